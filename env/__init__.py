@@ -1,0 +1,1 @@
+"""The game: rules, boats, observations, presets and pictures."""

@@ -1,0 +1,1 @@
+"""Policies: scripted opponents, submissions and learned ones, by name."""

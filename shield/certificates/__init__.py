@@ -1,0 +1,1 @@
+"""Certificates: functions of the fleet's state that are >= 0 while a boat can still keep clear."""

@@ -1,0 +1,35 @@
+"""Every error the package raises on bad input, as one tree. Each message names the remedy."""
+
+from __future__ import annotations
+
+
+class SteerclearError(Exception):
+    """Base of all errors this package raises on purpose."""
+
+
+class ConfigError(SteerclearError, ValueError):
+    """A setting is unknown, misspelt or out of range."""
+
+
+class PlatformError(ConfigError):
+    """A platform is unknown or its parameters make no sense."""
+
+
+class FleetError(SteerclearError, ValueError):
+    """The state or the commands handed to the shield have the wrong shape or a value that cannot be used."""
+
+
+class GameError(SteerclearError, ValueError):
+    """A game setting, action or initial state that the rules do not allow."""
+
+
+class PolicyError(SteerclearError, ValueError):
+    """A policy is unknown, cannot be loaded, or answered something that is not a command."""
+
+
+class TraceError(SteerclearError, ValueError):
+    """A recorded game cannot be read or lacks an array."""
+
+
+class SolverError(SteerclearError, RuntimeError):
+    """A QP backend is missing or cannot be used."""

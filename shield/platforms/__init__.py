@@ -1,0 +1,9 @@
+"""Boats: hull and autopilot models, their limits, and the autopilot's inverse."""
+
+from . import layout
+from .platform import Gains, Platform
+from .registry import PLATFORMS, get_platform
+from .step import step_boat
+from .usv import fresh_state
+
+__all__ = ["PLATFORMS", "Gains", "Platform", "fresh_state", "get_platform", "layout", "step_boat"]

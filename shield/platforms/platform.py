@@ -1,0 +1,118 @@
+"""`Platform`: a boat and its autopilot's settings, validated when built."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..exceptions import PlatformError
+from . import layout as L
+
+KINDS = {
+    "usv": L.KIND_USV,
+    "single_integrator": L.KIND_SINGLE_INTEGRATOR,
+    "double_integrator": L.KIND_DOUBLE_INTEGRATOR,
+}
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of one PID controller: output = p + i + d on the error; the integral is clamped."""
+
+    kp: float = 0.0
+    ki: float = 0.0
+    kd: float = 0.0
+    integral_limit: float = 0.0
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A boat behind its autopilot.
+
+    Units: speeds m/s, accelerations m/s^2, turn rates deg/s, thrust and rudder in percent. For
+    ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg and the
+    steady speed is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``; a limit of 0 on acceleration or
+    deceleration means none. Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``.
+
+    Raises:
+        PlatformError: a value is missing, non-finite or out of range, or the kind is unknown.
+    """
+
+    name: str
+    kind: str
+    max_speed_mps: float
+    thrust_map: tuple[tuple[float, float], ...] = ((0.0, 0.0), (100.0, 1.0))
+    speed_factor: float = 0.0
+    max_thrust: float = 100.0
+    max_rudder: float = 100.0
+    turn_loss: float = 0.0
+    turn_gain: float = 0.0
+    max_acc: float = 0.0
+    max_dec: float = 0.0
+    rotate_speed_dps: float = 0.0
+    speed_gain: float = 1.0
+    speed_pid: Gains = field(default_factory=Gains)
+    heading_pid: Gains = field(default_factory=Gains)
+    max_turn_rate_dps: float = 0.0
+    max_angular_acc_dps2: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise PlatformError(f"platform {self.name!r}: unknown kind {self.kind!r}; choose one of {sorted(KINDS)}")
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, (int, float)) and not math.isfinite(value):
+                raise PlatformError(f"platform {self.name!r}: {entry.name} is {value}; give a finite number")
+        if self.max_speed_mps <= 0:
+            raise PlatformError(f"platform {self.name!r}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
+        for name in ("max_acc", "max_dec", "max_thrust", "max_rudder", "max_turn_rate_dps", "max_angular_acc_dps2"):
+            if getattr(self, name) < 0:
+                raise PlatformError(f"platform {self.name!r}: {name} is {getattr(self, name)}; it must be >= 0")
+        self._check_thrust_map()
+
+    def _check_thrust_map(self) -> None:
+        thrusts = [point[0] for point in self.thrust_map]
+        if not 2 <= len(thrusts) <= L.MAP_CAPACITY or any(b <= a for a, b in pairwise(thrusts)):
+            raise PlatformError(
+                f"platform {self.name!r}: thrust_map needs 2 to {L.MAP_CAPACITY} (thrust, speed) points "
+                f"with rising thrust, got {self.thrust_map}"
+            )
+
+    def pack(self) -> NDArray[np.float64]:
+        """Parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
+        row = np.zeros(L.N_PARAM)
+        row[L.KIND] = KINDS[self.kind]
+        row[L.MAX_SPEED : L.ROTATE_SPEED + 1] = (
+            self.max_speed_mps,
+            self.speed_factor,
+            self.max_thrust,
+            self.max_rudder,
+            self.turn_loss,
+            self.turn_gain,
+            self.max_acc,
+            self.max_dec,
+            self.rotate_speed_dps,
+        )
+        speed, heading = self.speed_pid, self.heading_pid
+        row[L.SPEED_KP : L.SPEED_GAIN + 1] = speed.kp, speed.ki, speed.kd, speed.integral_limit, self.speed_gain
+        row[L.HEADING_KP : L.HEADING_LIMIT + 1] = heading.kp, heading.ki, heading.kd, heading.integral_limit
+        row[L.MAX_TURN_RATE] = self.max_turn_rate_dps
+        row[L.MAX_ANGULAR_ACC] = self.max_angular_acc_dps2
+        row[L.MAP_SIZE] = len(self.thrust_map)
+        for i, (thrust, speed_mps) in enumerate(self.thrust_map):
+            row[L.MAP_THRUST + i] = thrust
+            row[L.MAP_SPEED + i] = speed_mps
+        return row
+
+    def max_turn_rate_at(self, speed_mps: float) -> float:
+        """Highest steady turn rate, deg/s, at a straight-line speed (m/s): full rudder at that speed's thrust."""
+        if self.kind != "usv":
+            return self.max_turn_rate_dps
+        thrusts, speeds = np.asarray(self.thrust_map).T
+        thrust = min(float(np.interp(speed_mps, speeds, thrusts)), self.max_thrust)
+        rudder = min(self.max_rudder, 100.0)
+        return rudder * self.turn_gain / 100.0 * thrust / 50.0

@@ -1,0 +1,28 @@
+"""One step of any platform: the single place where dynamics are chosen by kind."""
+
+from __future__ import annotations
+
+from ..jit import Array, kernel
+from . import layout as L
+from .integrators import step_double_integrator, step_single_integrator
+from .usv import step_usv
+
+
+@kernel
+def step_boat(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
+    """Advance one boat by one step, in place.
+
+    Args:
+        params: platform row, shape ``(N_PARAM,)``.
+        state: state row, shape ``(N_STATE,)``.
+        desired_speed_mps: commanded speed, m/s.
+        heading_error_deg: commanded heading minus present heading, deg, as the autopilot is given it.
+        dt_s: step, s.
+    """
+    kind = params[L.KIND]
+    if kind == L.KIND_USV:
+        step_usv(params, state, desired_speed_mps, heading_error_deg, dt_s)
+    elif kind == L.KIND_SINGLE_INTEGRATOR:
+        step_single_integrator(params, state, desired_speed_mps, heading_error_deg, dt_s)
+    else:
+        step_double_integrator(params, state, desired_speed_mps, heading_error_deg, dt_s)

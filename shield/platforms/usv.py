@@ -1,0 +1,190 @@
+"""Thrust-and-rudder boat behind a heading and speed controller, one compiled step.
+
+The model is the one of MOOS-IvP's uSimMarine (thrust map, turn loss, turn rate) behind pMarinePID, as the
+competition's simulator uses it. ``step_usv`` is the whole boat as a policy sees it; ``actuate_usv`` is the
+hull alone, for predictions that choose rudder and speed command directly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..jit import Array, kernel
+from . import layout as L
+
+
+@kernel
+def wrap_degrees(angle_deg: float) -> float:
+    """Angle brought into [-180, 180]; both ends are kept, as the reference simulator keeps them.
+
+    A non-finite angle gives NaN: a loop on infinity would never end.
+    """
+    if not abs(angle_deg) <= 540.0:
+        angle_deg = math.fmod(angle_deg, 360.0)
+    if angle_deg > 180.0:
+        return angle_deg - 360.0
+    if angle_deg < -180.0:
+        return angle_deg + 360.0
+    return angle_deg
+
+
+@kernel
+def clamp(value: float, low: float, high: float) -> float:
+    """Value limited to [low, high]; NaN stays NaN."""
+    if value > high:
+        return high
+    if value < low:
+        return low
+    return value
+
+
+@kernel
+def speed_of_thrust(params: Array, thrust: float) -> float:
+    """Steady straight-line speed, m/s, that a thrust (percent) gives; flat beyond the map's ends."""
+    size = int(params[L.MAP_SIZE])
+    if thrust <= params[L.MAP_THRUST]:
+        return params[L.MAP_SPEED]
+    for i in range(1, size):
+        high = params[L.MAP_THRUST + i]
+        if thrust <= high:
+            low = params[L.MAP_THRUST + i - 1]
+            v_low = params[L.MAP_SPEED + i - 1]
+            v_high = params[L.MAP_SPEED + i]
+            return v_low + (v_high - v_low) / (high - low) * (thrust - low)
+    return params[L.MAP_SPEED + size - 1]
+
+
+@kernel
+def _controller(
+    kp: float, ki: float, kd: float, limit: float, error: float, previous_error: float, integral: float, dt_s: float
+) -> tuple[float, float]:
+    """PID output before clamping and its new integral; the derivative is 0 on the first call (NaN memory)."""
+    derivative = 0.0
+    if not math.isnan(previous_error):
+        derivative = (error - previous_error) / dt_s
+    integral = clamp(integral + ki * error * dt_s, -limit, limit)
+    return kp * error + kd * derivative + integral, integral
+
+
+@kernel
+def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: float) -> None:
+    """Advance the speed controller in ``state`` by one step and set its thrust."""
+    if params[L.SPEED_FACTOR] != 0.0:
+        thrust = desired_speed_mps * params[L.SPEED_FACTOR]
+    else:
+        error = desired_speed_mps - state[L.SPEED]
+        output, integral = _controller(
+            params[L.SPEED_KP],
+            params[L.SPEED_KI],
+            params[L.SPEED_KD],
+            params[L.SPEED_LIMIT],
+            error,
+            state[L.SPEED_ERROR],
+            state[L.SPEED_INTEGRAL],
+            dt_s,
+        )
+        output = clamp(output, -params[L.MAX_THRUST], params[L.MAX_THRUST])
+        state[L.SPEED_ERROR] = error
+        state[L.SPEED_INTEGRAL] = integral
+        thrust = state[L.THRUST] + params[L.SPEED_GAIN] * output
+    if thrust < 0.01:
+        thrust = 0.0
+    state[L.THRUST] = clamp(thrust, -params[L.MAX_THRUST], params[L.MAX_THRUST])
+
+
+@kernel
+def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: float) -> None:
+    """Advance the heading controller; without thrust the rudder is 0 and its memory stays as it was."""
+    if not state[L.THRUST] > 0.0:
+        state[L.RUDDER] = 0.0
+        return
+    output, integral = _controller(
+        params[L.HEADING_KP],
+        params[L.HEADING_KI],
+        params[L.HEADING_KD],
+        params[L.HEADING_LIMIT],
+        heading_error_deg,
+        state[L.HEADING_ERROR],
+        state[L.HEADING_INTEGRAL],
+        dt_s,
+    )
+    limit = min(params[L.MAX_RUDDER], 100.0)
+    state[L.RUDDER] = clamp(output, -limit, limit)
+    state[L.HEADING_ERROR] = heading_error_deg
+    state[L.HEADING_INTEGRAL] = integral
+
+
+@kernel
+def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> float:
+    """Heading change, deg, of one step with way on: proportional to rudder and to thrust."""
+    turn = rudder * (params[L.TURN_GAIN] / 100.0) * dt_s * (1.0 + (abs(thrust) - 50.0) / 50.0)
+    if thrust < 0.0:
+        turn = -turn
+    return turn
+
+
+@kernel
+def next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, dt_s: float) -> float:
+    """Speed at the end of a step, m/s, before the hull's mean is stored."""
+    speed = speed_of_thrust(params, thrust) * (1.0 - (abs(rudder) / 100.0) * params[L.TURN_LOSS])
+    max_acc = params[L.MAX_ACC]
+    max_dec = params[L.MAX_DEC]
+    if max_acc > 0.0 and (speed - speed_mps) / dt_s > max_acc:
+        return speed_mps + max_acc * dt_s
+    if max_dec > 0.0 and (speed_mps - speed) / dt_s > max_dec:
+        return speed_mps - max_dec * dt_s
+    return speed
+
+
+@kernel
+def advance_hull(params: Array, state: Array, dt_s: float) -> None:
+    """Move the hull one step under the thrust and rudder in ``state`` (positions in m, headings in deg)."""
+    thrust = state[L.THRUST]
+    rudder = state[L.RUDDER]
+    speed = next_speed(params, state[L.SPEED], thrust, rudder, dt_s)
+    turn = params[L.ROTATE_SPEED] * dt_s
+    if speed != 0.0:
+        turn += turn_of_rudder(params, thrust, rudder, dt_s)
+    move_along_mean(params, state, speed, state[L.HEADING] + turn, dt_s)
+
+
+@kernel
+def move_along_mean(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
+    """Move with the mean of old and new speed along the mean heading; the mean speed is what is stored."""
+    mean_speed = 0.5 * (speed_mps + state[L.SPEED])
+    mean_heading = math.radians(0.5 * (state[L.HEADING] + heading_deg))
+    state[L.X] += math.sin(mean_heading) * mean_speed * dt_s
+    state[L.Y] += math.cos(mean_heading) * mean_speed * dt_s
+    state[L.SPEED] = clamp(mean_speed, 0.0, params[L.MAX_SPEED])
+    state[L.HEADING] = wrap_degrees(heading_deg)
+
+
+@kernel
+def step_usv(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
+    """One full step: speed controller, heading controller, hull. Changes ``state`` in place."""
+    update_thrust(params, state, desired_speed_mps, dt_s)
+    update_rudder(params, state, heading_error_deg, dt_s)
+    advance_hull(params, state, dt_s)
+
+
+@kernel
+def actuate_usv(params: Array, state: Array, desired_speed_mps: float, rudder: float, dt_s: float) -> None:
+    """One step with the rudder given (percent) instead of asked of the heading controller."""
+    update_thrust(params, state, desired_speed_mps, dt_s)
+    limit = min(params[L.MAX_RUDDER], 100.0)
+    state[L.RUDDER] = clamp(rudder, -limit, limit) if state[L.THRUST] > 0.0 else 0.0
+    advance_hull(params, state, dt_s)
+
+
+def fresh_state(x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0.0) -> np.ndarray:
+    """State row of a boat whose autopilot has not run yet.
+
+    Returns:
+        Array of shape ``(N_STATE,)``, float64.
+    """
+    row = np.zeros(L.N_STATE)
+    row[[L.X, L.Y, L.HEADING, L.SPEED]] = x_m, y_m, heading_deg, speed_mps
+    row[[L.SPEED_ERROR, L.HEADING_ERROR]] = np.nan
+    return row

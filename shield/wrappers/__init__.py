@@ -1,0 +1,1 @@
+"""Wrappers that put the shield around policies and environments."""
