@@ -1,0 +1,183 @@
+"""Recording a game step by step; ``record_file`` describes the arrays and reads and writes them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.env.record_file import (
+    ARRAYS,
+    LAYOUT,
+    META_KEYS,
+    NOT_COVERED,
+    Record,
+    load,
+    make_record,
+    plain,
+    read_meta,
+    save,
+    validate,
+)
+from steerclear.shield.exceptions import TraceError
+from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
+
+__all__ = [
+    "ARRAYS",
+    "META_KEYS",
+    "NOT_COVERED",
+    "GameRecorder",
+    "Record",
+    "absolute_commands",
+    "find_breaches",
+    "load",
+    "make_record",
+    "read_meta",
+    "save",
+    "validate",
+]
+
+
+def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
+    """Turn the game's commands into the record's.
+
+    Args:
+        commands: (n, 2) speed m/s and heading deg relative to the boat's own.
+        heading_deg: (n,) headings of the boats when the command is given.
+
+    Returns:
+        (n, 2) speed m/s and absolute heading deg in [-180, 180).
+    """
+    absolute = np.array(commands, dtype=np.float64)
+    absolute[:, 1] = (absolute[:, 1] + heading_deg + 180.0) % 360.0 - 180.0
+    return absolute
+
+
+def find_breaches(position: np.ndarray, separation_m: float) -> np.ndarray:
+    """List every entry of two boats into the separation radius.
+
+    The start position itself is not counted, so a pair that starts inside counts at the first step.
+
+    Args:
+        position: (T+1, n, 2) positions, m.
+        separation_m: Two centres at this distance or less are a breach.
+
+    Returns:
+        (K, 4) in order of time: index (1..T) of the first state inside, boat a, boat b (a < b), closest
+        distance m until the pair is apart again.
+
+    Raises:
+        TraceError: Another shape, or a radius that is not positive.
+    """
+    if position.ndim != 3 or position.shape[2] != 2:
+        raise TraceError(f"positions have shape {position.shape}, expected (steps + 1, boats, 2).")
+    if not separation_m > 0.0:
+        raise TraceError(f"the separation radius is {separation_m}, it must be positive (metres).")
+    found: list[tuple[float, float, float, float]] = []
+    for a, b in zip(*np.triu_indices(position.shape[1], k=1), strict=True):
+        distance_m = np.linalg.norm(position[1:, a] - position[1:, b], axis=1)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], distance_m <= separation_m, [False]))))
+        for first, after in edges.reshape(-1, 2):
+            found.append((first + 1.0, float(a), float(b), float(distance_m[first:after].min())))
+    return np.array(sorted(found), dtype=np.float64).reshape(-1, 4)
+
+
+class GameRecorder:
+    """Collects a game step by step.
+
+    Example:
+        ``recorder.start(env.view(), meta)``, after each step ``recorder.step(env.view(), wanted, sent)``,
+        at the end ``save(recorder.finish(breaches), "game.npz")``.
+    """
+
+    def __init__(self) -> None:
+        self._meta: dict[str, Any] | None = None
+        self._rows: dict[str, list[np.ndarray]] = {}
+
+    def start(self, view: Any, meta: Mapping[str, Any]) -> None:
+        """Begin a new game; what an earlier one left is dropped.
+
+        Args:
+            view: The game's state before its first step (a ``GameView``).
+            meta: Settings of the game, keyed by at least ``META_KEYS``.
+
+        Raises:
+            TraceError: ``meta`` lacks a key.
+        """
+        read_meta({"meta": np.array(json.dumps(dict(meta), default=plain))})
+        self._meta = dict(meta)
+        self._rows = {name: [] for name in ARRAYS if name != "breaches"}
+        self._append(_state_of(view))
+
+    def step(
+        self,
+        view: Any,
+        wanted: np.ndarray,
+        sent: np.ndarray,
+        reason: np.ndarray | None = None,
+        intervened: np.ndarray | None = None,
+        certificate_m: np.ndarray | None = None,
+    ) -> None:
+        """Add one step.
+
+        Args:
+            view: The game's state after the step.
+            wanted: (n, 2) speed m/s and absolute heading deg asked for before the step.
+            sent: (n, 2) likewise, what the boats were told.
+            reason: (n,) reason codes; all ``NOT_COVERED`` when left out.
+            intervened: (n,) bool; all False when left out.
+            certificate_m: (n,) certificate values, m; all NaN when left out.
+
+        Raises:
+            TraceError: ``start`` was not called, or an array has the wrong shape.
+        """
+        if self._meta is None:
+            raise TraceError("no game is being recorded. Call start() before step().")
+        n = len(self._meta["agent_ids"])
+        given = {
+            "wanted": wanted,
+            "sent": sent,
+            "reason": np.full(n, NOT_COVERED) if reason is None else reason,
+            "intervened": np.zeros(n, bool) if intervened is None else intervened,
+            "certificate_m": np.full(n, np.nan) if certificate_m is None else certificate_m,
+        }
+        self._append(given | _state_of(view))
+
+    def finish(self, breaches: Sequence[Sequence[float]] | np.ndarray = ()) -> Record:
+        """Close the game.
+
+        Args:
+            breaches: (K, 4) first step, boat a, boat b, closest distance m, as ``find_breaches`` gives.
+
+        Returns:
+            The validated record.
+
+        Raises:
+            TraceError: ``start`` was not called, or the arrays do not fit together.
+        """
+        if self._meta is None:
+            raise TraceError("no game is being recorded. Call start() before finish().")
+        arrays = {name: np.array(rows).reshape(-1, *self._row_shape(name)) for name, rows in self._rows.items()}
+        return make_record(self._meta, breaches=np.array(breaches, dtype=np.float64).reshape(-1, 4), **arrays)
+
+    def _append(self, given: Mapping[str, Any]) -> None:
+        """Add one row to each array named, or to none of them when one does not fit."""
+        rows = {name: np.array(values, dtype=LAYOUT[name][1]) for name, values in given.items()}
+        for name, row in rows.items():
+            if row.shape != (want := self._row_shape(name)):
+                raise TraceError(f"the game's {name} has shape {row.shape}, expected {want}: pass one row per boat.")
+        for name, row in rows.items():
+            self._rows[name].append(row)
+
+    def _row_shape(self, name: str) -> tuple[int, ...]:
+        boats = len((self._meta or {})["agent_ids"])
+        return tuple(boats if axis == "n" else int(axis) for axis in LAYOUT[name][0][1:])
+
+
+def _state_of(view: Any) -> dict[str, Any]:
+    """Return the part of a record that a ``GameView`` holds."""
+    state = np.asarray(view.state)
+    moving = {"position": state[:, [X, Y]], "heading_deg": state[:, HEADING], "speed_mps": state[:, SPEED]}
+    marks = ("has_flag", "is_tagged", "oob", "flag_position", "captures")
+    return moving | {name: getattr(view, name) for name in marks}

@@ -1,0 +1,231 @@
+"""The record of a game: every array a replay, a picture or an analysis needs, in one ``.npz`` file.
+
+A record is a plain dict of numpy arrays. With ``n`` boats (blue team first) and ``T`` steps:
+
+=================  ==============  =======================================================================
+array              shape           contents
+=================  ==============  =======================================================================
+``meta``           ()              JSON text, see ``META_KEYS``
+``position``       (T+1, n, 2)     m, state before step t at index t
+``heading_deg``    (T+1, n)        deg, clockwise from north
+``speed_mps``      (T+1, n)        m/s
+``has_flag``       (T+1, n)        bool; likewise ``is_tagged`` and ``oob`` (out of bounds)
+``flag_position``  (T+1, 2, 2)     m, flag of team 0 and of team 1
+``captures``       (T+1, 2)        captures made by each team so far
+``wanted``         (T, n, 2)       speed m/s and absolute heading deg the policy asked for
+``sent``           (T, n, 2)       what the boat was told
+``reason``         (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
+``intervened``     (T, n)          bool, sent differs from wanted
+``certificate_m``  (T, n)          float32, NaN where there is none
+``breaches``       (K, 4)          index of the first state inside, boat a, boat b, closest distance m
+=================  ==============  =======================================================================
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import TraceError
+
+Record = dict[str, np.ndarray]
+
+NOT_COVERED = 6
+"""Reason code of a boat for which no shield decided (``Reason.NOT_COVERED``)."""
+
+META_KEYS = (
+    "dt_s",
+    "env_bounds_m",
+    "team_size",
+    "agent_ids",
+    "team",
+    "flag_home",
+    "catch_radius_m",
+    "flag_keepout_m",
+    "agent_radius_m",
+    "separation_m",
+    "preset",
+    "policies",
+    "shielded",
+    "seed",
+    "reason_names",
+    "platforms",
+)
+"""Keys that ``meta`` must have; further keys (``obstacles``, ``title``) are kept."""
+
+LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
+    "position": (("T+1", "n", 2), np.float64),
+    "heading_deg": (("T+1", "n"), np.float64),
+    "speed_mps": (("T+1", "n"), np.float64),
+    "has_flag": (("T+1", "n"), np.bool_),
+    "is_tagged": (("T+1", "n"), np.bool_),
+    "oob": (("T+1", "n"), np.bool_),
+    "flag_position": (("T+1", 2, 2), np.float64),
+    "captures": (("T+1", 2), np.int64),
+    "wanted": (("T", "n", 2), np.float64),
+    "sent": (("T", "n", 2), np.float64),
+    "reason": (("T", "n"), np.uint8),
+    "intervened": (("T", "n"), np.bool_),
+    "certificate_m": (("T", "n"), np.float32),
+    "breaches": (("K", 4), np.float64),
+}
+"""Per array: its axes (T steps, n boats, K breaches) and its type."""
+
+ARRAYS = tuple(LAYOUT)
+"""Names of the arrays beside ``meta``."""
+
+_MUST_BE_FINITE = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
+_AGAIN = "Record the game again with GameRecorder and save() it."
+
+
+def read_meta(record: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Decode the record's ``meta``.
+
+    Args:
+        record: A record.
+
+    Returns:
+        The settings of the game, keyed by at least ``META_KEYS``.
+
+    Raises:
+        TraceError: ``meta`` is missing, no JSON object, or lacks a key.
+    """
+    if "meta" not in record:
+        raise TraceError(f"the record has no 'meta'. {_AGAIN}")
+    try:
+        meta = json.loads(str(record["meta"]))
+    except json.JSONDecodeError as error:
+        raise TraceError(f"the record's meta is not JSON ({error}). {_AGAIN}") from None
+    missing = [key for key in META_KEYS if not isinstance(meta, dict) or key not in meta]
+    if missing:
+        raise TraceError(f"the record's meta lacks {', '.join(missing)}. Pass them to GameRecorder.start().")
+    return meta
+
+
+def validate(record: Mapping[str, np.ndarray]) -> None:
+    """Check that a record is complete and that its shapes fit together.
+
+    Args:
+        record: Arrays to check.
+
+    Raises:
+        TraceError: An array is missing, has the wrong shape, or holds a value that cannot be drawn.
+    """
+    meta = read_meta(record)
+    missing = [name for name in ARRAYS if name not in record]
+    if missing:
+        raise TraceError(f"the record lacks {', '.join(missing)}. {_AGAIN}")
+    n, steps = len(meta["agent_ids"]), len(record["wanted"])
+    sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(record["breaches"])}
+    for name, (axes, _) in LAYOUT.items():
+        want = tuple(axis if isinstance(axis, int) else sizes[axis] for axis in axes)
+        if record[name].shape != want:
+            raise TraceError(f"the record's {name} has shape {record[name].shape}, expected {want}. {_AGAIN}")
+    for name in _MUST_BE_FINITE:
+        if not np.isfinite(record[name]).all():
+            raise TraceError(f"the record's {name} holds NaN or infinity. {_AGAIN}")
+    _check_breaches(record["breaches"], steps, n)
+    if len(meta["team"]) != n or len(meta["platforms"]) != n:
+        raise TraceError(f"meta's team and platforms must have one entry for each of the {n} boats. {_AGAIN}")
+
+
+def _check_breaches(breaches: np.ndarray, steps: int, n: int) -> None:
+    inside = (breaches[:, :3] >= 0).all() and (breaches[:, 0] <= steps).all() and (breaches[:, 1:3] < n).all()
+    if not inside:
+        raise TraceError(f"the record's breaches name a step beyond {steps} or a boat beyond {n - 1}. {_AGAIN}")
+
+
+def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
+    """Build a record from whole arrays, cast to the record's types.
+
+    Args:
+        meta: Settings of the game, keyed by at least ``META_KEYS``.
+        **arrays: The arrays named in ``ARRAYS``.
+
+    Returns:
+        A validated record.
+
+    Raises:
+        TraceError: An array is missing, unknown, or does not fit the others.
+    """
+    unknown = sorted(set(arrays) - set(ARRAYS))
+    if unknown:
+        raise TraceError(f"a record has no array {', '.join(unknown)}; it has {', '.join(ARRAYS)}.")
+    record = {name: np.asarray(values, dtype=LAYOUT[name][1]) for name, values in arrays.items()}
+    record["meta"] = np.array(json.dumps(dict(meta), default=plain))
+    validate(record)
+    return record
+
+
+def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path:
+    """Write a record; an interrupted write leaves no half file and no damaged older one.
+
+    Args:
+        record: A record.
+        path: File to write; ``.npz`` is added when the name has no such ending.
+
+    Returns:
+        The path written.
+
+    Raises:
+        TraceError: The record is incomplete, or the folder cannot be written to.
+    """
+    validate(record)
+    target = Path(path)
+    if target.suffix != ".npz":
+        target = target.with_name(target.name + ".npz")
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **record)
+        os.replace(part, target)
+    except OSError as error:
+        raise TraceError(f"cannot write the record {target}: {error}. Choose a folder you may write to.") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def load(path: str | os.PathLike[str]) -> Record:
+    """Read a record and check it.
+
+    Args:
+        path: An ``.npz`` file written by ``save``.
+
+    Returns:
+        The record.
+
+    Raises:
+        TraceError: The file is missing, cut, not a record, or lacks an array.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise TraceError(f"there is no record {source}. Check the path, or record a game first.")
+    try:
+        with np.load(source, allow_pickle=False) as archive:
+            record = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+        raise TraceError(f"{source} is cut or not a record ({error}). {_AGAIN}") from error
+    try:
+        validate(record)
+    except TraceError as error:
+        raise TraceError(f"{source}: {error}") from None
+    return record
+
+
+def plain(value: Any) -> Any:
+    """Let ``json`` write numpy values.
+
+    Raises:
+        TypeError: The value has no JSON form.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no JSON form")
