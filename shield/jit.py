@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -15,9 +18,27 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+@cache
+def _tree_stamp() -> tuple[str, int]:
+    """Stamp of all sources that may be compiled into one another."""
+    here = Path(__file__).parent
+    folders = (here, here.parent / "env", here.parent / "policies")
+    files = sorted(path for folder in folders for path in folder.rglob("*.py"))
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(str(path).encode() + path.read_bytes())
+    return digest.hexdigest(), len(files)
+
+
 def kernel(function: F) -> F:
     """Compile a function with numba: cached on disk, without the GIL, IEEE division (no ZeroDivisionError).
 
     Fast-math stays off: results must be the same bits everywhere, and NaN tests must work.
+    numba's cache looks at a function's own file only, although callees from other files are compiled into it;
+    the stamp is therefore replaced by one over all sources, so that no stale machine code is ever run.
     """
-    return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
+    compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
+    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if hasattr(cache_file, "_source_stamp"):
+        cache_file._source_stamp = _tree_stamp()
+    return cast(F, compiled)

@@ -22,7 +22,7 @@ def wrap_degrees(angle_deg: float) -> float:
     A non-finite angle gives NaN: a loop on infinity would never end.
     """
     if not abs(angle_deg) <= 540.0:
-        angle_deg = math.fmod(angle_deg, 360.0)
+        angle_deg = np.fmod(angle_deg, 360.0)
     if angle_deg > 180.0:
         return angle_deg - 360.0
     if angle_deg < -180.0:

@@ -1,0 +1,90 @@
+"""The boat in actuator terms, and the autopilot's inverse.
+
+A heading controller with a derivative term answers a *change* of command at once and a held error slowly, so
+the same boat turns several times harder when its commands are chosen through the controller. `actuate` moves
+a boat by a turn (deg in this step) and a speed command; `command_for_turn` gives the heading error that makes
+the autopilot produce exactly that turn now.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, kernel
+from . import layout as L
+from .integrators import step_double_integrator, step_single_integrator
+from .usv import actuate_usv, clamp, turn_of_rudder, update_thrust
+
+
+@kernel
+def largest_turn(params: Array, state: Array, dt_s: float) -> float:
+    """Largest turn, deg, that one step can make with the present thrust (or turn-rate limit)."""
+    if params[L.KIND] == L.KIND_USV:
+        return abs(turn_of_rudder(params, state[L.THRUST], min(params[L.MAX_RUDDER], 100.0), dt_s))
+    if params[L.KIND] == L.KIND_SINGLE_INTEGRATOR:
+        return params[L.MAX_TURN_RATE] * dt_s
+    reach = abs(state[L.TURN_RATE]) + params[L.MAX_ANGULAR_ACC] * dt_s
+    return min(reach, params[L.MAX_TURN_RATE]) * dt_s
+
+
+@kernel
+def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
+    """Advance one step turning by ``turn_deg`` as nearly as the actuators allow; changes ``state`` in place.
+
+    The heading controller's memory is left alone: a prediction made of such steps needs none.
+    """
+    kind = params[L.KIND]
+    if kind == L.KIND_USV:
+        before = state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL]
+        update_thrust(params, state, speed_mps, dt_s)
+        full = turn_of_rudder(params, state[L.THRUST], 100.0, dt_s)
+        state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = before
+        rudder = 0.0
+        if full > 0.0:
+            rudder = clamp(100.0 * turn_deg / full, -100.0, 100.0)
+        actuate_usv(params, state, speed_mps, rudder, dt_s)
+    elif kind == L.KIND_SINGLE_INTEGRATOR:
+        step_single_integrator(params, state, speed_mps, turn_deg, dt_s)
+    else:
+        step_double_integrator(params, state, speed_mps, turn_deg, dt_s)
+
+
+@kernel
+def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> float:
+    """Heading error, deg in [-180, 180], that makes the autopilot turn the boat by ``turn_deg`` in this step.
+
+    For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e, where e0 and I are
+    the controller's memory (derivative 0 when it has none). Without thrust there is no rudder to command and the
+    error returned is 0. An answer beyond +-180 deg is cut there: the turn is then the nearest one possible.
+    """
+    if params[L.KIND] != L.KIND_USV:
+        return clamp(turn_deg, -180.0, 180.0)
+    before = state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL]
+    update_thrust(params, state, speed_mps, dt_s)
+    full = turn_of_rudder(params, state[L.THRUST], 100.0, dt_s)
+    state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = before
+    if not full > 0.0:
+        return 0.0
+    limit = min(params[L.MAX_RUDDER], 100.0)
+    rudder = clamp(100.0 * turn_deg / full, -limit, limit)
+    return _error_for_rudder(params, state, rudder, dt_s)
+
+
+@kernel
+def _error_for_rudder(params: Array, state: Array, rudder: float, dt_s: float) -> float:
+    """Invert the heading controller, trying the integral free first, then clamped at its nearer end."""
+    last = state[L.HEADING_ERROR]
+    gain = params[L.HEADING_KP]
+    offset = 0.0
+    if not math.isnan(last):
+        gain += params[L.HEADING_KD] / dt_s
+        offset = -params[L.HEADING_KD] / dt_s * last
+    limit = params[L.HEADING_LIMIT]
+    step = params[L.HEADING_KI] * dt_s
+    if gain + step <= 0.0:
+        return 0.0
+    error = (rudder - offset - state[L.HEADING_INTEGRAL]) / (gain + step)
+    integral = state[L.HEADING_INTEGRAL] + step * error
+    if abs(integral) > limit and gain > 0.0:
+        error = (rudder - offset - clamp(integral, -limit, limit)) / gain
+    return clamp(error, -180.0, 180.0)

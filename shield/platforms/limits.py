@@ -1,0 +1,87 @@
+"""What a platform can do, found by running its own model: how fast it gains speed and how long a turn takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from . import layout as L
+from .actuator import actuate, largest_turn
+from .platform import Platform
+from .usv import fresh_state
+
+LONGEST_S = 60.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Measured limits of a platform behind its autopilot.
+
+    Attributes:
+        top_speed_mps: top speed, m/s.
+        acceleration_mps2: highest acceleration, mean over any second of a full-speed start from rest, m/s^2.
+        turn_rate_dps: highest turn rate at top speed, deg/s.
+        half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
+        stop_s: time from top speed to below 5 % of it under a stop command, s.
+    """
+
+    top_speed_mps: float
+    acceleration_mps2: float
+    turn_rate_dps: float
+    half_turn_s: float
+    stop_s: float
+
+
+@lru_cache(maxsize=64)
+def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
+    """Limits of a platform, by simulation with step ``dt_s``, s."""
+    return Limits(
+        top_speed_mps=platform.max_speed_mps,
+        acceleration_mps2=_acceleration(platform, dt_s),
+        turn_rate_dps=platform.max_turn_rate_at(platform.max_speed_mps),
+        half_turn_s=_half_turn(platform, dt_s),
+        stop_s=_stop(platform, dt_s),
+    )
+
+
+def _acceleration(platform: Platform, dt_s: float) -> float:
+    params, state = platform.pack(), fresh_state(0.0, 0.0, 0.0)
+    speeds = [0.0]
+    for _ in range(int(LONGEST_S / dt_s)):
+        actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
+        speeds.append(state[L.SPEED])
+        if state[L.SPEED] > 0.98 * platform.max_speed_mps:
+            break
+    window = max(1, round(1.0 / dt_s))
+    if len(speeds) <= window:
+        return float(max(speeds)) / (dt_s * (len(speeds) - 1))
+    return float(max(b - a for a, b in zip(speeds, speeds[window:], strict=False))) / (window * dt_s)
+
+
+def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[object, object]:
+    """Parameters and state of the boat once it has settled at top speed, heading north from the origin."""
+    params, state = platform.pack(), fresh_state(0.0, 0.0, 0.0)
+    for _ in range(int(LONGEST_S / dt_s)):
+        actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
+    state[[L.X, L.Y]] = 0.0
+    return params, state
+
+
+def _half_turn(platform: Platform, dt_s: float) -> float:
+    params, state = cruise(platform, dt_s)
+    turned, step = 0.0, 0
+    while turned < 180.0 and step * dt_s < LONGEST_S:
+        before = state[L.HEADING]  # type: ignore[index]
+        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
+        turned += (state[L.HEADING] - before) % 360.0  # type: ignore[index]
+        step += 1
+    return step * dt_s
+
+
+def _stop(platform: Platform, dt_s: float) -> float:
+    params, state = cruise(platform, dt_s)
+    step = 0
+    while state[L.SPEED] > 0.05 * platform.max_speed_mps and step * dt_s < LONGEST_S:  # type: ignore[index]
+        actuate(params, state, 0.0, 0.0, dt_s)
+        step += 1
+    return step * dt_s
