@@ -80,23 +80,6 @@ def count_breaches(distances: PairDistances, radius_m: float) -> int:
     return int(entries(distances, radius_m).sum())
 
 
-def list_breaches(distances: PairDistances, radius_m: float) -> NDArray[np.float64]:
-    """List every breach with its closest distance.
-
-    Returns:
-        (K, 4) rows of step (1..T), boat, boat, closest distance in m until the pair is out again; by step.
-    """
-    rows = []
-    for column, pair in enumerate(distances.pairs):
-        track = distances.distance_m[:, column]
-        inside = track <= radius_m
-        for start in np.flatnonzero(entries(distances, radius_m)[:, column]):
-            after = np.flatnonzero(~inside[start:])
-            end = start + after[0] if len(after) else len(track)
-            rows.append((start + 1.0, float(pair[0]), float(pair[1]), float(track[start:end].min())))
-    return np.array(sorted(rows), dtype=np.float64).reshape(-1, 4)
-
-
 def team_pairs(team: ArrayLike, side: int, kind: str) -> NDArray[np.bool_]:
     """Choose a team's pairs, in the order of `PairDistances.of`.
 

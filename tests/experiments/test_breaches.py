@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from steerclear.experiments.breaches import PairDistances, count_breaches, entries, list_breaches, team_pairs
+from steerclear.env.record import find_breaches
+from steerclear.experiments.breaches import PairDistances, count_breaches, entries, team_pairs
 from steerclear.experiments.reversals import count_reversals, heading_change_deg
 from steerclear.shield.exceptions import ConfigError
 
@@ -36,20 +37,6 @@ def test_a_wider_radius_merges_visits():
     assert count_breaches(track, 4.0) == 1
 
 
-def test_breaches_are_listed_with_step_pair_and_closest_distance():
-    rows = list_breaches(two_boats(5, 2, 1.5, 2, 5, 2.25), 2.5)
-    np.testing.assert_allclose(rows, [[1, 0, 1, 1.5], [5, 0, 1, 2.25]])
-    assert list_breaches(two_boats(5, 5), 2.5).shape == (0, 4)
-
-
-def test_breaches_of_several_pairs_come_in_order_of_time():
-    track = np.zeros((4, 3, 2))
-    track[:, 1, 0] = [9, 9, 9, 1]
-    track[:, 2, 0] = [20, 20, 9.5, 20]
-    rows = list_breaches(PairDistances.of(track), 2.0)
-    np.testing.assert_allclose(rows, [[2, 1, 2, 0.5], [3, 0, 1, 1.0]])
-
-
 def test_pairs_of_a_team():
     team = [0, 0, 1, 1]
     distances = PairDistances.of(np.zeros((1, 4, 2)))
@@ -60,11 +47,13 @@ def test_pairs_of_a_team():
     assert own.closest_m() == np.inf
 
 
-@given(st.lists(st.floats(0.0, 10.0), min_size=1, max_size=40), st.floats(0.1, 9.0))
-def test_list_and_count_agree_and_shifting_the_fleet_changes_nothing(gaps_m, radius_m):
+@given(st.lists(st.integers(0, 40).map(lambda n: n / 4), min_size=1, max_size=40), st.sampled_from([0.5, 2.5, 4.0]))
+def test_count_agrees_with_the_recorder_and_swapping_boats_changes_nothing(gaps_m, radius_m):
     distances = two_boats(*gaps_m)
     moved = PairDistances(distances.pairs[:, ::-1], distances.distance_m)
-    assert len(list_breaches(distances, radius_m)) == count_breaches(distances, radius_m)
+    track = np.zeros((len(gaps_m), 2, 2))
+    track[:, 1, 0] = gaps_m
+    assert len(find_breaches(track, radius_m)) == count_breaches(distances, radius_m)
     assert count_breaches(moved, radius_m) == count_breaches(distances, radius_m)
     assert entries(distances, radius_m).shape == distances.distance_m.shape
 

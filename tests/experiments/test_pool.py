@@ -1,0 +1,67 @@
+import os
+import signal
+import threading
+import time
+
+import pytest
+from steerclear.experiments.pool import attempt, available_cores, check_jobs, run_all
+from steerclear.shield.exceptions import ConfigError, GameError
+
+
+def work(job):
+    """Importable by spawned workers: negative numbers go wrong, 99 kills the worker, 50 takes for ever."""
+    if job == -1:
+        raise GameError("a game setting is wrong; change it")
+    if job < 0:
+        raise RuntimeError("went wrong")
+    if job == 99:
+        os._exit(3)
+    if job == 50:
+        time.sleep(600.0)
+    return job * job, os.getpid()
+
+
+def test_one_process_answers_in_order_and_errors_do_not_stop_the_rest():
+    outcomes = list(run_all(work, [3, -1, -2, 4]))
+    assert [outcome.job for outcome in outcomes] == [3, -1, -2, 4]
+    assert [outcome.answer and outcome.answer[0] for outcome in outcomes] == [9, None, None, 16]
+    assert outcomes[1].error == "a game setting is wrong; change it"
+    assert outcomes[2].error == "RuntimeError: went wrong"
+
+
+def test_several_processes_answer_every_job():
+    outcomes = list(run_all(work, [1, 2, -2, 3, 4], processes=2))
+    assert sorted(outcome.job for outcome in outcomes) == [-2, 1, 2, 3, 4]
+    assert {outcome.job: outcome.answer[0] for outcome in outcomes if outcome.answer} == {1: 1, 2: 4, 3: 9, 4: 16}
+    assert os.getpid() not in {outcome.answer[1] for outcome in outcomes if outcome.answer}
+
+
+def test_a_dead_worker_is_reported_with_a_remedy():
+    outcomes = list(run_all(work, [99, 99], processes=2))
+    assert len(outcomes) == 2
+    assert all("--resume" in outcome.error for outcome in outcomes)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_interrupt_keeps_what_is_finished_and_ends_the_workers():
+    finished = []
+    timer = threading.Timer(30.0, os.kill, (os.getpid(), signal.SIGTERM))  # a hang fails the run, not the machine
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012 - the loop is what is interrupted
+        for outcome in run_all(work, [1, 50, 50], processes=2):
+            finished.append(outcome.job)
+            raise KeyboardInterrupt
+    timer.cancel()
+    assert finished == [1]
+
+
+def test_an_error_keeps_its_traceback_in_the_log(caplog):
+    attempt(work, -2)
+    assert "RuntimeError: went wrong" in caplog.text
+
+
+def test_number_of_processes():
+    assert check_jobs(None) == available_cores() >= 1
+    assert check_jobs(3) == 3
+    with pytest.raises(ConfigError, match="at least 1"):
+        check_jobs(0)
