@@ -1,0 +1,154 @@
+"""Pictures and films of a record."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pygame
+from PIL import Image
+from steerclear.env.record_file import read_meta, validate
+from steerclear.env.render.arena import Arena
+from steerclear.env.render.picture import Picture, pixels
+from steerclear.env.render.scene import Scene
+from steerclear.shield.exceptions import ConfigError
+
+FORMATS = (".mp4", ".gif")
+Progress = Callable[[int, int], None]
+
+
+def save_frame(
+    record: Mapping[str, np.ndarray],
+    step: int,
+    path: str | os.PathLike[str],
+    width_px: int = 1280,
+    theme: str = "light",
+) -> Path:
+    """Write one moment of a record as a PNG picture.
+
+    Args:
+        record: A record of T steps.
+        step: 0..T; negative counts from the end.
+        path: File to write.
+        width_px: Width of the picture.
+        theme: "light" or "dark".
+
+    Returns:
+        The path written.
+
+    Raises:
+        TraceError: The record is incomplete.
+        ConfigError: There is no such step, or the file cannot be written.
+    """
+    picture, states = _picture_of(record, width_px, theme)
+    if not -states <= step < states:
+        raise ConfigError(f"there is no step {step}; the record has 0 to {states - 1}.")
+    surface = picture.draw(Scene.from_record(record, step % states, picture.arena.dt_s))
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        pygame.image.save(surface, os.fspath(path), "picture.png")
+    except (OSError, pygame.error) as error:
+        raise ConfigError(f"cannot write {path}: {error}. Choose a folder you may write to.") from error
+    return Path(path)
+
+
+def save_animation(
+    record: Mapping[str, np.ndarray],
+    path: str | os.PathLike[str],
+    fps: float = 20.0,
+    speedup: float = 4.0,
+    progress: Progress | None = None,
+    start_s: float = 0.0,
+    end_s: float | None = None,
+    width_px: int = 1280,
+    theme: str = "light",
+) -> Path:
+    """Write a record as a film.
+
+    Args:
+        record: A record.
+        path: File to write, ending in ``.mp4`` or ``.gif``.
+        fps: Pictures per second.
+        speedup: How many times faster than the game.
+        progress: Called after each picture with the number done and the number of all.
+        start_s: Time of the game at which to begin.
+        end_s: Time of the game at which to stop; its end when left out.
+        width_px: Width of the picture.
+        theme: "light" or "dark".
+
+    Returns:
+        The path written.
+
+    Raises:
+        TraceError: The record is incomplete.
+        ConfigError: The ending, a number, or the folder cannot be used.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise ConfigError(f"cannot write {target.name!r}; end the name in {' or '.join(FORMATS)}.")
+    if not (0.0 < fps <= 100.0 and speedup > 0.0):
+        raise ConfigError(f"fps is {fps} and speedup {speedup}; choose 0 < fps <= 100 and speedup > 0.")
+    picture, states = _picture_of(record, width_px, theme)
+    steps = _steps_shown(states, picture.arena.dt_s, fps, speedup, start_s, end_s)
+    frames = _frames(record, picture, steps, progress)
+    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(part, frames, picture.size_px, fps)
+        os.replace(part, target)
+    except OSError as error:
+        raise ConfigError(f"cannot write {target}: {error}. Choose a folder you may write to.") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def _picture_of(record: Mapping[str, np.ndarray], width_px: int, theme: str) -> tuple[Picture, int]:
+    """Return a picture for the record and the number of its states."""
+    validate(record)
+    return Picture(Arena.from_meta(read_meta(record)), width_px, theme), len(record["position"])
+
+
+def _steps_shown(
+    states: int, dt_s: float, fps: float, speedup: float, start_s: float, end_s: float | None
+) -> np.ndarray:
+    """Return the steps to draw, evenly spaced in time."""
+    last_s = (states - 1) * dt_s
+    end_s = last_s if end_s is None else min(end_s, last_s)
+    if not 0.0 <= start_s <= end_s:
+        raise ConfigError(f"cannot show {start_s} s to {end_s} s; the record lasts from 0 to {last_s:.1f} s.")
+    times_s = np.arange(start_s, end_s + 1e-9, speedup / fps)
+    return np.minimum(np.round(times_s / dt_s).astype(int), states - 1)
+
+
+def _frames(
+    record: Mapping[str, np.ndarray], picture: Picture, steps: np.ndarray, progress: Progress | None
+) -> Iterator[np.ndarray]:
+    for done, step in enumerate(steps, start=1):
+        yield pixels(picture.draw(Scene.from_record(record, int(step), picture.arena.dt_s)))
+        if progress is not None:
+            progress(done, len(steps))
+
+
+def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
+    quality = ["-crf", "20", "-preset", "medium", "-movflags", "+faststart"]
+    writer = imageio_ffmpeg.write_frames(
+        os.fspath(path), size_px, fps=fps, codec="libx264", quality=None, output_params=quality, macro_block_size=1
+    )
+    writer.send(None)
+    try:
+        for frame in frames:
+            writer.send(frame)
+    finally:
+        writer.close()
+
+
+def _write_gif(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
+    """Write all frames with one palette, so that still water does not flicker and frames stay small."""
+    first = Image.fromarray(next(frames)).quantize(colors=255, method=Image.Quantize.MEDIANCUT)
+    rest = (Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
+    duration_ms = max(20, 10 * round(100.0 / fps))
+    first.save(path, save_all=True, append_images=rest, duration=duration_ms, loop=0, disposal=1)

@@ -1,0 +1,165 @@
+"""Drawing in metres with smooth edges: shapes go on an enlarged surface that is then shrunk.
+
+The surface is a plain memory surface, so nothing here needs a display.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pygame
+from steerclear.env.render.theme import Colour
+
+OVERSAMPLE = 2
+Point = Sequence[float] | np.ndarray
+
+
+@lru_cache(maxsize=32)
+def font(size_px: int, bold: bool = False) -> pygame.font.Font:
+    """Return a typeface that is the same on every machine (the one that matplotlib brings)."""
+    pygame.font.init()
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return pygame.font.Font(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size_px)
+
+
+class Canvas:
+    """A field of metres on a surface of pixels.
+
+    Args:
+        size_px: Width and height of the finished picture.
+        origin_px: Pixel of the field's lower left corner.
+        scale_px_per_m: Pixels of the finished picture per metre.
+    """
+
+    def __init__(self, size_px: tuple[int, int], origin_px: tuple[float, float], scale_px_per_m: float) -> None:
+        self.size_px = size_px
+        self.scale_px_per_m = scale_px_per_m
+        self._origin = (origin_px[0] * OVERSAMPLE, origin_px[1] * OVERSAMPLE)
+        self._scale = scale_px_per_m * OVERSAMPLE
+        self.surface = pygame.Surface((size_px[0] * OVERSAMPLE, size_px[1] * OVERSAMPLE), 0, 32)
+
+    def to_px(self, point_m: Point) -> tuple[float, float]:
+        """Return the pixel of the finished picture at which a point of the field lies."""
+        x, y = self._at(point_m)
+        return x / OVERSAMPLE, y / OVERSAMPLE
+
+    def finished(self) -> pygame.Surface:
+        """Return the picture at its own size."""
+        return pygame.transform.smoothscale(self.surface, self.size_px)
+
+    def rectangle(self, lower_m: Point, upper_m: Point, colour: Colour) -> None:
+        """Fill the rectangle between two corners."""
+        (left, bottom), (right, top) = self._at(lower_m), self._at(upper_m)
+        pygame.draw.rect(self.surface, colour, (round(left), round(top), round(right - left), round(bottom - top)))
+
+    def polygon(self, points_m: Sequence[Point], colour: Colour, outline: Colour | None = None) -> None:
+        """Fill a polygon, with a thin outline when one is given."""
+        points = [self._at(point) for point in points_m]
+        pygame.draw.polygon(self.surface, colour, points)
+        if outline is not None:
+            pygame.draw.polygon(self.surface, outline, points, max(1, round(1.2 * OVERSAMPLE)))
+
+    def disc(self, centre_m: Point, radius_m: float, colour: Colour, opacity: float = 1.0) -> None:
+        """Fill a circle."""
+        radius = radius_m * self._scale
+        box, layer = self._layer(centre_m, radius + 2)
+        pygame.draw.circle(layer, (*colour, round(255 * opacity)), (box.width / 2, box.height / 2), radius)
+        self.surface.blit(layer, box)
+
+    def ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
+        """Draw a circle's line."""
+        radius, width = radius_m * self._scale, max(1, round(width_px * OVERSAMPLE))
+        box, layer = self._layer(centre_m, radius + width + 2)
+        middle = (box.width / 2, box.height / 2)
+        pygame.draw.circle(layer, (*colour, round(255 * opacity)), middle, radius + width / 2, width)
+        self.surface.blit(layer, box)
+
+    def dashed_ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, dash_px: float) -> None:
+        """Draw a circle's line in dashes."""
+        dashes = max(8, round(2 * math.pi * radius_m * self.scale_px_per_m / (2 * dash_px)))
+        for start in np.arange(dashes) * (2 * math.pi / dashes):
+            turn = np.linspace(start, start + math.pi / dashes, 6)
+            arc = np.asarray(centre_m) + radius_m * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+            self.line(arc, colour, width_px)
+
+    def line(self, points_m: Sequence[Point] | np.ndarray, colour: Colour, width_px: float) -> None:
+        """Draw a line through points, its ends rounded."""
+        points = [self._at(point) for point in points_m]
+        width = max(1.0, width_px * OVERSAMPLE)
+        for start, end in pairwise(points):
+            self._bar(self.surface, start, end, width, colour)
+        if width >= 3:
+            for point in points:
+                pygame.draw.circle(self.surface, colour, point, width / 2)
+
+    def dashed_line(self, start_m: Point, end_m: Point, colour: Colour, width_px: float, dash_px: float) -> None:
+        """Draw a straight line in dashes."""
+        start, end = np.asarray(start_m, float), np.asarray(end_m, float)
+        count = max(1, round(float(np.linalg.norm(end - start)) * self.scale_px_per_m / (2 * dash_px)))
+        for k in range(count):
+            first, last = start + (end - start) * k / count, start + (end - start) * (k + 0.5) / count
+            self._bar(self.surface, self._at(first), self._at(last), width_px * OVERSAMPLE, colour)
+
+    def trail(self, points_m: np.ndarray, colour: Colour, width_px: float) -> None:
+        """Draw a track that fades towards its beginning."""
+        points = [self._at(point) for point in points_m]
+        if len(points) < 2:
+            return
+        corner = np.floor(np.min(points, axis=0)) - 8
+        span = np.ceil(np.max(points, axis=0)) + 8 - corner
+        layer = pygame.Surface((int(span[0]), int(span[1])), pygame.SRCALPHA, 32)
+        for k in range(1, len(points)):
+            alpha = round(190 * (k / len(points)) ** 1.5)
+            start, end = np.subtract(points[k - 1], corner), np.subtract(points[k], corner)
+            self._bar(layer, tuple(start), tuple(end), width_px * OVERSAMPLE, (*colour, alpha))
+        self.surface.blit(layer, tuple(corner))
+
+    def arrow(self, start_m: Point, end_m: Point, colour: Colour, width_px: float, edge: Colour | None = None) -> None:
+        """Draw an arrow; ``edge`` outlines it so that it stands out from what lies under it."""
+        start, end = np.array(self._at(start_m)), np.array(self._at(end_m))
+        length = float(np.linalg.norm(end - start))
+        if length < 2.0:
+            return
+        along = (end - start) / length
+        across = np.array([-along[1], along[0]])
+        half, head = width_px * OVERSAMPLE / 2, min(length, (4 + 2.6 * width_px) * OVERSAMPLE)
+        neck, wing = end - along * head * 0.85, head * 0.48
+        shaft = [start - across * half, neck - across * half, neck - across * wing, end]
+        points = [*shaft, neck + across * wing, neck + across * half, start + across * half]
+        if edge is not None:
+            pygame.draw.polygon(self.surface, edge, points, 2 * OVERSAMPLE + 1)
+        pygame.draw.polygon(self.surface, colour, points)
+
+    def _at(self, point_m: Point) -> tuple[float, float]:
+        return self._origin[0] + point_m[0] * self._scale, self._origin[1] - point_m[1] * self._scale
+
+    def _layer(self, centre_m: Point, reach: float) -> tuple[pygame.Rect, pygame.Surface]:
+        """Return a see-through surface around a point and the place where it belongs."""
+        x, y = self._at(centre_m)
+        half = math.ceil(reach)
+        box = pygame.Rect(round(x) - half, round(y) - half, 2 * half, 2 * half)
+        return box, pygame.Surface(box.size, pygame.SRCALPHA, 32)
+
+    @staticmethod
+    def _bar(
+        surface: pygame.Surface,
+        start: Sequence[float],
+        end: Sequence[float],
+        width: float,
+        colour: Sequence[int],
+    ) -> None:
+        """Draw a straight bar of any width; pygame's own thick lines have slanted ends."""
+        along_x, along_y = end[0] - start[0], end[1] - start[1]
+        length = math.hypot(along_x, along_y)
+        if length == 0.0:
+            return
+        x, y = -along_y / length * width / 2, along_x / length * width / 2
+        corners = [(start[0] + x, start[1] + y), (end[0] + x, end[1] + y)]
+        corners += [(end[0] - x, end[1] - y), (start[0] - x, start[1] - y)]
+        pygame.draw.polygon(surface, colour, corners)
