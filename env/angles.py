@@ -1,0 +1,25 @@
+"""Compass angles: degrees, clockwise from north (+y)."""
+
+from __future__ import annotations
+
+import math
+
+from steerclear.shield.jit import kernel
+
+
+@kernel
+def wrap_bearing(angle_deg: float) -> float:
+    """Angle within one turn of zero brought into (-180, 180]: straight astern is +180, as the reference has it."""
+    if angle_deg > 180.0:
+        return angle_deg - 360.0
+    if angle_deg <= -180.0:
+        return angle_deg + 360.0
+    return angle_deg
+
+
+@kernel
+def heading_to(dx: float, dy: float) -> float:
+    """Heading of the vector (dx, dy), deg in [-180, 180]; the zero vector points east, as in the reference."""
+    if dx == 0.0 and dy == 0.0:
+        return 90.0
+    return math.degrees(math.atan2(dx, dy))

@@ -1,0 +1,236 @@
+"""`GameConfig`: every setting of a game, with units, checked when it is built."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import Platform, get_platform
+
+from .presets import PRESETS
+from .validation import (
+    check_choice,
+    check_circles,
+    check_count,
+    check_point,
+    check_polygons,
+    check_real,
+    per_boat,
+)
+
+Point = tuple[float, float]
+PolygonPoints = tuple[Point, ...]
+CircleSpec = tuple[float, Point]
+
+CAPTURE_AT = ("own_side", "own_base")
+
+
+@dataclass(frozen=True)
+class RewardWeights:
+    """Weights of the default, sparse reward of one boat in one step.
+
+    Each of the first four counts events of the own team minus the same events of the opponents, so the two
+    teams' rewards from them add up to zero; ``oob`` (boats that just left the field) and ``collision`` (new
+    collisions of this very boat) are costs and enter with a minus sign.
+
+    Raises:
+        ConfigError: a weight is not a finite number.
+    """
+
+    capture: float = 1.0
+    grab: float = 0.25
+    tag: float = 0.25
+    oob: float = 0.25
+    collision: float = 0.0
+
+    def __post_init__(self) -> None:
+        for entry in dataclasses.fields(self):
+            check_real(f"reward.{entry.name}", getattr(self, entry.name), low=-math.inf)
+
+
+@dataclass(frozen=True)
+class GameConfig:
+    """Settings of a game. Build one with `GameConfig.preset` or name what differs from the defaults.
+
+    Attributes:
+        team_size: boats per team; blue are agent_0.., red follow.
+        env_bounds_m: width (x, east) and height (y, north) of the field, m.
+        dt_s: length of a step, s.
+        max_time_s: length of a game, s.
+        max_score: captures that end the game.
+        platforms: one platform (name or `Platform`) for all boats or one per boat.
+        agent_radius_m: radius of a boat, m, one for all or one per boat; two boats collide when closer than the sum.
+        catch_radius_m: radius for tags, grabs and untagging at the own flag's home, m.
+        flag_keepout_m: own boats stay this far plus their radius from their flag while it is home, m; 0 = no keep-out.
+        flag_radius_m: radius a flag is drawn with, m.
+        tagging_cooldown_s: time after a tag before the same boat can tag again, s.
+        oob_speed_frac: share of top speed at which the game drives a boat that is out of bounds.
+        tag_on_oob: leaving the field tags the boat.
+        tag_on_collision: hitting an obstacle tags the boat.
+        capture_at: "own_side" (on crossing to the own side) or "own_base" (within the catch radius of the own flag home).
+        blue_flag_home_m, red_flag_home_m: flag homes (x, y), m; None = 1/8 and 7/8 of the width, half the height.
+        scrimmage_m: two points of the dividing line, m; None = perpendicular bisector of the flag homes.
+        default_start: fixed starts on a line before the own flag, at rest; else random positions, speeds, headings.
+        on_side_start: random starts only on the own side.
+        obstacles: {"circle": [(radius, (x, y)), ...], "polygon": [((x, y), ...), ...]}, m.
+        reward: weights of the default reward.
+        preset_name: where the settings came from, for records and reports.
+
+    Raises:
+        ConfigError: a value is of the wrong kind or out of range.
+        PlatformError: a platform is unknown.
+    """
+
+    team_size: int = 3
+    env_bounds_m: Point = (160.0, 80.0)
+    dt_s: float = 0.1
+    max_time_s: float = 600.0
+    max_score: int = 20
+    platforms: str | Platform | tuple[str | Platform, ...] = "surveyor"
+    agent_radius_m: float | tuple[float, ...] = 2.0
+    catch_radius_m: float = 10.0
+    flag_keepout_m: float = 3.0
+    flag_radius_m: float = 2.0
+    tagging_cooldown_s: float = 60.0
+    oob_speed_frac: float = 0.5
+    tag_on_oob: bool = True
+    tag_on_collision: bool = False
+    capture_at: str = "own_side"
+    blue_flag_home_m: Point | None = None
+    red_flag_home_m: Point | None = None
+    scrimmage_m: tuple[Point, Point] | None = None
+    default_start: bool = True
+    on_side_start: bool = True
+    obstacles: Mapping[str, Any] | None = field(default=None, hash=False)
+    reward: RewardWeights = field(default_factory=RewardWeights)
+    preset_name: str = "custom"
+
+    def __post_init__(self) -> None:
+        check_count("team_size", self.team_size, low=1)
+        check_count("max_score", self.max_score, low=1)
+        self._check_numbers()
+        for name in ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start"):
+            check_choice(name, getattr(self, name), (True, False))
+        check_choice("capture_at", self.capture_at, CAPTURE_AT)
+        if not isinstance(self.reward, RewardWeights):
+            raise ConfigError(f"reward is {self.reward!r}; give a RewardWeights(...)")
+        self._set_geometry()
+        boats = self.n_boats
+        platforms = per_boat("platforms", self.platforms, boats, (str, Platform))
+        self._set("platforms", tuple(get_platform(p) for p in platforms))
+        radii = per_boat("agent_radius_m", self.agent_radius_m, boats, (int, float))
+        self._set("agent_radius_m", tuple(check_real("agent_radius_m", r, above=0.0) for r in radii))
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_numbers(self) -> None:
+        for name in ("dt_s", "max_time_s", "catch_radius_m"):
+            self._set(name, check_real(name, getattr(self, name), above=0.0))
+        for name in ("flag_keepout_m", "flag_radius_m", "tagging_cooldown_s", "oob_speed_frac"):
+            self._set(name, check_real(name, getattr(self, name), low=0.0))
+
+    def _set_geometry(self) -> None:
+        width, height = check_point("env_bounds_m", self.env_bounds_m)
+        check_real("env_bounds_m width", width, above=0.0)
+        check_real("env_bounds_m height", height, above=0.0)
+        self._set("env_bounds_m", (width, height))
+        for name in ("blue_flag_home_m", "red_flag_home_m"):
+            if getattr(self, name) is not None:
+                self._set(name, check_point(name, getattr(self, name)))
+        if (self.blue_flag_home_m is None) != (self.red_flag_home_m is None):
+            raise ConfigError("give both blue_flag_home_m and red_flag_home_m, or neither")
+        if self.scrimmage_m is not None:
+            ends = tuple(check_point("scrimmage_m", point) for point in self.scrimmage_m)
+            if len(ends) != 2 or ends[0] == ends[1]:
+                raise ConfigError(f"scrimmage_m is {self.scrimmage_m!r}; give two different points")
+            self._set("scrimmage_m", ends)
+        self._set_obstacles()
+
+    def _set_obstacles(self) -> None:
+        if self.obstacles is None:
+            self._set("obstacles", {"circle": (), "polygon": ()})
+            return
+        if not isinstance(self.obstacles, Mapping) or set(self.obstacles) - {"circle", "polygon"}:
+            raise ConfigError(f"obstacles is {self.obstacles!r}; give a dict with the keys 'circle' and 'polygon' only")
+        circles = check_circles(self.obstacles.get("circle") or ())
+        polygons = check_polygons(self.obstacles.get("polygon") or ())
+        self._set("obstacles", {"circle": circles, "polygon": polygons})
+
+    @property
+    def n_boats(self) -> int:
+        """Boats in a game, both teams."""
+        return 2 * self.team_size
+
+    @property
+    def n_obstacles(self) -> int:
+        """Obstacles in the field."""
+        return 0 if self.obstacles is None else len(self.obstacles["circle"]) + len(self.obstacles["polygon"])
+
+    @property
+    def agent_ids(self) -> tuple[str, ...]:
+        """Names of the boats, blue first."""
+        return tuple(f"agent_{i}" for i in range(self.n_boats))
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of all settings."""
+        return tuple(entry.name for entry in dataclasses.fields(cls))
+
+    @classmethod
+    def build(cls, **settings: Any) -> GameConfig:
+        """A config from keyword settings, as the constructor, but a misspelt name is explained.
+
+        Raises:
+            ConfigError: a setting is unknown; the message names near matches.
+        """
+        for name in settings:
+            if name not in cls.names():
+                near = difflib.get_close_matches(name, cls.names(), n=3, cutoff=0.5)
+                hint = f"did you mean {', '.join(near)}?" if near else f"known settings: {', '.join(cls.names())}"
+                raise ConfigError(f"unknown game setting {name!r}; {hint}")
+        return cls(**settings)
+
+    @classmethod
+    def preset(cls, name: str, **overrides: Any) -> GameConfig:
+        """A named set of rules, with settings replaced at will.
+
+        Args:
+            name: "aamas2024" (the 2024 competition's paper) or "mctf2025" (the 2025 competition's configuration).
+            **overrides: any setting of `GameConfig`.
+
+        Raises:
+            ConfigError: the preset or a setting is unknown.
+        """
+        if name not in PRESETS:
+            raise ConfigError(f"unknown preset {name!r}; known presets: {', '.join(sorted(PRESETS))}")
+        return cls.build(**{**PRESETS[name], "preset_name": name, **overrides})
+
+    def replace(self, **overrides: Any) -> GameConfig:
+        """A copy with settings replaced.
+
+        Raises:
+            ConfigError: a setting is unknown.
+        """
+        current = {name: getattr(self, name) for name in self.names()}
+        return self.build(**{**current, **overrides})
+
+
+def as_config(config: GameConfig | str | None) -> GameConfig:
+    """A `GameConfig` from itself, a preset's name, or None (the ``mctf2025`` preset).
+
+    Raises:
+        ConfigError: the preset is unknown or the argument is of another kind.
+    """
+    if config is None:
+        return GameConfig.preset("mctf2025")
+    if isinstance(config, str):
+        return GameConfig.preset(config)
+    if isinstance(config, GameConfig):
+        return config
+    raise ConfigError(f"config is {type(config).__name__}; give a GameConfig or a preset name ({', '.join(PRESETS)})")

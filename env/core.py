@@ -1,0 +1,193 @@
+"""`BatchedMctf`: B games at once, compiled; the one set of rules behind every front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from steerclear.shield.exceptions import GameError
+from steerclear.shield.jit import Array, BoolArray, IntArray
+
+from .advance import advance_games, first_unusable
+from .arrays import make_games, make_rules
+from .config import GameConfig, as_config
+from .drive_home import decide_commands
+from .field import field_geometry
+from .observe import observation_bounds, observation_keys, observe_games
+from .randomness import seed_states
+from .reward import reward_games
+from .starts import default_places, reset_games
+from .validation import check_count
+from .view import GameView, view_game
+
+CommandFilter = Callable[["BatchedMctf", Array], Array]
+"""Stands between decision and motion: ``filter(core, commands (B, n, 2)) -> commands``; the shield's place."""
+
+
+class BatchedMctf:
+    """B games of Maritime Capture the Flag, stepped together without Python in the loop.
+
+    Boats are ordered agent_0..: blue (team 0) first, then red (team 1). All arrays are attributes and live: they
+    are changed in place by `step` and `reset`. With n boats:
+
+    ``state (B, n, N_STATE)`` (columns in `steerclear.shield.platforms.layout`), ``params (n, N_PARAM)``,
+    ``team (n,)``, ``is_tagged, has_flag, oob, on_side, driven (B, n)`` bool, ``tagging_cooldown_s (B, n)`` s since
+    the last tag, ``flag_home (2, 2)`` m, ``flag_position (B, 2, 2)`` m, ``flag_taken (B, 2)``,
+    ``captures, grabs, tags (B, 2)``, ``events (B, 2, 4)`` captures, grabs, tags and boats gone out of bounds in the
+    last step, ``made_tag (B, n)``, ``collisions, new_collisions (B, n)``, ``touching (B, n, n)``, ``time_s (B,)``,
+    ``terminated, truncated (B,)``, ``previous_position (B, n, 2)``.
+
+    A finished game goes on when stepped; reset it with `reset(mask)`.
+
+    Args:
+        config: a `GameConfig` or a preset's name.
+        n_games: number of games B.
+        seed: seed of all games; game b draws the same numbers whatever B is.
+
+    Raises:
+        ConfigError: the config is unusable.
+    """
+
+    def __init__(self, config: GameConfig | str | None = None, n_games: int = 1, seed: int | None = None) -> None:
+        self.config = as_config(config)
+        self.n_games = check_count("n_games", n_games, low=1)
+        self.n_boats = self.config.n_boats
+        self.field = field_geometry(self.config)
+        self.rules = make_rules(self.config, self.field)
+        self.games = make_games(self.config, self.n_games)
+        self._bind_arrays()
+        self.observation_keys = observation_keys(self.config)
+        self.n_obs = len(self.observation_keys)
+        low, high = observation_bounds(self.config, self.field, float(self.max_speed_mps.max()))
+        self.observation_low, self.observation_high = low, high
+        self._middle = 0.5 * (low + high)
+        self._scale = 2.0 / np.where(high > low, high - low, np.inf)
+        self._raw = np.zeros((self.n_boats, self.n_obs))
+        self._places = default_places(self.config, self.field)
+        self._commands = np.zeros((self.n_games, self.n_boats, 2))
+        self.observations = np.zeros((self.n_games, self.n_boats, self.n_obs), dtype=np.float32)
+        self.rewards = np.zeros((self.n_games, self.n_boats))
+        self.reset(seed=seed)
+
+    def _bind_arrays(self) -> None:
+        """Attributes are the very arrays compiled code works on."""
+        games, rules = self.games, self.rules
+        self.params: Array = rules.params
+        self.team: IntArray = rules.team
+        self.max_speed_mps: Array = rules.max_speed
+        self.agent_radius_m: Array = rules.agent_radius
+        self.flag_home: Array = rules.flag_home
+        self.state: Array = games.state
+        self.previous_position: Array = games.previous_position
+        self.is_tagged: BoolArray = games.is_tagged
+        self.has_flag: BoolArray = games.has_flag
+        self.oob: BoolArray = games.oob
+        self.on_side: BoolArray = games.on_side
+        self.driven: BoolArray = games.driven
+        self.tagging_cooldown_s: Array = games.tagging_cooldown_s
+        self.made_tag: IntArray = games.made_tag
+        self.collisions: IntArray = games.collisions
+        self.new_collisions: IntArray = games.new_collisions
+        self.touching: BoolArray = games.touching
+        self.flag_position: Array = games.flag_position
+        self.flag_taken: BoolArray = games.flag_taken
+        self.captures: IntArray = games.captures
+        self.grabs: IntArray = games.grabs
+        self.tags: IntArray = games.tags
+        self.events: IntArray = games.events
+        self.time_s: Array = games.time_s
+        self.terminated: BoolArray = games.terminated
+        self.truncated: BoolArray = games.truncated
+
+    def reset(self, mask: BoolArray | None = None, seed: int | None = None) -> np.ndarray:
+        """Start games anew.
+
+        Args:
+            mask: (B,) bool, which games; None for all.
+            seed: new seed for all games; None goes on with each game's random numbers.
+
+        Returns:
+            Observations (B, n, n_obs) float32, normalised, of all games.
+
+        Raises:
+            GameError: the mask has the wrong shape, or boats do not fit into the field.
+        """
+        chosen = np.ones(self.n_games, dtype=np.bool_) if mask is None else np.asarray(mask)
+        if chosen.shape != (self.n_games,) or chosen.dtype != np.bool_:
+            raise GameError(f"mask is {chosen.dtype} of shape {chosen.shape}; give bool of shape ({self.n_games},)")
+        if seed is not None or not self.games.rng.any():
+            self.games.rng[:] = seed_states(seed, self.n_games)
+        reset_games(self.rules, self.games, chosen, self._places, self.config)
+        return self.observe()
+
+    def commands(self, actions: Array) -> Array:
+        """What each boat will obey, after the game's own decisions; sets ``driven``.
+
+        Args:
+            actions: (B, n, 2) what the policies want: speed m/s, relative heading deg.
+
+        Returns:
+            New array (B, n, 2), same units.
+
+        Raises:
+            GameError: wrong shape, or an action is not finite.
+        """
+        wanted = self._checked("actions", actions)
+        decided = np.empty_like(self._commands)
+        self._refuse("action", decide_commands(self.rules, self.games, wanted, decided))
+        return decided
+
+    def advance(self, commands: Array) -> None:
+        """Move all boats under ``commands`` (B, n, 2) and apply the rules, collisions and clocks.
+
+        Raises:
+            GameError: wrong shape, or a command is not finite.
+        """
+        given = self._checked("commands", commands)
+        self._refuse("command", first_unusable(given))
+        advance_games(self.rules, self.games, given)
+
+    def step(
+        self, actions: Array, command_filter: CommandFilter | None = None
+    ) -> tuple[np.ndarray, Array, BoolArray, BoolArray]:
+        """One step of all games.
+
+        Args:
+            actions: (B, n, 2) speed m/s, relative heading deg.
+            command_filter: called with this object and the decided commands; what it returns is obeyed.
+
+        Returns:
+            observations (B, n, n_obs) float32 in [-1, 1], rewards (B, n), terminated (B,), truncated (B,). The
+            arrays are reused by the next step: copy what you keep.
+
+        Raises:
+            GameError: see `commands` and `advance`.
+        """
+        commands = self.commands(actions)
+        if command_filter is not None:
+            commands = command_filter(self, commands)
+        self.advance(commands)
+        reward_games(self.rules, self.games, self.rewards)
+        return self.observe(), self.rewards, self.terminated, self.truncated
+
+    def observe(self) -> np.ndarray:
+        """Observations (B, n, n_obs) float32, normalised; the array is reused."""
+        observe_games(self.rules, self.games, self._middle, self._scale, self._raw, self.observations)
+        return self.observations
+
+    def view(self, game: int = 0) -> GameView:
+        """A frozen copy of one game."""
+        return view_game(self.config, self.rules, self.games, game)
+
+    def _checked(self, name: str, values: Any) -> Array:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+        if array.shape != self._commands.shape:
+            raise GameError(f"{name} have shape {array.shape}; give {self._commands.shape}: speed m/s, heading deg")
+        return array
+
+    def _refuse(self, what: str, number: int) -> None:
+        if number >= 0:
+            game, boat = divmod(number, self.n_boats)
+            raise GameError(f"{what} of agent_{boat} in game {game} is not finite; give finite speed and heading")

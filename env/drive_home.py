@@ -1,0 +1,111 @@
+"""Which boats the game itself drives, and where to: what every boat will obey, decided before anything moves.
+
+A tagged boat drives straight to its own flag's home, a boat out of bounds straight off the nearest edge. Where
+the reference plans around obstacles (RRT*), a tagged boat here steers along the tangent of the obstacle in its
+way: simple, the same for every seed, and enough for obstacles that do not form traps.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from steerclear.shield.jit import Array, kernel
+from steerclear.shield.platforms import layout as L
+
+from .angles import heading_to, wrap_bearing
+from .arrays import Games, Rules
+from .obstacles import touches_obstacle
+
+CLEARANCE_M = 1.0
+"""How much wider than its radius a boat driven home passes an obstacle."""
+
+
+@kernel
+def heading_into_field(size: Array, x: float, y: float) -> float:
+    """Heading perpendicular to the edge nearest to (x, y), pointing inwards, deg."""
+    over_x = max(0.0, -x, x - size[0])
+    over_y = max(0.0, -y, y - size[1])
+    south = math.hypot(y, over_x)
+    east = math.hypot(size[0] - x, over_y)
+    north = math.hypot(size[1] - y, over_x)
+    west = math.hypot(x, over_y)
+    nearest = min(min(south, east), min(north, west))
+    if south == nearest:
+        return 0.0
+    if east == nearest:
+        return -90.0
+    if north == nearest:
+        return 180.0
+    return 90.0
+
+
+@kernel
+def heading_around_obstacles(rules: Rules, i: int, x: float, y: float, goal_x: float, goal_y: float) -> float:
+    """Heading to a goal, or along the tangent of the first obstacle (as a circle) that the straight way would hit."""
+    way = math.hypot(goal_x - x, goal_y - y)
+    heading = heading_to(goal_x - x, goal_y - y)
+    nearest = np.inf
+    around = heading
+    for number in range(rules.obstacles.bounds.shape[0]):
+        dx = rules.obstacles.bounds[number, 0] - x
+        dy = rules.obstacles.bounds[number, 1] - y
+        radius = rules.obstacles.bounds[number, 2] + rules.agent_radius[i] + CLEARANCE_M
+        distance = math.hypot(dx, dy)
+        offset = wrap_bearing(heading - heading_to(dx, dy))
+        half_angle = 90.0 if distance <= radius else math.degrees(math.asin(radius / distance))
+        if abs(offset) < half_angle and distance - radius < way and distance < nearest:
+            nearest = distance
+            around = heading_to(dx, dy) + (half_angle if offset >= 0.0 else -half_angle)
+    return around
+
+
+@kernel
+def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
+    """Command of a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
+    x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
+    if games.is_tagged[b, i]:
+        home = rules.flag_home[rules.team[i]]
+        if rules.obstacles.bounds.shape[0] > 0:
+            heading = heading_around_obstacles(rules, i, x, y, home[0], home[1])
+        else:
+            heading = heading_to(home[0] - x, home[1] - y)
+    else:
+        heading = heading_into_field(rules.size, x, y)
+    share = rules.oob_speed_frac if games.oob[b, i] else 1.0
+    command[0] = rules.max_speed[i] * share
+    command[1] = wrap_bearing(heading - games.state[b, i, L.HEADING])
+
+
+@kernel
+def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array) -> int:
+    """What every boat will obey; fills ``commands`` and ``games.driven``.
+
+    Args:
+        rules: the rules.
+        games: the games; only ``driven`` is written.
+        actions: (B, n, 2) what the policies want: speed m/s, relative heading deg.
+        commands: (B, n, 2) output, same units.
+
+    Returns:
+        -1, or the flat number ``b * n + i`` of the first boat whose own command is not finite and would be obeyed.
+    """
+    has_obstacles = rules.obstacles.bounds.shape[0] > 0
+    for b in range(games.state.shape[0]):
+        for i in range(rules.n_boats):
+            state = games.state[b, i]
+            games.driven[b, i] = True
+            if has_obstacles and touches_obstacle(rules.obstacles, state[L.X], state[L.Y], rules.agent_radius[i]):
+                commands[b, i, 0] = 0.0
+                commands[b, i, 1] = 0.0
+            elif games.is_tagged[b, i] or games.oob[b, i]:
+                _drive(rules, games, b, i, commands[b, i])
+            else:
+                games.driven[b, i] = False
+                # the reference hands policies' commands to the autopilot in single precision
+                commands[b, i, 0] = np.float32(actions[b, i, 0])
+                commands[b, i, 1] = np.float32(actions[b, i, 1])
+            if not (math.isfinite(actions[b, i, 0]) and math.isfinite(actions[b, i, 1])):
+                return b * rules.n_boats + i
+    return -1

@@ -1,0 +1,134 @@
+"""Geometry of the field: walls, dividing line, flag homes, named points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array
+
+from .config import GameConfig
+
+ROWS = ("B", "F", "H", "M", "C", "MX", "HX", "FX", "BX")
+"""Rows of named points from the blue end (x = 0) to the red end; "X" marks the opponent's half as blue sees it."""
+COLUMNS = ("PP", "P", "C", "S", "SS")
+"""Columns from port (y = height) to starboard (y = 0), as seen from the blue end."""
+
+
+@dataclass(frozen=True)
+class FieldGeometry:
+    """Fixed lines and points of a field, m.
+
+    Attributes:
+        size: (2,) width and height.
+        diagonal: length of the diagonal.
+        flag_home: (2, 2) homes of the blue and the red flag.
+        scrimmage: (2, 2) ends of the dividing line.
+        walls: (2, 4, 2, 2) per team its four walls as segments; wall 1 is the one behind the own flag, then round
+            the field the same way for both teams, so that both see the same picture.
+        side_sign: (2,) sign of the cross product (line x point) on each team's side.
+    """
+
+    size: Array
+    diagonal: float
+    flag_home: Array
+    scrimmage: Array
+    walls: Array
+    side_sign: Array
+
+
+def field_geometry(config: GameConfig) -> FieldGeometry:
+    """Geometry of a config's field.
+
+    Raises:
+        ConfigError: a flag home lies outside, or the dividing line does not part the flags.
+    """
+    size = np.array(config.env_bounds_m)
+    homes = _flag_homes(config, size)
+    scrimmage = _scrimmage(config, size, homes)
+    along = scrimmage[1] - scrimmage[0]
+    sides = np.array([_cross(along, home - scrimmage[0]) for home in homes])
+    if sides[0] * sides[1] >= 0:
+        raise ConfigError("scrimmage_m does not part the two flag homes; move the line or the flags")
+    walls = np.stack([_walls_of_team(size, homes, team) for team in (0, 1)])
+    return FieldGeometry(size, float(np.linalg.norm(size)), homes, scrimmage, walls, np.sign(sides))
+
+
+def field_points(size: Array) -> dict[str, Array]:
+    """The named points of the 9 x 5 grid in blue's naming, name -> (x, y) m."""
+    points = {}
+    for i, row in enumerate(ROWS):
+        for j, column in enumerate(COLUMNS):
+            # the middle column of a row is named by one letter, and row C carries its name once: PC, CC, SC
+            points[column + row] = np.array([i / 8.0, (4 - j) / 4.0]) * size
+    return points
+
+
+def _cross(a: Array, b: Array) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+def _flag_homes(config: GameConfig, size: Array) -> Array:
+    if config.blue_flag_home_m is None or config.red_flag_home_m is None:
+        return np.array([[size[0] / 8.0, size[1] / 2.0], [size[0] * 7.0 / 8.0, size[1] / 2.0]])
+    homes = np.array([config.blue_flag_home_m, config.red_flag_home_m])
+    for home in homes:
+        if not ((home > 0.0) & (home < size)).all():
+            raise ConfigError(f"flag home {tuple(home)} lies outside the field {tuple(size)}; move it inside")
+    return homes
+
+
+def line_through_field(size: Array, point: Array, direction: Array) -> Array:
+    """The two points where a line leaves the field: first along ``direction``, then against it, shape (2, 2).
+
+    Raises:
+        ConfigError: the line misses the field.
+    """
+    low, high = -math.inf, math.inf
+    for axis in (0, 1):
+        if direction[axis] == 0.0:
+            if not 0.0 <= point[axis] <= size[axis]:
+                low, high = 1.0, 0.0
+            continue
+        ends = sorted(((0.0 - point[axis]) / direction[axis], (size[axis] - point[axis]) / direction[axis]))
+        low, high = max(low, ends[0]), min(high, ends[1])
+    if low >= high:
+        raise ConfigError("scrimmage_m does not cross the field; give two points whose line does")
+    return np.array([point + high * direction, point + low * direction])
+
+
+def _scrimmage(config: GameConfig, size: Array, homes: Array) -> Array:
+    if config.scrimmage_m is not None:
+        ends = np.array(config.scrimmage_m)
+        return line_through_field(size, ends[0], ends[0] - ends[1])
+    between = homes[0] - homes[1]
+    if not between.any():
+        raise ConfigError("both flags have the same home; move one")
+    middle = 0.5 * (homes[0] + homes[1])
+    return line_through_field(size, middle, np.array([-between[1], between[0]]))
+
+
+def _walls_of_team(size: Array, homes: Array, team: int) -> Array:
+    """Four segments, counted so that number 1 is the wall a ray from midfield through the own flag meets."""
+    width, height = size
+    upper_left, upper_right = (0.0, height), (width, height)
+    lower_right, lower_left = (width, 0.0), (0.0, 0.0)
+    clockwise = [
+        (upper_left, upper_right),
+        (upper_right, lower_right),
+        (lower_right, lower_left),
+        (lower_left, upper_left),
+    ]
+    middle = 0.5 * (homes[0] + homes[1])
+    ray = homes[team] - middle
+    reach = [
+        (height - middle[1]) / ray[1] if ray[1] > 0 else math.inf,
+        (width - middle[0]) / ray[0] if ray[0] > 0 else math.inf,
+        -middle[1] / ray[1] if ray[1] < 0 else math.inf,
+        -middle[0] / ray[0] if ray[0] < 0 else math.inf,
+    ]
+    behind_flag = int(np.argmin(reach))
+    return np.array([clockwise[(behind_flag - 1 + i) % 4] for i in range(4)])

@@ -1,0 +1,104 @@
+"""Moving the boats of one game, one after another: own side, obstacle hits, dynamics, keep-out, carried flags."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from steerclear.shield.jit import Array, kernel
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms import step_boat
+from steerclear.shield.platforms.usv import wrap_degrees
+
+from .arrays import Games, Rules
+from .keepout import keep_out
+from .obstacles import touches_obstacle
+
+
+@kernel
+def is_on_side(rules: Rules, team: int, x: float, y: float) -> bool:
+    """Whether (x, y) lies on a team's side of the dividing line, or on the line itself."""
+    line = rules.scrimmage
+    along_x, along_y = line[1, 0] - line[0, 0], line[1, 1] - line[0, 1]
+    cross = along_x * (y - line[0, 1]) - along_y * (x - line[0, 0])
+    return cross * rules.side_sign[team] >= 0.0
+
+
+@kernel
+def send_flag_home(rules: Rules, games: Games, b: int, flag: int) -> None:
+    """Put a team's flag back to its home."""
+    games.flag_taken[b, flag] = False
+    games.flag_position[b, flag, 0] = rules.flag_home[flag, 0]
+    games.flag_position[b, flag, 1] = rules.flag_home[flag, 1]
+
+
+@kernel
+def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
+    """Boat ``i`` loses the flag it may carry, which goes home."""
+    if games.has_flag[b, i]:
+        games.has_flag[b, i] = False
+        send_flag_home(rules, games, b, 1 - rules.team[i])
+
+
+@kernel
+def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
+    """A boat that hit an obstacle: back to where it was, turned round, stopped, flag lost; the autopilot's memory stays."""
+    state = games.state[b, i]
+    if rules.tag_on_collision:
+        games.is_tagged[b, i] = True
+    drop_flag(rules, games, b, i)
+    before = games.previous_position[b, i]
+    x, y = state[L.X], state[L.Y]
+    state[L.X], state[L.Y] = before[0], before[1]
+    before[0], before[1] = x, y
+    state[L.HEADING] = wrap_degrees(state[L.HEADING] + 180.0)
+    state[L.SPEED] = 0.0
+    state[L.THRUST] = 0.0
+    state[L.RUDDER] = 0.0
+    state[L.TURN_RATE] = 0.0
+
+
+@kernel
+def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, command: Array, dt_s: float) -> bool:
+    """Advance a boat by one step under a command (speed m/s, relative heading deg).
+
+    The reference subtracts the heading controller's last two errors in single precision when both reached it so;
+    the memory is shifted so that the double-precision derivative comes out the same.
+
+    Returns:
+        Whether the error now in the heading controller's memory came in single precision.
+    """
+    error = command[1]
+    memory = state[L.HEADING_ERROR]
+    if is_float32 and was_float32 and not math.isnan(memory):
+        state[L.HEADING_ERROR] = error - np.float64(np.float32(error) - np.float32(memory))
+    step_boat(params, state, command[0], error, dt_s)
+    if state[L.THRUST] > 0.0:
+        return is_float32
+    state[L.HEADING_ERROR] = memory
+    return was_float32
+
+
+@kernel
+def move_boat(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
+    """One boat's turn in a step."""
+    state = games.state[b, i]
+    before = games.previous_position[b, i]
+    team = rules.team[i]
+    x, y = state[L.X], state[L.Y]
+    games.on_side[b, i] = is_on_side(rules, team, x, y)
+    if rules.obstacles.bounds.shape[0] > 0 and touches_obstacle(rules.obstacles, x, y, rules.agent_radius[i]):
+        bounce_off(rules, games, b, i)
+        return
+    before[0], before[1] = x, y
+    # a policy's command comes in single precision; one that the game or a filter computed does not
+    is_float32 = not games.driven[b, i] and np.float64(np.float32(command[1])) == command[1]
+    games.error_is_float32[b, i] = obey(
+        rules.params[i], state, is_float32, games.error_is_float32[b, i], command, rules.dt_s
+    )
+    if rules.flag_keepout > 0.0 and not games.flag_taken[b, team]:
+        keep_out(state, before, rules.flag_home[team], rules.flag_keepout + rules.agent_radius[i])
+    if games.has_flag[b, i]:
+        games.flag_position[b, 1 - team, 0] = state[L.X]
+        games.flag_position[b, 1 - team, 1] = state[L.Y]

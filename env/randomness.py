@@ -1,0 +1,23 @@
+"""Random numbers of each game: one 64-bit state per game, so that a game's course never depends on its neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steerclear.shield.jit import kernel
+
+
+def seed_states(seed: int | None, n_games: int) -> np.ndarray:
+    """First random states of ``n_games`` games, uint64; game 0 of a batch equals a single game of the same seed."""
+    return np.random.SeedSequence(seed).generate_state(n_games, dtype=np.uint64)
+
+
+@kernel
+def next_uniform(rng: np.ndarray, b: int) -> float:
+    """Next number of game ``b`` in [0, 1), by the SplitMix64 generator; advances its state."""
+    rng[b] += np.uint64(0x9E3779B97F4A7C15)
+    z = rng[b]
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)

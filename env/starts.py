@@ -1,0 +1,182 @@
+"""Where boats start: fixed places on a line before the own flag, or random ones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from steerclear.shield.exceptions import GameError
+from steerclear.shield.jit import Array, BoolArray, kernel
+from steerclear.shield.platforms import layout as L
+
+from .angles import heading_to
+from .arrays import Games, Rules
+from .config import GameConfig
+from .field import FieldGeometry, line_through_field
+from .motion import is_on_side
+from .obstacles import closest_on_segment, touches_obstacle
+from .randomness import next_uniform
+from .rules import check_grabs, check_tags, check_untags
+
+MAX_TRIES = 20_000
+"""Random places tried for one boat before the field counts as full."""
+
+
+def default_places(config: GameConfig, field: FieldGeometry) -> Array:
+    """Fixed start places (n, 2), m: evenly along the line halfway between the own flag and the dividing line."""
+    along = field.scrimmage[1] - field.scrimmage[0]
+    places = np.zeros((config.n_boats, 2))
+    for i in range(config.n_boats):
+        team, k = divmod(i, config.team_size)
+        home = field.flag_home[team]
+        middle = 0.5 * (home + np.array(closest_on_segment(field.scrimmage, home[0], home[1])))
+        first, last = line_through_field(field.size, middle, along)
+        margin = 2.0 * config.agent_radius_m[i]
+        place = first + (last - first) * (k + 1) / (config.team_size + 1)
+        places[i] = np.maximum(margin, np.minimum(field.size - margin, place))
+    return places
+
+
+@kernel
+def place_is_free(rules: Rules, games: Games, b: int, i: int, x: float, y: float, placed: BoolArray) -> bool:
+    """Whether boat ``i`` may start at (x, y): clear of placed boats, flags that are home, obstacles and edges."""
+    radius = rules.agent_radius[i]
+    if not (radius < x < rules.size[0] - radius and radius < y < rules.size[1] - radius):
+        return False
+    for j in range(rules.n_boats):
+        if placed[j] and j != i:
+            other = games.state[b, j]
+            if math.hypot(other[L.X] - x, other[L.Y] - y) <= radius + rules.agent_radius[j]:
+                return False
+    for flag in range(2):
+        if not games.flag_taken[b, flag]:
+            home = rules.flag_home[flag]
+            if math.hypot(home[0] - x, home[1] - y) <= rules.flag_keepout:
+                return False
+    return not touches_obstacle(rules.obstacles, x, y, radius)
+
+
+@kernel
+def draw_place(rules: Rules, games: Games, b: int, i: int, side: int, placed: BoolArray) -> bool:
+    """Put boat ``i`` on a random free place; ``side`` is the team whose side it must lie on, -1 for anywhere.
+
+    Returns:
+        False when no free place was found.
+    """
+    radius = rules.agent_radius[i]
+    for _ in range(MAX_TRIES):
+        x = radius + next_uniform(games.rng, b) * (rules.size[0] - 2.0 * radius)
+        y = radius + next_uniform(games.rng, b) * (rules.size[1] - 2.0 * radius)
+        if side >= 0 and not is_on_side(rules, side, x, y):
+            continue
+        if place_is_free(rules, games, b, i, x, y, placed):
+            games.state[b, i, L.X], games.state[b, i, L.Y] = x, y
+            return True
+    return False
+
+
+@kernel
+def heading_to_scrimmage(rules: Rules, x: float, y: float) -> float:
+    """Heading from (x, y) to the closest point of the dividing line, deg."""
+    px, py = closest_on_segment(rules.scrimmage, x, y)
+    return heading_to(px - x, py - y)
+
+
+@kernel
+def clear_game(rules: Rules, games: Games, b: int) -> None:
+    """Scores, flags, counters and clocks of game ``b`` as at the start of a game."""
+    for i in range(rules.n_boats):
+        games.state[b, i] = 0.0
+        games.state[b, i, L.SPEED_ERROR] = np.nan
+        games.state[b, i, L.HEADING_ERROR] = np.nan
+        games.error_is_float32[b, i] = False
+        games.is_tagged[b, i] = False
+        games.has_flag[b, i] = False
+        games.oob[b, i] = False
+        games.driven[b, i] = False
+        games.tagging_cooldown_s[b, i] = rules.cooldown
+        games.made_tag[b, i] = -1
+        games.collisions[b, i] = 0
+        games.new_collisions[b, i] = 0
+    games.touching[b] = False
+    games.flag_position[b] = rules.flag_home
+    games.flag_taken[b] = False
+    games.captures[b] = 0
+    games.grabs[b] = 0
+    games.tags[b] = 0
+    games.events[b] = 0
+    games.time_s[b] = 0.0
+    games.terminated[b] = False
+    games.truncated[b] = False
+
+
+@kernel
+def start_game(rules: Rules, games: Games, b: int, places: Array, random: bool, own_side: bool) -> bool:
+    """Place every boat of game ``b`` (already cleared).
+
+    Args:
+        rules: the rules.
+        games: the games.
+        b: which game.
+        places: (n, 2) fixed places, m; a boat whose place is not free gets a random one on its own side.
+        random: ignore ``places``; positions, speeds and headings are random.
+        own_side: random places lie on the own side.
+
+    Returns:
+        False when a boat found no place.
+    """
+    placed = np.zeros(rules.n_boats, dtype=np.bool_)
+    for i in range(rules.n_boats):
+        state = games.state[b, i]
+        team = rules.team[i]
+        x, y = places[i, 0], places[i, 1]
+        if not random and place_is_free(rules, games, b, i, x, y, placed) and is_on_side(rules, team, x, y):
+            state[L.X], state[L.Y] = x, y
+        elif not draw_place(rules, games, b, i, team if own_side or not random else -1, placed):
+            return False
+        placed[i] = True
+        if random:
+            state[L.SPEED] = rules.max_speed[i] * next_uniform(games.rng, b)
+            state[L.HEADING] = 360.0 * next_uniform(games.rng, b) - 180.0
+        else:
+            state[L.HEADING] = heading_to_scrimmage(rules, state[L.X], state[L.Y])
+    return True
+
+
+def crowded_field_error() -> GameError:
+    """The error for boats that do not fit into the field."""
+    return GameError("no free start place was found; use a larger field, fewer boats or smaller obstacles")
+
+
+@kernel
+def settle(rules: Rules, games: Games, b: int) -> None:
+    """After placing: sides, last positions, and the grabs, tags and untags that the places themselves cause."""
+    for i in range(rules.n_boats):
+        x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
+        games.previous_position[b, i, 0], games.previous_position[b, i, 1] = x, y
+        games.on_side[b, i] = is_on_side(rules, rules.team[i], x, y)
+    check_grabs(rules, games, b)
+    check_tags(rules, games, b)
+    check_untags(rules, games, b)
+
+
+@kernel
+def _start_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, random: bool, own_side: bool) -> bool:
+    for b in range(chosen.shape[0]):
+        if chosen[b]:
+            clear_game(rules, games, b)
+            if not start_game(rules, games, b, places, random, own_side):
+                return False
+            settle(rules, games, b)
+    return True
+
+
+def reset_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, config: GameConfig) -> None:
+    """Start the chosen games anew; ``places`` (n, 2) m are the fixed start places.
+
+    Raises:
+        GameError: a boat found no free place.
+    """
+    if not _start_games(rules, games, chosen, places, not config.default_start, config.on_side_start):
+        raise crowded_field_error()

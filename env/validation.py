@@ -1,0 +1,91 @@
+"""Checks of settings. Each returns the checked value or raises one `ConfigError` that names the remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from steerclear.shield.exceptions import ConfigError
+
+
+def check_real(name: str, value: Any, low: float | None = None, above: float | None = None) -> float:
+    """A finite number, ``>= low`` or ``> above`` where given."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ConfigError(f"{name} is {value!r}; give a number")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ConfigError(f"{name} is {number}; give a finite number")
+    if low is not None and number < low:
+        raise ConfigError(f"{name} is {number}; it must be >= {low}")
+    if above is not None and number <= above:
+        raise ConfigError(f"{name} is {number}; it must be > {above}")
+    return number
+
+
+def check_count(name: str, value: Any, low: int) -> int:
+    """A whole number ``>= low``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low:
+        raise ConfigError(f"{name} is {value!r}; give a whole number >= {low}")
+    return int(value)
+
+
+def check_choice(name: str, value: Any, choices: Sequence[Any]) -> None:
+    """One of ``choices``."""
+    if not any(value is choice or (isinstance(value, str) and value == choice) for choice in choices):
+        raise ConfigError(f"{name} is {value!r}; choose one of {', '.join(repr(c) for c in choices)}")
+
+
+def check_point(name: str, value: Any) -> tuple[float, float]:
+    """An (x, y) pair of finite numbers."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise ConfigError(f"{name} is {value!r}; give a pair (x, y)")
+    pair = tuple(value)
+    if len(pair) != 2:
+        raise ConfigError(f"{name} is {value!r}; give a pair (x, y)")
+    return check_real(f"{name} x", pair[0]), check_real(f"{name} y", pair[1])
+
+
+def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tuple[Any, ...]:
+    """One value per boat: a single value is repeated, a sequence must have the right length."""
+    if isinstance(value, kinds):
+        return (value,) * n_boats
+    if isinstance(value, (list, tuple, np.ndarray)):
+        if len(value) != n_boats:
+            raise ConfigError(f"{name} has {len(value)} entries for {n_boats} boats; give one value, or one per boat")
+        return tuple(value)
+    raise ConfigError(f"{name} is {value!r}; give one value, or one per boat ({n_boats})")
+
+
+def check_circles(circles: Any) -> tuple[tuple[float, tuple[float, float]], ...]:
+    """Circle obstacles as (radius, (x, y)), m."""
+    checked = []
+    for entry in _entries("circle", circles):
+        if len(entry) != 2:
+            raise ConfigError(f"circle obstacle {entry!r}: give (radius, (x, y))")
+        radius = check_real("circle obstacle radius", entry[0], above=0.0)
+        checked.append((radius, check_point("circle obstacle centre", entry[1])))
+    return tuple(checked)
+
+
+def check_polygons(polygons: Any) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """Polygon obstacles as sequences of at least three different corners (x, y), m."""
+    checked = []
+    for entry in _entries("polygon", polygons):
+        corners = tuple(check_point("polygon obstacle corner", corner) for corner in entry)
+        if len(set(corners)) < 3 or len(set(corners)) != len(corners):
+            raise ConfigError(f"polygon obstacle {entry!r}: give at least 3 corners, each once")
+        checked.append(corners)
+    return tuple(checked)
+
+
+def _entries(kind: str, value: Any) -> list[Any]:
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise ConfigError(f"obstacles[{kind!r}] is {value!r}; give a list")
+    entries = list(value)
+    for entry in entries:
+        if isinstance(entry, str) or not isinstance(entry, Sequence | np.ndarray):
+            raise ConfigError(f"{kind} obstacle {entry!r}: give a tuple")
+    return entries

@@ -1,0 +1,91 @@
+"""`GameView`: a frozen copy of one game's arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.platforms import layout as L
+
+from .arrays import Games, Rules
+from .config import GameConfig
+
+
+@dataclass(frozen=True)
+class GameView:
+    """One game at one moment; every array is a copy. Names and units as in `BatchedMctf`, without the batch axis."""
+
+    config: GameConfig
+    state: Array
+    params: Array
+    team: IntArray
+    previous_position: Array
+    is_tagged: BoolArray
+    has_flag: BoolArray
+    oob: BoolArray
+    on_side: BoolArray
+    driven: BoolArray
+    tagging_cooldown_s: Array
+    made_tag: IntArray
+    collisions: IntArray
+    flag_home: Array
+    flag_position: Array
+    flag_taken: BoolArray
+    captures: IntArray
+    grabs: IntArray
+    tags: IntArray
+    events: IntArray
+    time_s: float
+    terminated: bool
+    truncated: bool
+
+    @property
+    def position(self) -> Array:
+        """Positions (n, 2), m."""
+        return self.state[:, [L.X, L.Y]]
+
+    @property
+    def heading_deg(self) -> Array:
+        """Headings (n,), deg clockwise from north."""
+        return self.state[:, L.HEADING]
+
+    @property
+    def speed_mps(self) -> Array:
+        """Speeds (n,), m/s."""
+        return self.state[:, L.SPEED]
+
+
+_COPIED = (
+    "state",
+    "previous_position",
+    "is_tagged",
+    "has_flag",
+    "oob",
+    "on_side",
+    "driven",
+    "tagging_cooldown_s",
+    "made_tag",
+    "collisions",
+    "flag_position",
+    "flag_taken",
+    "captures",
+    "grabs",
+    "tags",
+    "events",
+)
+
+
+def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameView:
+    """A view of game ``b``."""
+    return GameView(
+        config=config,
+        params=rules.params,
+        team=rules.team,
+        flag_home=rules.flag_home,
+        time_s=float(games.time_s[b]),
+        terminated=bool(games.terminated[b]),
+        truncated=bool(games.truncated[b]),
+        **{name: np.copy(getattr(games, name)[b]) for name in _COPIED},
+    )
