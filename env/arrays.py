@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms.layout import N_STATE

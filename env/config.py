@@ -72,7 +72,7 @@ class GameConfig:
         oob_speed_frac: share of top speed at which the game drives a boat that is out of bounds.
         tag_on_oob: leaving the field tags the boat.
         tag_on_collision: hitting an obstacle tags the boat.
-        capture_at: "own_side" (on crossing to the own side) or "own_base" (within the catch radius of the own flag home).
+        capture_at: "own_side" (on crossing to it) or "own_base" (within the catch radius of the own flag's home).
         blue_flag_home_m, red_flag_home_m: flag homes (x, y), m; None = 1/8 and 7/8 of the width, half the height.
         scrimmage_m: two points of the dividing line, m; None = perpendicular bisector of the flag homes.
         default_start: fixed starts on a line before the own flag, at rest; else random positions, speeds, headings.

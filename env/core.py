@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 
@@ -15,6 +14,7 @@ from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
 from .field import field_geometry
+from .initial import start_from
 from .observe import observation_bounds, observation_keys, observe_games
 from .randomness import seed_states
 from .reward import reward_games
@@ -69,7 +69,8 @@ class BatchedMctf:
         self._commands = np.zeros((self.n_games, self.n_boats, 2))
         self.observations = np.zeros((self.n_games, self.n_boats, self.n_obs), dtype=np.float32)
         self.rewards = np.zeros((self.n_games, self.n_boats))
-        self.reset(seed=seed)
+        self.seed(seed)
+        self.reset()
 
     def _bind_arrays(self) -> None:
         """Attributes are the very arrays compiled code works on."""
@@ -117,9 +118,29 @@ class BatchedMctf:
         chosen = np.ones(self.n_games, dtype=np.bool_) if mask is None else np.asarray(mask)
         if chosen.shape != (self.n_games,) or chosen.dtype != np.bool_:
             raise GameError(f"mask is {chosen.dtype} of shape {chosen.shape}; give bool of shape ({self.n_games},)")
-        if seed is not None or not self.games.rng.any():
-            self.games.rng[:] = seed_states(seed, self.n_games)
+        if seed is not None:
+            self.seed(seed)
         reset_games(self.rules, self.games, chosen, self._places, self.config)
+        return self.observe()
+
+    def seed(self, seed: int | None) -> None:
+        """Seed the random numbers of all games; None takes entropy from the machine."""
+        if seed is not None:
+            check_count("seed", seed, low=0)
+        self.games.rng[:] = seed_states(seed, self.n_games)
+
+    def reset_game(self, game: int, init: Mapping[str, Any]) -> np.ndarray:
+        """Start one game from a partial state, see `steerclear.env.initial.start_from`; the others go on.
+
+        Returns:
+            Observations (B, n, n_obs) float32, normalised, of all games.
+
+        Raises:
+            GameError: no such game, or a state that the rules do not allow.
+        """
+        if not 0 <= game < self.n_games:
+            raise GameError(f"there is no game {game}; games are 0..{self.n_games - 1}")
+        start_from(self.config, self.rules, self.games, game, self._places, init)
         return self.observe()
 
     def commands(self, actions: Array) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
 from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import layout as L
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 

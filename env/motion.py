@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
 from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
@@ -43,7 +42,7 @@ def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @kernel
 def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
-    """A boat that hit an obstacle: back to where it was, turned round, stopped, flag lost; the autopilot's memory stays."""
+    """A boat that hit an obstacle goes back, turned round and stopped, and loses the flag; its autopilot remembers."""
     state = games.state[b, i]
     if rules.tag_on_collision:
         games.is_tagged[b, i] = True

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-
 from steerclear.shield.jit import Array, IntArray, kernel
 
 from .angles import heading_to

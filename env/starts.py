@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, kernel
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import wrap_degrees
 
 from .angles import heading_to
 from .arrays import Games, Rules
@@ -112,28 +112,44 @@ def clear_game(rules: Rules, games: Games, b: int) -> None:
 
 
 @kernel
-def start_game(rules: Rules, games: Games, b: int, places: Array, random: bool, own_side: bool) -> bool:
-    """Place every boat of game ``b`` (already cleared).
+def _find_place(
+    rules: Rules, games: Games, b: int, i: int, place: Array, random: bool, own_side: bool, placed: BoolArray
+) -> bool:
+    """Put boat ``i`` on its fixed place when that is free, else on a random one; False when there is none."""
+    team = rules.team[i]
+    if games.has_flag[b, i]:
+        return draw_place(rules, games, b, i, 1 - team, placed)
+    if random:
+        return draw_place(rules, games, b, i, team if own_side else -1, placed)
+    if place_is_free(rules, games, b, i, place[0], place[1], placed) and is_on_side(rules, team, place[0], place[1]):
+        games.state[b, i, L.X], games.state[b, i, L.Y] = place[0], place[1]
+        return True
+    return draw_place(rules, games, b, i, team, placed)
+
+
+@kernel
+def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, random: bool, own_side: bool) -> bool:
+    """Place every boat of game ``b`` (already cleared, carriers already marked).
 
     Args:
         rules: the rules.
         games: the games.
         b: which game.
         places: (n, 2) fixed places, m; a boat whose place is not free gets a random one on its own side.
+        given: (n, 4) x m, y m, speed m/s and heading deg that the caller wants; NaN where it does not care.
         random: ignore ``places``; positions, speeds and headings are random.
         own_side: random places lie on the own side.
 
     Returns:
         False when a boat found no place.
     """
-    placed = np.zeros(rules.n_boats, dtype=np.bool_)
+    placed = ~np.isnan(given[:, 0])
+    for i in range(rules.n_boats):
+        if placed[i]:
+            games.state[b, i, L.X], games.state[b, i, L.Y] = given[i, 0], given[i, 1]
     for i in range(rules.n_boats):
         state = games.state[b, i]
-        team = rules.team[i]
-        x, y = places[i, 0], places[i, 1]
-        if not random and place_is_free(rules, games, b, i, x, y, placed) and is_on_side(rules, team, x, y):
-            state[L.X], state[L.Y] = x, y
-        elif not draw_place(rules, games, b, i, team if own_side or not random else -1, placed):
+        if not placed[i] and not _find_place(rules, games, b, i, places[i], random, own_side, placed):
             return False
         placed[i] = True
         if random:
@@ -141,6 +157,10 @@ def start_game(rules: Rules, games: Games, b: int, places: Array, random: bool, 
             state[L.HEADING] = 360.0 * next_uniform(games.rng, b) - 180.0
         else:
             state[L.HEADING] = heading_to_scrimmage(rules, state[L.X], state[L.Y])
+        if not math.isnan(given[i, 2]):
+            state[L.SPEED] = given[i, 2]
+        if not math.isnan(given[i, 3]):
+            state[L.HEADING] = wrap_degrees(given[i, 3])
     return True
 
 
@@ -156,6 +176,9 @@ def settle(rules: Rules, games: Games, b: int) -> None:
         x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
         games.previous_position[b, i, 0], games.previous_position[b, i, 1] = x, y
         games.on_side[b, i] = is_on_side(rules, rules.team[i], x, y)
+        if games.has_flag[b, i]:
+            games.flag_position[b, 1 - rules.team[i], 0] = x
+            games.flag_position[b, 1 - rules.team[i], 1] = y
     check_grabs(rules, games, b)
     check_tags(rules, games, b)
     check_untags(rules, games, b)
@@ -163,10 +186,11 @@ def settle(rules: Rules, games: Games, b: int) -> None:
 
 @kernel
 def _start_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, random: bool, own_side: bool) -> bool:
+    nothing_given = np.full((rules.n_boats, 4), np.nan)
     for b in range(chosen.shape[0]):
         if chosen[b]:
             clear_game(rules, games, b)
-            if not start_game(rules, games, b, places, random, own_side):
+            if not start_game(rules, games, b, places, nothing_given, random, own_side):
                 return False
             settle(rules, games, b)
     return True

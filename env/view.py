@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 

@@ -1,0 +1,213 @@
+"""`MctfEnv`: the game as a PettingZoo ``ParallelEnv``, a thin front over `BatchedMctf` with one game."""
+
+from __future__ import annotations
+
+import difflib
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Space
+from pettingzoo import ParallelEnv
+from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.jit import Array
+
+from .actions import ActionDecoder, action_kinds, action_space
+from .compat import PyquaticusAttributes
+from .config import GameConfig
+from .core import BatchedMctf, CommandFilter
+from .field import field_points
+from .infos import InfoWriter
+from .view import GameView
+
+logger = logging.getLogger(__name__)
+
+Reward = Callable[[str, GameView, GameView], float]
+"""``reward(agent_id, before, after) -> float``, called once per boat and step."""
+
+RENDER_MODES = ("human", "rgb_array")
+RESET_OPTIONS = ("init_dict",)
+
+
+class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
+    """Maritime Capture the Flag for policies written to PettingZoo or to Pyquaticus.
+
+    Observations are normalised float32 vectors; ``infos[agent]["global_state"]`` and ``["unnorm_obs"]`` are dicts keyed
+    as in Pyquaticus. A boat without an action stops. ``agents`` is empty once the game is over. Scores, positions and
+    the rest are in ``core`` (a `BatchedMctf` with one game) and in `view`.
+
+    Args:
+        config: a `GameConfig` or a preset's name; None is the ``mctf2025`` preset.
+        render_mode: None, "human" (a window) or "rgb_array".
+        action_kind: kind of action space ("discrete", "continuous" or "afp"), one for all, one per boat, or a dict by
+            agent id. Actions of every kind are understood whatever is declared.
+        reward: None for the sparse default (weights in the config) or a function of agent id and the views before
+            and after the step.
+        command_filter: see ``env.command_filter``: called with ``core`` and the decided commands (1, n, 2) before
+            the boats move; the shield's place.
+
+    Raises:
+        ConfigError: an unusable config, action kind or render mode.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "name": "mctf_v0", "is_parallelizable": True, "render_fps": 10}  # noqa: RUF012 (PettingZoo's own form)
+
+    def __init__(
+        self,
+        config: GameConfig | str | None = None,
+        render_mode: str | None = None,
+        action_kind: str | Sequence[str] | Mapping[str, str] = "discrete",
+        reward: Reward | None = None,
+        command_filter: CommandFilter | None = None,
+        seed: int | None = None,
+    ) -> None:
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ConfigError(f"unknown render_mode {render_mode!r}; choose one of {', '.join(RENDER_MODES)} or None")
+        self.core = BatchedMctf(config, n_games=1, seed=seed)
+        self.config = self.core.config
+        self.render_mode = render_mode
+        self.reward = reward
+        self.command_filter = command_filter
+        self.possible_agents = list(self.config.agent_ids)
+        self.agents: list[str] = []
+        points = field_points(self.core.field.size)
+        kinds = action_kinds(self.config, action_kind)
+        self.action_kinds = kinds
+        self._decoder = ActionDecoder(self.config, kinds, self.core.max_speed_mps, points, self.core.field.size)
+        self._info_writer = InfoWriter(self.core)
+        self.agent_obs_normalizer = self._info_writer.observation
+        self.global_state_normalizer = self._info_writer.global_state
+        self._set_pyquaticus_attributes(points)
+        self.observation_spaces: dict[str, Space[Any]] = {
+            a: self.agent_obs_normalizer.normalized_space for a in self.possible_agents
+        }
+        self.action_spaces: dict[str, Space[Any]] = {
+            a: action_space(kinds[a], self.max_speeds[i], len(points)) for i, a in enumerate(self.possible_agents)
+        }
+        self.state_space = self.global_state_normalizer.unnormalized_space
+        self._renderer: Any = None
+
+    def observation_space(self, agent: str) -> Space[Any]:
+        """Space of an agent's observations: the same object at every call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Space[Any]:
+        """Space of an agent's actions: the same object at every call."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
+        """Start a game.
+
+        Args:
+            seed: seed of random starts; None goes on with the present random numbers.
+            options: {"init_dict": ...} starts from a partial state (see `steerclear.env.initial.start_from`).
+
+        Returns:
+            observations and infos by agent id.
+
+        Raises:
+            GameError: an init_dict that the rules do not allow.
+        """
+        init = _init_dict(options)
+        if seed is not None:
+            self.core.seed(seed)
+        if init is None:
+            self.core.reset()
+        else:
+            self.core.reset_game(0, init)
+        self.agents = self.possible_agents[:]
+        if self.render_mode == "human":
+            self.render()
+        return self._observations(), self._info_writer.infos()
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """One step.
+
+        Args:
+            actions: agent id -> action of any kind (see `ActionDecoder`).
+
+        Returns:
+            observations, rewards, terminated, truncated and infos by agent id.
+
+        Raises:
+            GameError: the game has not been reset or is over, or an action is unusable.
+        """
+        if not self.agents:
+            raise GameError("the game has not begun or is over; call reset() first")
+        before = None if self.reward is None else self.view()
+        commands = self._decoder.decode(actions, self.core.state[0])
+        _, rewards, terminated, truncated = self.core.step(commands[np.newaxis], self.command_filter)
+        ids = self.agents
+        outcome = (
+            self._observations(),
+            self._rewards(rewards[0], before),
+            dict.fromkeys(ids, bool(terminated[0])),
+            dict.fromkeys(ids, bool(truncated[0])),
+            self._info_writer.infos(),
+        )
+        if terminated[0] or truncated[0]:
+            self.agents = []
+        if self.render_mode == "human":
+            self.render()
+        return outcome
+
+    def state(self) -> np.ndarray:
+        """Raw global state vector (n_global,) float32, in the order of ``global_state_normalizer.keys``."""
+        return self._info_writer.global_vector().astype(np.float32)
+
+    def view(self) -> GameView:
+        """A frozen copy of the game as it stands."""
+        return self.core.view(0)
+
+    def render(self, overlay: Any = None) -> np.ndarray | None:
+        """Draw the game: an RGB array (height, width, 3) uint8 in mode "rgb_array", the window in mode "human".
+
+        Args:
+            overlay: what else to draw, see `steerclear.env.render`.
+        """
+        if self.render_mode is None:
+            logger.warning("render() does nothing without a render_mode; build the env with one of %s", RENDER_MODES)
+            return None
+        if self._renderer is None:
+            from .render import Renderer
+
+            self._renderer = Renderer(self.config, self.render_mode)
+        picture = self._renderer.draw(self.view(), overlay)
+        return picture if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Close the window, if any."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _observations(self) -> dict[str, np.ndarray]:
+        rows = self.core.observations[0].copy()
+        return {agent_id: rows[i] for i, agent_id in enumerate(self.possible_agents)}
+
+    def _rewards(self, defaults: Array, before: GameView | None) -> dict[str, float]:
+        if self.reward is None or before is None:
+            return dict(zip(self.possible_agents, defaults.tolist(), strict=True))
+        after = self.view()
+        return {agent_id: float(self.reward(agent_id, before, after)) for agent_id in self.possible_agents}
+
+
+def _init_dict(options: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+    """The init_dict among reset's options; other options are reported, near misses refused."""
+    if options is None:
+        return None
+    if not isinstance(options, Mapping):
+        raise GameError(f"options is {type(options).__name__}; give a dict such as {{'init_dict': {{...}}}}")
+    for name in options:
+        if name in RESET_OPTIONS:
+            continue
+        near = difflib.get_close_matches(str(name), RESET_OPTIONS, n=1)
+        if near:
+            raise GameError(f"unknown reset option {name!r}; did you mean {near[0]!r}?")
+        logger.warning("reset option %r is not known and has no effect; known: %s", name, ", ".join(RESET_OPTIONS))
+    return options.get("init_dict")
