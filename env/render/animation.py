@@ -14,6 +14,7 @@ from steerclear.env.record_file import read_meta, validate
 from steerclear.env.render.arena import Arena
 from steerclear.env.render.picture import Picture, pixels
 from steerclear.env.render.scene import Scene
+from steerclear.env.render.theme import mix
 from steerclear.shield.exceptions import ConfigError
 
 FORMATS = (".mp4", ".gif")
@@ -97,7 +98,10 @@ def save_animation(
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(part, frames, picture.size_px, fps)
+        if target.suffix.lower() == ".gif":
+            _write_gif(part, frames, picture, fps)
+        else:
+            _write_mp4(part, frames, picture.size_px, fps)
         os.replace(part, target)
     except OSError as error:
         raise ConfigError(f"cannot write {target}: {error}. Choose a folder you may write to.") from error
@@ -134,7 +138,7 @@ def _frames(
 
 
 def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
-    quality = ["-crf", "20", "-preset", "medium", "-movflags", "+faststart"]
+    quality = ["-crf", "20", "-preset", "veryfast", "-movflags", "+faststart"]
     writer = imageio_ffmpeg.write_frames(
         os.fspath(path), size_px, fps=fps, codec="libx264", quality=None, output_params=quality, macro_block_size=1
     )
@@ -146,9 +150,23 @@ def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int
         writer.close()
 
 
-def _write_gif(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
+def _write_gif(path: Path, frames: Iterator[np.ndarray], picture: Picture, fps: float) -> None:
     """Write all frames with one palette, so that still water does not flicker and frames stay small."""
-    first = Image.fromarray(next(frames)).quantize(colors=255, method=Image.Quantize.MEDIANCUT)
-    rest = (Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_palette(picture))
+    images = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     duration_ms = max(20, 10 * round(100.0 / fps))
-    first.save(path, save_all=True, append_images=rest, duration=duration_ms, loop=0, disposal=1)
+    next(images).save(path, save_all=True, append_images=images, duration=duration_ms, loop=0, disposal=1)
+
+
+def _palette(picture: Picture) -> list[int]:
+    """Return 256 colours: the theme's, the commonest of the still field, and steps between marks and water."""
+    theme = picture.theme
+    marks = [*theme.team, theme.ink, theme.muted, theme.wanted, theme.changed, theme.breach]
+    grounds = [*theme.water, theme.page, theme.plate]
+    colours = [*marks, *grounds, theme.grid, theme.edge, theme.obstacle]
+    seen, counts = np.unique(pixels(picture.still()).reshape(-1, 3), axis=0, return_counts=True)
+    colours += [tuple(seen[k].tolist()) for k in np.argsort(counts)[::-1][:60]]
+    for share in (0.3, 0.6, 0.8, 0.15, 0.45, 0.9):
+        colours += [mix(mark, ground, share) for mark in marks for ground in grounds]
+    return [part for colour in list(dict.fromkeys(colours))[:256] for part in colour]

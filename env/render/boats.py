@@ -83,18 +83,30 @@ def _draw_closest(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme) -> N
         canvas.dashed_line(scene.position_m[pair[0]], scene.position_m[pair[1]], colour, 1.4, 3)
 
 
+def command_end(start_m: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """Return where the arrow of a command ends.
+
+    Args:
+        start_m: Where the boat is.
+        command: Speed m/s and absolute heading deg.
+
+    Returns:
+        The point that the boat would reach in ``LOOKAHEAD_S``; the start itself when the command is not finite.
+    """
+    if not np.isfinite(command).all():
+        return np.asarray(start_m, dtype=float)
+    return start_m + along(float(command[1]), float(command[0]) * LOOKAHEAD_S)
+
+
 def _draw_command(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: Theme) -> None:
     overlay, start = scene.overlay, scene.position_m[boat]
-    if overlay is None or not np.isfinite(overlay.sent[boat]).all():
+    if overlay is None:
         return
-    speed_mps, heading_deg = overlay.sent[boat]
-    sent_end = start + along(heading_deg, speed_mps * LOOKAHEAD_S)
+    sent_end = command_end(start, overlay.sent[boat])
     if not overlay.intervened[boat]:
         canvas.arrow(start, sent_end, mix(theme.team[arena.team[boat]], theme.page, 0.25), 1.6)
         return
-    if np.isfinite(overlay.wanted[boat]).all():
-        speed_mps, heading_deg = overlay.wanted[boat]
-        canvas.arrow(start, start + along(heading_deg, speed_mps * LOOKAHEAD_S), theme.wanted, 1.6)
+    canvas.arrow(start, command_end(start, overlay.wanted[boat]), theme.wanted, 1.6)
     canvas.arrow(start, sent_end, theme.changed, 4.6, theme.plate)
 
 
@@ -109,7 +121,7 @@ def _draw_hull(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: The
     tagged = bool(scene.is_tagged[boat])
     fill = mix(colour, theme.page, 0.72) if tagged else colour
     canvas.polygon(centre + turned(HULL * length_m, heading_deg), fill, colour if tagged else theme.plate)
-    canvas.polygon(centre + turned(DECK * length_m, heading_deg), colour if tagged else mix(colour, theme.plate, 0.75))
+    canvas.polygon(centre + turned(DECK * length_m, heading_deg), colour if tagged else mix(colour, theme.plate, 0.5))
     if tagged:
         _draw_cross(canvas, centre, length_m * 0.36, theme.ink)
 

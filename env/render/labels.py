@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pygame
 from steerclear.env.render.arena import Arena
-from steerclear.env.render.boats import CLOSE_SEPARATIONS, MIN_HULL_PX
+from steerclear.env.render.boats import CLOSE_SEPARATIONS, MIN_HULL_PX, command_end
 from steerclear.env.render.canvas import Canvas, font
 from steerclear.env.render.panel import FOOTER_PX, HEADER_PX, draw_text
 from steerclear.env.render.scene import Scene, closest_pair
@@ -28,7 +28,7 @@ def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Ar
     """
     reach_px = max(arena.separation_m / 2 * canvas.scale_px_per_m, MIN_HULL_PX / 2)
     spots = [canvas.to_px(centre) for centre in scene.position_m]
-    taken = [_around(spot, reach_px) for spot in spots]
+    taken = [_around(spot, reach_px) for spot in spots] + _marks_to_keep_clear(canvas, scene)
     _draw_distance(surface, canvas, scene, arena, theme, taken)
     changed = np.zeros(len(spots), bool) if scene.overlay is None else np.asarray(scene.overlay.intervened)
     for boat in np.argsort(~changed, kind="stable").tolist():
@@ -42,11 +42,27 @@ def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Ar
             taken.append(place)
 
 
+def _marks_to_keep_clear(canvas: Canvas, scene: Scene) -> list[pygame.Rect]:
+    """Return boxes over the flags and along the arrows of commands the shield changed."""
+    boxes = []
+    for foot in scene.flag_position_m:
+        x, y = canvas.to_px(foot)
+        boxes.append(pygame.Rect(round(x) - 6, round(y) - 28, 28, 32))
+    if scene.overlay is None:
+        return boxes
+    for boat in np.flatnonzero(scene.overlay.intervened):
+        start = scene.position_m[boat]
+        for command in (scene.overlay.wanted[boat], scene.overlay.sent[boat]):
+            way = command_end(start, command) - start
+            boxes += [_around(canvas.to_px(start + share * way), 6.0) for share in np.linspace(0.1, 1.0, 10)]
+    return boxes
+
+
 def _shield_text(scene: Scene, boat: int, arena: Arena) -> str:
     if scene.overlay is None:
         return ""
     certificate_m = float(scene.overlay.certificate_m[boat])
-    margin = f"  {certificate_m:+.1f} m" if np.isfinite(certificate_m) else ""
+    margin = f"  {certificate_m:+.1f} m".replace("-", "−") if np.isfinite(certificate_m) else ""
     return arena.reason_text(int(scene.overlay.reason[boat])) + margin
 
 

@@ -50,6 +50,11 @@ class Picture:
         draw_field(self._canvas, arena, self.theme)
         self._field = self._canvas.surface.copy()
 
+    def still(self) -> pygame.Surface:
+        """Return the field alone."""
+        self._canvas.surface.blit(self._field, (0, 0))
+        return self._canvas.finished()
+
     def draw(self, scene: Scene, show_commands: bool = True) -> pygame.Surface:
         """Draw a moment.
 

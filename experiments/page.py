@@ -1,0 +1,69 @@
+"""Writing self-contained HTML pages from the templates beside this package."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+
+def template(name: str) -> str:
+    """Return the text of a template."""
+    return (files("steerclear.experiments") / "templates" / name).read_text(encoding="utf-8")
+
+
+def fill(page: str, parts: Mapping[str, str]) -> str:
+    """Put parts into a template, each at its ``@@NAME@@``; a part is never searched for further marks.
+
+    Args:
+        page: The template's text.
+        parts: Text by name.
+
+    Returns:
+        The page.
+    """
+    pieces = page.split("@@")
+    return "".join(parts[piece] if place % 2 else piece for place, piece in enumerate(pieces))
+
+
+def as_json(content: Any) -> str:
+    """Return JSON that may stand inside a script element whatever texts it holds."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def as_text(content: Any) -> str:
+    """Return text that may stand inside an element or an attribute."""
+    return html.escape(str(content))
+
+
+def write_page(path: str | os.PathLike[str], page: str) -> Path:
+    """Write a page; the file appears whole or not at all.
+
+    Args:
+        path: File to write.
+        page: Its text.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ConfigError: The file cannot be written.
+    """
+    target = Path(path)
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(page, encoding="utf-8")
+        os.replace(part, target)
+    except OSError as error:
+        raise ConfigError(f"cannot write {target} ({error.strerror}); choose a folder you may write to.") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return target
