@@ -28,7 +28,8 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
             ids), ``seed``, ``reason_names`` and ``title``. Those left out describe an unshielded, unnamed game.
 
     Returns:
-        A dict with all of ``record_file.META_KEYS``, the title, the scrimmage line and the obstacles.
+        A dict with all of ``record_file.META_KEYS``, the title, the scrimmage line and the obstacles. The radius
+        is one number, or one for each boat where they differ.
 
     Raises:
         TraceError: A setting is unknown.
@@ -36,7 +37,7 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
     unknown = sorted(set(settings) - set(_BESIDE_THE_GAME))
     if unknown:
         raise TraceError(f"unknown {', '.join(unknown)}; a record takes {', '.join(_BESIDE_THE_GAME)}.")
-    width, height = config.env_bounds_m
+    (width, height), radii = config.env_bounds_m, config.agent_radius_m
     game = {
         "dt_s": config.dt_s,
         "env_bounds_m": config.env_bounds_m,
@@ -50,7 +51,7 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
         "scrimmage": config.scrimmage_m,
         "catch_radius_m": config.catch_radius_m,
         "flag_keepout_m": config.flag_keepout_m,
-        "agent_radius_m": config.agent_radius_m,
+        "agent_radius_m": radii[0] if len(set(radii)) == 1 else radii,
         "platforms": [platform.name for platform in config.platforms],
         "obstacles": config.obstacles,
         "preset": config.preset_name,

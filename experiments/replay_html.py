@@ -71,8 +71,6 @@ def own_team(metas: Sequence[Mapping[str, Any]]) -> int:
 
 
 def game_title(meta: Mapping[str, Any]) -> str:
-    """Return a game's own title, or who plays whom, with or without a shield."""
-    if meta.get("title"):
-        return str(meta["title"])
+    """Return the game's own title or who plays whom, and whether a shield is on."""
     blue, red = (meta["policies"].get(side) or side for side in ("blue", "red"))
-    return f"{blue} – {red}, {'shield on' if meta['shielded'] else 'shield off'}"
+    return f"{meta.get('title') or f'{blue} – {red}'}, {'shield on' if meta['shielded'] else 'shield off'}"

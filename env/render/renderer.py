@@ -25,7 +25,7 @@ class Renderer:
         mode: One of ``MODES``.
         width_px: Width of the picture; the height follows from the field.
         theme: "light" or "dark".
-        show_commands: Draw wanted and sent commands when ``render`` is given them.
+        show_commands: Draw wanted and sent commands when ``draw`` is given them.
         speedup: In a window, how many times faster than real time to go at most.
 
     Raises:
@@ -53,7 +53,7 @@ class Renderer:
         self._track: deque[np.ndarray] = deque(maxlen=max(2, round(TRAIL_S / self.arena.dt_s)))
         self._last_s = -np.inf
 
-    def render(self, view: Any, overlay: Overlay | None = None) -> np.ndarray | None:
+    def draw(self, view: Any, overlay: Overlay | None = None) -> np.ndarray | None:
         """Show a moment; the track behind the boats is made of the moments shown so far.
 
         Args:

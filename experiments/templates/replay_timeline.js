@@ -56,6 +56,6 @@ function drawTimes(context, game, width, height, foot, colours) {
     const x = time / Math.max(game.duration, 1e-9) * width;
     context.fillRect(Math.min(x, width - 1), foot, 1, 3);
     context.textAlign = x < 12 ? "left" : x > width - 14 ? "right" : "center";
-    context.fillText(`${Math.floor(time / 60)}:${String(time % 60).padStart(2, "0")}`, x, height);
+    context.fillText(`${Math.floor(time / 60)}:${String(time % 60).padStart(2, "0")}`, x < 12 ? x + 3 : x, height);
   }
 }
