@@ -1,0 +1,186 @@
+"""How near two boats come along sampled paths, and what a neighbour may do meanwhile.
+
+A result is the row ``(margin, sample, nx, ny)``: least distance minus radius in m, the sample at the end of the
+segment where it occurs, and the unit vector from the neighbour to the boat there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, kernel
+
+MARGIN = 0
+SAMPLE = 1
+NORMAL_X = 2
+NORMAL_Y = 3
+N_CLEARANCE = 4
+
+FAR = 1e6
+"""Margin, m, of a pair that cannot meet."""
+
+
+@kernel
+def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k: int) -> float:
+    """Least squared distance to the origin over a straight segment; noted in ``out`` when below ``best``."""
+    dx, dy = x1 - x0, y1 - y0
+    length = dx * dx + dy * dy
+    part = 0.0
+    if length > 0.0:
+        part = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / length))
+    x, y = x0 + part * dx, y0 + part * dy
+    square = x * x + y * y
+    if square < best:
+        out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = k, x, y
+        return square
+    return best
+
+
+@kernel
+def _finish(out: Array, best: float, radius_m: float) -> None:
+    """Turn squared distance and vector into margin and unit normal; coincident boats get the x axis."""
+    distance = math.sqrt(best)
+    out[MARGIN] = distance - radius_m
+    if distance > 1e-9:
+        out[NORMAL_X] /= distance
+        out[NORMAL_Y] /= distance
+    else:
+        out[NORMAL_X], out[NORMAL_Y] = 1.0, 0.0
+
+
+@kernel
+def clear_of_path(own: Array, other: Array, samples: int, tail: float, radius_m: float, floor_m: float, out: Array) -> None:
+    """Clearance between two sampled paths, run on straight for ``tail`` samples at the end.
+
+    Stops early once the margin is below ``floor_m``: such a manoeuvre is out of the running anyway.
+    """
+    best = FAR * FAR
+    stop = max(0.0, floor_m + radius_m)
+    stop *= stop
+    x0, y0 = own[0, 0] - other[0, 0], own[0, 1] - other[0, 1]
+    dx, dy = 0.0, 0.0
+    for k in range(1, samples + 1):
+        x1, y1 = own[k, 0] - other[k, 0], own[k, 1] - other[k, 1]
+        best = _note(out, best, x0, y0, x1, y1, k)
+        if best < stop:
+            break
+        dx, dy = x1 - x0, y1 - y0
+        x0, y0 = x1, y1
+    if best >= stop and tail > 0.0:
+        best = _note(out, best, x0, y0, x0 + tail * dx, y0 + tail * dy, samples)
+    _finish(out, best, radius_m)
+
+
+@kernel
+def clear_of_straight(
+    own: Array, x: float, y: float, sx: float, sy: float, samples: int, tail: float, radius_m: float, floor_m: float, out: Array
+) -> None:
+    """Clearance from a neighbour that keeps its velocity: at (x, y) m now, moving (sx, sy) m per sample."""
+    best = FAR * FAR
+    stop = max(0.0, floor_m + radius_m)
+    stop *= stop
+    x0, y0 = own[0, 0] - x, own[0, 1] - y
+    dx, dy = 0.0, 0.0
+    for k in range(1, samples + 1):
+        x1, y1 = own[k, 0] - x - k * sx, own[k, 1] - y - k * sy
+        best = _note(out, best, x0, y0, x1, y1, k)
+        if best < stop:
+            break
+        dx, dy = x1 - x0, y1 - y0
+        x0, y0 = x1, y1
+    if best >= stop and tail > 0.0:
+        best = _note(out, best, x0, y0, x0 + tail * dx, y0 + tail * dy, samples)
+    _finish(out, best, radius_m)
+
+
+@kernel
+def _aim(rx: float, ry: float, vx: float, vy: float, way: float) -> tuple[float, float]:
+    """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity, else at the boat.
+
+    (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
+    """
+    a = vx * vx + vy * vy - way * way
+    b = rx * vx + ry * vy
+    c = rx * rx + ry * ry
+    root = b * b - a * c
+    if root <= 0.0:
+        return rx, ry
+    root = math.sqrt(root)
+    time = -1.0
+    if abs(a) < 1e-9:
+        time = -0.5 * c / b if b < 0.0 else -1.0
+    else:
+        early, late = (-b - root) / a, (-b + root) / a
+        if early > late:
+            early, late = late, early
+        time = early if early > 0.0 else late
+    if time <= 0.0:
+        return rx, ry
+    return rx + time * vx, ry + time * vy
+
+
+@kernel
+def clear_of_pursuer(
+    own: Array,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    speed_mps: float,
+    top_speed_mps: float,
+    acc_mps2: float,
+    turn_rad: float,
+    lead: bool,
+    sample_s: float,
+    samples: int,
+    radius_m: float,
+    floor_m: float,
+    out: Array,
+) -> None:
+    """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
+
+    Args:
+        own: the boat's path, m.
+        x, y: the neighbour's position now, m.
+        ux, uy: its heading as a unit vector (east, north).
+        speed_mps, top_speed_mps, acc_mps2: its speed, top speed and granted acceleration.
+        turn_rad: granted turn per sample, rad.
+        lead: steer for the meeting point instead of the boat itself.
+        sample_s: time between samples, s.
+        samples: samples of the path to go through.
+        radius_m: separation radius, m.
+        floor_m: margin below which the search stops early, m.
+        out: the result row.
+    """
+    best = FAR * FAR
+    stop = max(0.0, floor_m + radius_m)
+    stop *= stop
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    x0, y0 = own[0, 0] - x, own[0, 1] - y
+    for k in range(1, samples + 1):
+        ax, ay = own[k, 0] - x, own[k, 1] - y
+        if lead:
+            ax, ay = _aim(
+                own[k - 1, 0] - x, own[k - 1, 1] - y, own[k, 0] - own[k - 1, 0], own[k, 1] - own[k - 1, 1],
+                speed_mps * sample_s,
+            )
+        along, across = ux * ax + uy * ay, ux * ay - uy * ax
+        if along > 0.0 and abs(across) * c <= along * s:
+            norm = math.sqrt(ax * ax + ay * ay)
+            if norm > 1e-12:
+                ux, uy = ax / norm, ay / norm
+        elif across >= 0.0:
+            ux, uy = c * ux - s * uy, s * ux + c * uy
+        else:
+            ux, uy = c * ux + s * uy, c * uy - s * ux
+        new_speed = max(speed_mps, min(top_speed_mps, speed_mps + acc_mps2 * sample_s))
+        way = 0.5 * (speed_mps + new_speed) * sample_s
+        speed_mps = new_speed
+        x += way * ux
+        y += way * uy
+        x1, y1 = own[k, 0] - x, own[k, 1] - y
+        best = _note(out, best, x0, y0, x1, y1, k)
+        if best < stop:
+            break
+        x0, y0 = x1, y1
+    _finish(out, best, radius_m)

@@ -1,0 +1,248 @@
+"""The manoeuvre certificate: a boat is safe while some escape manoeuvre keeps clear of everybody.
+
+For boat i with escape manoeuvre m (turn to one side, then straight, at a set speed),
+
+    h_i(x) = max over m of min over neighbours j, over what j may do, over t of |p_i(t; m) - p_j(t)| - R_ij,
+
+with the boat's own motion from its full model (thrust lag, speed lost in the turn, turn rate bound by thrust). The
+manoeuvre is one for all neighbours of a boat, so rows of different neighbours never contradict each other: the
+manoeuvre itself satisfies them all (backup certificates: Chen, Jankovic, Santillo, Ames 2021). Team-mates are taken
+along their own manoeuvres; opponents straight on and, when a turn is granted to them, as pursuers.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, BoolArray, kernel
+from ..platforms import layout as L
+from ..scene import Boats, Fixed, Tuning, Work
+from .clearance import FAR, MARGIN, clear_of_path, clear_of_pursuer, clear_of_straight
+from .paths import STRIDE, trace_path
+from .surroundings import clear_of_surroundings
+
+PAIR_SAFE = 1e3
+"""Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
+
+FIXED_LOST = 500.0
+"""Merit from which it keeps clear of all boats, but not of fixed things."""
+
+STRAIGHT_SAFE = 100.0
+"""Merit from which it keeps clear of team-mates and of opponents that hold their course, but not of pursuers."""
+
+STRAIGHT_BASE = 300.0
+"""Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
+
+RECOVERY_S = 1.5
+"""When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
+
+SLOWEST = 0.3
+"""Opponents are granted the turn rate of at least this fraction of top speed: thrust comes before way."""
+
+
+@kernel
+def mark_near(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, near: BoolArray) -> None:
+    """Mark pairs close enough to matter.
+
+    A pair is left out when its distance exceeds R_ij + (top speed i + top speed j) * (longer horizon + tail). No boat
+    outruns its top speed, so on every path the certificate looks at the pair stays apart by more than R_ij: its
+    margin is positive for every manoeuvre and every command, its row can never be the binding one, and leaving it
+    out changes no decision.
+    """
+    n = state.shape[0]
+    for i in range(n):
+        top_i = max(boats.params[i, L.MAX_SPEED], state[i, L.SPEED])
+        for j in range(i):
+            top = top_i + max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED])
+            horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * STRIDE * tuning.dt_s + tuning.tail_s
+            reach = tuning.radius_m + margin_m[i] + margin_m[j] + top * horizon_s
+            dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
+            hit = dx * dx + dy * dy <= reach * reach
+            near[i, j] = hit
+            near[j, i] = hit
+
+
+@kernel
+def clear_of_opponent(
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, radius_m: float, floor_m: float, out: Array
+) -> None:
+    """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
+    sample_s = STRIDE * tuning.dt_s
+    heading = math.radians(state[j, L.HEADING])
+    way = state[j, L.SPEED] * sample_s
+    clear_of_straight(
+        path, state[j, L.X], state[j, L.Y], way * math.sin(heading), way * math.cos(heading),
+        boats.samples[i], tuning.tail_s / sample_s, radius_m, floor_m, out,
+    )
+
+
+@kernel
+def clear_of_hunter(
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, radius_m: float, floor_m: float,
+    spare: Array, out: Array,
+) -> None:
+    """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
+
+    The worse of two hunters: one steers at the boat, one for the meeting point. ``spare`` is scratch.
+    """
+    sample_s = STRIDE * tuning.dt_s
+    speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
+    heading = math.radians(state[j, L.HEADING])
+    turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, SLOWEST))
+    out[MARGIN] = FAR
+    for lead in range(2):
+        clear_of_pursuer(
+            path, state[j, L.X], state[j, L.Y], math.sin(heading), math.cos(heading), speed, top,
+            boats.granted_acc_mps2[j], turn, lead == 1, sample_s, boats.samples[i], radius_m, floor_m, spare,
+        )
+        if spare[MARGIN] < out[MARGIN]:
+            out[:] = spare
+            if out[MARGIN] < floor_m:
+                return
+
+
+@kernel
+def _rank_recovery(
+    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work, radius_m: float
+) -> None:
+    """Inside the radius no margin is left to compare: rank by not closing further and by the distance soon after."""
+    sample_s = STRIDE * tuning.dt_s
+    k = min(boats.samples[i], max(1, int(RECOVERY_S / sample_s)))
+    if ours[j]:
+        x, y = work.path[j, k, 0], work.path[j, k, 1]
+    else:
+        heading = math.radians(state[j, L.HEADING])
+        way = state[j, L.SPEED] * k * sample_s
+        x, y = state[j, L.X] + way * math.sin(heading), state[j, L.Y] + way * math.cos(heading)
+    now = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
+    later = math.hypot(path[k, 0] - x, path[k, 1] - y)
+    least = work.out[MARGIN] + radius_m
+    work.out[MARGIN] = -1e-3 + min(0.0, later - radius_m) + 2.0 * min(0.0, least - now)
+
+
+@kernel
+def clear_of_boat(
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+) -> None:
+    """Clearance row of boat i on ``path`` from boat j, into ``work.out``."""
+    radius = tuning.radius_m + margin_m[i] + margin_m[j]
+    dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
+    inside = dx * dx + dy * dy < radius * radius
+    floor = -FAR if inside else floor_m
+    if ours[j]:
+        samples = min(boats.samples[i], boats.samples[j])
+        tail = tuning.tail_s / (STRIDE * tuning.dt_s)
+        clear_of_path(path, work.path[j], samples, tail, radius, floor, work.out)
+    else:
+        clear_of_opponent(i, j, path, state, boats, tuning, radius, floor, work.out)
+    if inside:
+        _rank_recovery(i, j, path, state, ours, boats, tuning, work, radius)
+
+
+@kernel
+def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
+    """Whether boat j is an opponent of boat i that is granted more than holding its course."""
+    return not ours[j] and boats.team[i] != boats.team[j] and boats.granted_turn_dps[j] > 0.0
+
+
+@kernel
+def worst_clearance(
+    i: int, slot: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work,
+    floor_m: float,
+) -> None:
+    """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses."""
+    clear = work.clear[slot]
+    clear[MARGIN] = FAR
+    work.bound[slot] = -1
+    for j in range(state.shape[0]):
+        if j == i or not work.near[i, j]:
+            continue
+        clear_of_boat(i, j, work.path[slot], state, margin_m, ours, boats, tuning, work, floor_m)
+        if work.out[MARGIN] < clear[MARGIN]:
+            clear[:] = work.out
+            work.bound[slot] = j
+            if clear[MARGIN] < floor_m:
+                return
+
+
+@kernel
+def worst_hunter(
+    i: int, slot: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work,
+    floor_m: float,
+) -> None:
+    """Lower the clearance in ``slot`` to that from hunting opponents where it is worse."""
+    clear = work.clear[slot]
+    for j in range(state.shape[0]):
+        if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
+            continue
+        radius = tuning.radius_m + margin_m[i] + margin_m[j]
+        if _separation(state, i, j) < radius:
+            continue
+        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, radius, floor_m, work.spare, work.out)
+        if work.out[MARGIN] < clear[MARGIN]:
+            clear[:] = work.out
+            work.bound[slot] = j
+            if clear[MARGIN] < floor_m:
+                return
+
+
+@kernel
+def _separation(state: Array, i: int, j: int) -> float:
+    return math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
+
+
+@kernel
+def rate_path(
+    i: int, slot: int, best: float, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed,
+    tuning: Tuning, work: Work,
+) -> float:
+    """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
+
+    What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
+    first, of hunting opponents second, of fixed things third, room to spare last. Below `STRAIGHT_SAFE` the merit is
+    the margin itself, m.
+    """
+    target = work.target[i]
+    clear = work.clear[slot]
+    floor = best if best < STRAIGHT_SAFE else 0.0
+    worst_clearance(i, slot, state, margin_m, ours, boats, tuning, work, min(floor, 0.0))
+    work.fixed[slot, MARGIN] = FAR
+    if clear[MARGIN] < 0.0:
+        return clear[MARGIN]
+    floor = -FAR
+    if best >= FIXED_LOST:
+        floor = target
+    elif best >= STRAIGHT_SAFE:
+        floor = min(target, best - STRAIGHT_BASE)
+    if clear[MARGIN] >= floor:
+        worst_hunter(i, slot, state, margin_m, ours, boats, tuning, work, floor)
+    if clear[MARGIN] < target:
+        return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
+    clear_of_surroundings(
+        work.path[slot], boats.static_samples[i], fixed.field, fixed.circles, fixed.segments, fixed.segment_m,
+        work.fixed[slot],
+    )
+    spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
+    return PAIR_SAFE + max(FIXED_LOST - PAIR_SAFE, min(work.fixed[slot, MARGIN], 0.0)) + spare
+
+
+@kernel
+def lay_path(
+    i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, state: Array, boats: Boats,
+    tuning: Tuning, work: Work,
+) -> None:
+    """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
+    work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
+    path = work.path[slot]
+    path[0, 0], path[0, 1] = state[i, L.X], state[i, L.Y]
+    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.samples[i], path)

@@ -1,0 +1,199 @@
+"""The rows of the quadratic program: what each boat's turn and speed do to the certificates.
+
+Scaled inputs of boat i: z_t = turn / full turn of this step (deg), z_s = sqrt(speed_weight) * speed / top speed. With
+plan and closest point fixed (envelope theorem), turning a boat by d(psi) in this step rotates its whole path about its
+next position, and d(v) stretches it, so with n the unit vector from neighbour to boat at the closest point and r the
+boat's path from its next position to there,
+
+    dh/dpsi = n . (r_y, -r_x)   (psi clockwise),     dh/dv = n . r / v,
+
+and the row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command:
+
+    h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') [- the same for a team-mate j, whose side of n is opposite] >= target.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from .certificates.manoeuvre import clear_of_boat, clear_of_hunter, hunts
+from .certificates.surroundings import clear_of_surroundings
+from .jit import Array, BoolArray, IntArray, kernel
+from .platforms import layout as L
+from .platforms.step import step_boat
+from .platforms.usv import turn_of_rudder, update_thrust
+from .scene import Boats, Fixed, Tuning, Work
+
+AIM_M = 0.02
+"""Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""
+
+SLOW_MPS = 0.3
+"""Below this speed dh/dv is taken as at this speed."""
+
+PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
+"""Classes of rows, in the order in which they give way last: boats, fixed things, and limits (never)."""
+
+
+@kernel
+def turn_range(params: Array, state: Array, speed_mps: float, row: Array, dt_s: float) -> float:
+    """Largest turn, deg, that this step can make under a speed command; ``row`` is scratch."""
+    if params[L.KIND] == L.KIND_USV:
+        row[:] = state
+        update_thrust(params, row, speed_mps, dt_s)
+        return turn_of_rudder(params, row[L.THRUST], min(params[L.MAX_RUDDER], 100.0), dt_s)
+    return params[L.MAX_TURN_RATE] * dt_s
+
+
+@kernel
+def speed_effect(i: int, command: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> float:
+    """Change of the next speed, m/s, per m/s of speed command, by a step of the model."""
+    params = boats.params[i]
+    step = 0.1 * params[L.MAX_SPEED]
+    if command[0] > 0.5 * params[L.MAX_SPEED]:
+        step = -step
+    work.row[:] = state[i]
+    step_boat(params, work.row, command[0] + step, command[1], tuning.dt_s)
+    return (work.row[L.SPEED] - work.next_state[i, L.SPEED]) / step
+
+
+@kernel
+def _add_effect(
+    C: Array, r: int, i: int, sign: float, k: int, nx: float, ny: float, path: Array, first: int, gain: Array, work: Work
+) -> None:
+    """Add boat i's share to row r; ``gain`` holds d(psi)/d(z_t) in rad and d(v)/d(z_s) in m/s."""
+    rx, ry = path[k, 0] - work.next_state[i, L.X], path[k, 1] - work.next_state[i, L.Y]
+    C[r, first] += sign * (nx * ry - ny * rx) * gain[i, 0]
+    speed = max(work.next_state[i, L.SPEED], SLOW_MPS)
+    C[r, first + 1] += sign * (nx * rx + ny * ry) / speed * gain[i, 1]
+
+
+@kernel
+def _close_row(C: Array, d: Array, lack: float, r: int, z_now: Array) -> bool:
+    """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length."""
+    norm = 0.0
+    for c in range(C.shape[1]):
+        norm += C[r, c] * C[r, c]
+    norm = math.sqrt(norm)
+    if norm < 1e-9:
+        C[r, :] = 0.0
+        return False
+    d[r] = lack
+    for c in range(z_now.shape[0]):
+        d[r] += C[r, c] * z_now[c]
+    d[r] /= norm
+    C[r, :] /= norm
+    return True
+
+
+@kernel
+def inputs_of(
+    commands: Array, wanted: Array, movers: IntArray, state: Array, boats: Boats, tuning: Tuning, work: Work,
+    wanted_turn: Array, gain: Array, z_now: Array, z0: Array,
+) -> None:
+    """Scaled inputs of the candidate (``z_now``) and the wanted commands (``z0``), and the gains of the movers.
+
+    ``wanted_turn`` is the turn, deg, the autopilot makes of each wanted command; ``gain[i, 2]`` the full turn, deg.
+    """
+    root = math.sqrt(tuning.speed_weight)
+    for m in range(movers.shape[0]):
+        i = movers[m]
+        full = max(turn_range(boats.params[i], state[i], commands[i, 0], work.row, tuning.dt_s), 1e-6)
+        top = boats.params[i, L.MAX_SPEED]
+        gain[i, 0] = math.radians(full)
+        gain[i, 1] = speed_effect(i, commands[i], state, boats, tuning, work) * top / root
+        gain[i, 2] = full
+        turn = (work.next_state[i, L.HEADING] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
+        z_now[2 * m] = max(-1.0, min(1.0, turn / full))
+        z_now[2 * m + 1] = root * max(0.0, min(1.0, commands[i, 0] / top))
+        z0[2 * m] = max(-1.0, min(1.0, wanted_turn[i] / full))
+        z0[2 * m + 1] = root * max(0.0, min(1.0, wanted[i, 0] / top))
+
+
+@kernel
+def _pair_row(
+    i: int, j: int, m: int, place: IntArray, state: Array, margin_m: Array, ours: BoolArray, boats: Boats,
+    tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int,
+) -> bool:
+    """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
+    clear_of_boat(i, j, work.path[i], state, margin_m, ours, boats, tuning, work, -FAR)
+    radius = tuning.radius_m + margin_m[i] + margin_m[j]
+    if hunts(i, j, ours, boats) and work.out[MARGIN] > -radius:
+        work.spare2[:] = work.out
+        clear_of_hunter(i, j, work.path[i], state, boats, tuning, radius, -FAR, work.spare, work.out)
+        if work.out[MARGIN] > work.spare2[MARGIN]:
+            work.out[:] = work.spare2
+    k, nx, ny = int(work.out[SAMPLE]), work.out[NORMAL_X], work.out[NORMAL_Y]
+    lack = work.target[i] + AIM_M - work.out[MARGIN]
+    C[r, :] = 0.0
+    _add_effect(C, r, i, 1.0, k, nx, ny, work.path[i], 2 * m, gain, work)
+    if place[j] >= 0:
+        _add_effect(C, r, j, -1.0, k, nx, ny, work.path[j], 2 * place[j], gain, work)
+    if _out_of_reach(C, r, lack, tuning):
+        return False
+    return _close_row(C, d, lack, r, z_now)
+
+
+@kernel
+def _out_of_reach(C: Array, r: int, lack: float, tuning: Tuning) -> bool:
+    """Whether no inputs within their limits could violate row r: the margin exceeds all they can take from it."""
+    root = math.sqrt(tuning.speed_weight)
+    most = 0.0
+    for c in range(0, C.shape[1], 2):
+        most += 2.0 * abs(C[r, c]) + root * abs(C[r, c + 1])
+    return lack + most < 0.0
+
+
+@kernel
+def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> int:
+    """Actuator limits: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight)."""
+    root = math.sqrt(tuning.speed_weight)
+    for m in range(movers.shape[0]):
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            C[r, :] = 0.0
+            C[r, 2 * m] = sign
+            d[r] = -1.0
+            C[r + 1, :] = 0.0
+            C[r + 1, 2 * m + 1] = sign
+            d[r + 1] = 0.0 if side == 0 else -root
+            r += 2
+    return r
+
+
+@kernel
+def build_rows(
+    movers: IntArray, place: IntArray, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed,
+    tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, kind: IntArray, label: IntArray,
+) -> int:
+    """Stack all rows of the movers; returns their number, or -1 when there are more than ``C`` can hold.
+
+    ``kind[r]`` is the class of a row, ``label[r]`` = (boat, neighbour), neighbour -1 for fixed things and limits.
+    """
+    n = state.shape[0]
+    r = 0
+    for m in range(movers.shape[0]):
+        i = movers[m]
+        for j in range(n):
+            if j == i or not work.near[i, j] or (place[j] >= 0 and j < i):
+                continue
+            if r + 1 + 4 * movers.shape[0] + 1 > C.shape[0]:
+                return -1
+            if _pair_row(i, j, m, place, state, margin_m, ours, boats, tuning, work, gain, z_now, C, d, r):
+                kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
+                r += 1
+        clear_of_surroundings(
+            work.path[i], boats.static_samples[i], fixed.field, fixed.circles, fixed.segments, fixed.segment_m, work.out
+        )
+        if work.out[MARGIN] < FAR:
+            C[r, :] = 0.0
+            k = int(work.out[SAMPLE])
+            _add_effect(C, r, i, 1.0, k, work.out[NORMAL_X], work.out[NORMAL_Y], work.path[i], 2 * m, gain, work)
+            lack = AIM_M - work.out[MARGIN]
+            if not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now):
+                kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, -1
+                r += 1
+    end = _box_rows(movers, tuning, C, d, r)
+    kind[r:end] = BOX_ROW
+    label[r:end, :] = -1
+    return end

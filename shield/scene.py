@@ -1,0 +1,150 @@
+"""What compiled shield code sees: the fleet, its surroundings, the settings, and working memory.
+
+Named tuples of arrays, so that the same functions serve one decision and thousands of games.
+Indices run over all boats of the scene; ``controlled`` says for which the shield decides.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .certificates.clearance import N_CLEARANCE
+from .jit import Array, BoolArray, IntArray
+from .platforms import layout as L
+
+
+class Boats(NamedTuple):
+    """Constants of the boats of a scene (n boats).
+
+    Attributes:
+        params: platform rows, (n, N_PARAM).
+        team: team of each boat, (n,).
+        granted_turn_dps: turn rate granted to each boat as an opponent at its top speed, (n,).
+        granted_acc_mps2: acceleration granted to each boat as an opponent, (n,).
+        samples: path samples of each boat's horizon, (n,).
+        static_samples: samples over which fixed things are looked at, (n,).
+    """
+
+    params: Array
+    team: IntArray
+    granted_turn_dps: Array
+    granted_acc_mps2: Array
+    samples: IntArray
+    static_samples: IntArray
+
+
+class Fixed(NamedTuple):
+    """Things that do not move, already widened by the distance to keep from them.
+
+    Attributes:
+        field: (xmin, ymin, xmax, ymax), m; infinite where there is no edge.
+        circles: (c, 3): centre x, y and radius, m.
+        segments: (s, 4): ends x0, y0, x1, y1, m.
+        segment_m: distance to keep from segments, m.
+    """
+
+    field: Array
+    circles: Array
+    segments: Array
+    segment_m: float
+
+
+class Tuning(NamedTuple):
+    """Scalar settings in the form compiled code takes them.
+
+    Attributes:
+        dt_s: step of decision and model, s.
+        radius_m: separation radius with buffer, m.
+        tail_s: how long straight runs are continued beyond the horizon, s.
+        hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
+        decay: factor by which a margin may shrink in one step; 0 lets it fall to 0 at once.
+        margin_cap_m: margins above this may shrink freely, m.
+        speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
+    """
+
+    dt_s: float
+    radius_m: float
+    tail_s: float
+    hysteresis_m: float
+    decay: float
+    margin_cap_m: float
+    speed_weight: float
+
+
+class Memory(NamedTuple):
+    """Escape manoeuvre each boat holds between decisions (n boats).
+
+    Attributes:
+        kept: whether the boat has one.
+        side: 1 clockwise, -1 the other way.
+        target_deg: heading it ends on, deg clockwise from north.
+        speed_mps: speed it commands.
+        margin_m: margin verified at the last decision.
+        escaping: whether the boat was carrying it out at the last decision.
+    """
+
+    kept: BoolArray
+    side: Array
+    target_deg: Array
+    speed_mps: Array
+    margin_m: Array
+    escaping: BoolArray
+
+
+class Work(NamedTuple):
+    """Scratch of one decision (n boats), overwritten every time; row n of plan-like arrays is for trials.
+
+    Attributes:
+        next_state: (n, N_STATE) predicted state after the candidate commands.
+        row: (N_STATE,) state being run through a manoeuvre.
+        plan: (n + 1, 3) side, turn to go deg, speed m/s.
+        path: (n + 1, samples + 1, 2) positions along the plans, m.
+        clear: (n + 1, N_CLEARANCE) worst clearance from boats.
+        fixed: (n + 1, N_CLEARANCE) worst clearance from fixed things.
+        out, spare, spare2: (N_CLEARANCE,).
+        merit: (n,) merit of the plan held.
+        target: (n,) margin the boat must keep, m.
+        bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
+        near: (n, n) pairs that can matter.
+    """
+
+    next_state: Array
+    row: Array
+    plan: Array
+    path: Array
+    clear: Array
+    fixed: Array
+    out: Array
+    spare: Array
+    spare2: Array
+    merit: Array
+    target: Array
+    bound: IntArray
+    near: BoolArray
+
+
+def new_memory(*shape: int) -> Memory:
+    """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
+    kept, escaping = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+    return Memory(kept, np.ones(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), escaping)
+
+
+def new_work(boats: int, samples: int) -> Work:
+    """Scratch arrays for a scene of that many boats and path samples."""
+    return Work(
+        next_state=np.zeros((boats, L.N_STATE)),
+        row=np.zeros(L.N_STATE),
+        plan=np.zeros((boats + 1, 3)),
+        path=np.zeros((boats + 1, samples + 1, 2)),
+        clear=np.zeros((boats + 1, N_CLEARANCE)),
+        fixed=np.zeros((boats + 1, N_CLEARANCE)),
+        out=np.zeros(N_CLEARANCE),
+        spare=np.zeros(N_CLEARANCE),
+        spare2=np.zeros(N_CLEARANCE),
+        merit=np.zeros(boats),
+        target=np.zeros(boats),
+        bound=np.full(boats + 1, -1, np.int64),
+        near=np.zeros((boats, boats), np.bool_),
+    )
