@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -32,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import TraceError
 
 Record = dict[str, np.ndarray]
@@ -81,6 +83,20 @@ ARRAYS = tuple(LAYOUT)
 """Names of the arrays beside ``meta``."""
 
 _MUST_BE_FINITE = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
+_UNREADABLE = (
+    OSError,
+    ValueError,
+    EOFError,
+    KeyError,
+    AttributeError,
+    TypeError,
+    NotImplementedError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy raises on files that are cut, damaged, or hold something else."""
+
 _AGAIN = "Record the game again with GameRecorder and save() it."
 
 
@@ -180,16 +196,8 @@ def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path
     target = Path(path)
     if target.suffix != ".npz":
         target = target.with_name(target.name + ".npz")
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **record)
-        os.replace(part, target)
-    except OSError as error:
-        raise TraceError(f"cannot write the record {target}: {error}. Choose a folder you may write to.") from error
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(target, TraceError) as part, part.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, **record)
     return target
 
 
@@ -209,9 +217,9 @@ def load(path: str | os.PathLike[str]) -> Record:
     if not source.is_file():
         raise TraceError(f"there is no record {source}. Check the path, or record a game first.")
     try:
-        with np.load(source, allow_pickle=False) as archive:
+        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             record = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+    except _UNREADABLE as error:
         raise TraceError(f"{source} is cut or not a record ({error}). {_AGAIN}") from error
     try:
         validate(record)

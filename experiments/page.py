@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 
 
@@ -57,13 +58,6 @@ def write_page(path: str | os.PathLike[str], page: str) -> Path:
         ConfigError: The file cannot be written.
     """
     target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(target, ConfigError) as part:
         part.write_text(page, encoding="utf-8")
-        os.replace(part, target)
-    except OSError as error:
-        raise ConfigError(f"cannot write {target} ({error.strerror}); choose a folder you may write to.") from error
-    finally:
-        part.unlink(missing_ok=True)
     return target

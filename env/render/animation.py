@@ -8,13 +8,13 @@ from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
-import pygame
 from PIL import Image
 from steerclear.env.record_file import read_meta, validate
 from steerclear.env.render.arena import Arena
 from steerclear.env.render.picture import Picture, pixels
 from steerclear.env.render.scene import Scene
 from steerclear.env.render.theme import mix
+from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 
 FORMATS = (".mp4", ".gif")
@@ -48,11 +48,8 @@ def save_frame(
     if not -states <= step < states:
         raise ConfigError(f"there is no step {step}; the record has 0 to {states - 1}.")
     surface = picture.draw(Scene.from_record(record, step % states, picture.arena.dt_s))
-    try:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        pygame.image.save(surface, os.fspath(path), "picture.png")
-    except (OSError, pygame.error) as error:
-        raise ConfigError(f"cannot write {path}: {error}. Choose a folder you may write to.") from error
+    with whole_file(Path(path), ConfigError) as part:
+        Image.fromarray(pixels(surface)).save(part, format="PNG")
     return Path(path)
 
 
@@ -95,18 +92,11 @@ def save_animation(
     picture, states = _picture_of(record, width_px, theme)
     steps = _steps_shown(states, picture.arena.dt_s, fps, speedup, start_s, end_s)
     frames = _frames(record, picture, steps, progress)
-    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(target, ConfigError) as part:
         if target.suffix.lower() == ".gif":
             _write_gif(part, frames, picture, fps)
         else:
             _write_mp4(part, frames, picture.size_px, fps)
-        os.replace(part, target)
-    except OSError as error:
-        raise ConfigError(f"cannot write {target}: {error}. Choose a folder you may write to.") from error
-    finally:
-        part.unlink(missing_ok=True)
     return target
 
 

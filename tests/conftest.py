@@ -1,0 +1,69 @@
+"""Fixtures that several folders of tests share."""
+
+import numpy as np
+import pytest
+from steerclear.env.config import GameConfig
+from steerclear.env.record import find_breaches, make_record
+from steerclear.env.record_meta import meta_of
+
+REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED"]
+
+
+@pytest.fixture
+def game_meta():
+    """Settings of a small game whose blue team has a shield."""
+    obstacles = {"circle": [(3.0, (40.0, 8.0))], "polygon": [((20.0, 2.0), (24.0, 2.0), (22.0, 6.0))]}
+    config = GameConfig.preset("aamas2024", team_size=2, obstacles=obstacles)
+    return meta_of(
+        config,
+        policies={"blue": "medium", "red": "easy"},
+        shielded=["agent_0", "agent_1"],
+        seed=7,
+        reason_names=REASONS,
+    )
+
+
+@pytest.fixture
+def game_record(game_meta):
+    """A made-up game of 60 steps with two changed stretches, a held boat, a capture and a breach of boats 0 and 2."""
+    return synthetic_record(game_meta, steps=60)
+
+
+def synthetic_record(meta, steps, seed=3):
+    """Boats on smooth random paths; the arrays have every feature that a replay shows."""
+    random = np.random.default_rng(seed)
+    n, time = 4, np.arange(steps + 1)[:, None] * 0.1
+    start = np.array([[10.0, 12.0], [14.0, 30.0], [30.0, 12.0], [60.0, 25.0]])
+    velocity = np.array([[1.5, 0.0], [0.4, -0.9], [-1.9, 0.02], [-0.5, 0.6]])
+    wave = np.sin(time[..., None] + random.uniform(0, 6, (n, 2)))
+    position = start + velocity * time[..., None] * (10.0 / max(steps * 0.1, 1.0)) + 0.2 * wave
+    heading = (np.degrees(np.arctan2(velocity[:, 0], velocity[:, 1])) + 20 * np.sin(time) + 180.0) % 360.0 - 180.0
+    wanted = np.stack([random.uniform(0.0, 2.0, (steps, n)), random.uniform(-180.0, 180.0, (steps, n))], axis=-1)
+    sent, intervened = wanted.copy(), np.zeros((steps, n), bool)
+    intervened[10:20, 0] = intervened[30:33, :2] = True
+    sent[intervened] = [1.25, 42.0]
+    reason = np.where(intervened, 1, 0)
+    reason[:, 2:] = 6
+    wanted[31, 1], reason[31, 1] = np.nan, 5
+    certificate = np.where(reason == 6, np.nan, random.normal(3.0, 2.0, (steps, n)))
+    has_flag = np.zeros((steps + 1, n), bool)
+    has_flag[20:40, 1] = True
+    flag_position = np.tile(np.array(meta["flag_home"], float), (steps + 1, 1, 1))
+    flag_position[20:40, 1] = position[20:40, 1]
+    return make_record(
+        meta,
+        position=position,
+        heading_deg=heading,
+        speed_mps=1.0 + 0.5 * np.sin(time + np.arange(n)),
+        has_flag=has_flag,
+        is_tagged=np.arange(n) == np.where(time > 4.0, 3, -1),
+        oob=np.zeros((steps + 1, n), bool),
+        flag_position=flag_position,
+        captures=np.where(np.arange(steps + 1)[:, None] >= 40, [1, 0], [0, 0]),
+        wanted=wanted,
+        sent=sent,
+        reason=reason,
+        intervened=intervened,
+        certificate_m=certificate,
+        breaches=find_breaches(position, meta["separation_m"]),
+    )

@@ -1,0 +1,282 @@
+import json
+import zipfile
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import (
+    ARRAYS,
+    META_KEYS,
+    NOT_COVERED,
+    GameRecorder,
+    absolute_commands,
+    find_breaches,
+    load,
+    make_record,
+    read_meta,
+    save,
+    validate,
+)
+from steerclear.env.record_meta import meta_of
+from steerclear.shield.exceptions import TraceError
+
+
+def arrays_of(record):
+    return {name: record[name] for name in ARRAYS}
+
+
+def with_meta(record, **changes):
+    return {**record, "meta": np.array(json.dumps({**read_meta(record), **changes}))}
+
+
+def test_a_record_survives_the_disk_bit_for_bit(game_record, tmp_path):
+    path = save(game_record, tmp_path / "deep" / "game")
+    back = load(path)
+    assert path.name == "game.npz"
+    assert set(back) == set(game_record) == {*ARRAYS, "meta"}
+    for name in ARRAYS:
+        np.testing.assert_array_equal(back[name], game_record[name])
+        assert back[name].dtype == game_record[name].dtype
+    assert read_meta(back) == read_meta(game_record)
+
+
+def test_saving_replaces_a_file_whole_and_leaves_nothing_else(game_record, tmp_path):
+    target = tmp_path / "game.npz"
+    target.write_bytes(b"an older file")
+    save(game_record, target)
+    assert [file.name for file in tmp_path.iterdir()] == ["game.npz"]
+    validate(load(target))
+
+
+def test_a_failed_save_leaves_the_older_file(game_record, tmp_path):
+    target = save(game_record, tmp_path / "game.npz")
+    before = target.read_bytes()
+    broken = {**game_record, "position": np.array([object()] * 3)}
+    with pytest.raises(TraceError):
+        save(broken, target)
+    assert target.read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.97])
+def test_a_cut_file_is_one_clear_error(game_record, tmp_path, share):
+    path = save(game_record, tmp_path / "game.npz")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(TraceError, match=r"game\.npz is cut or not a record .*Record the game again"):
+        load(path)
+
+
+def test_a_damaged_file_is_one_clear_error(game_record, tmp_path):
+    path = save(game_record, tmp_path / "game.npz")
+    content = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as archive:
+        start = archive.getinfo("position.npy").header_offset + 100
+    content[start : start + 60] = bytes(60)
+    path.write_bytes(content)
+    with pytest.raises(TraceError, match="cut or not a record"):
+        load(path)
+
+
+def test_other_files_are_refused(tmp_path):
+    with pytest.raises(TraceError, match="there is no record"):
+        load(tmp_path / "none.npz")
+    (tmp_path / "text.npz").write_text("hello")
+    with pytest.raises(TraceError, match="cut or not a record"):
+        load(tmp_path / "text.npz")
+    np.save(tmp_path / "one.npy", np.zeros(3))
+    with pytest.raises(TraceError, match="cut or not a record"):
+        load(tmp_path / "one.npy")
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_missing_array_is_named(game_record, tmp_path, name):
+    arrays = {key: value for key, value in game_record.items() if key != name}
+    np.savez(tmp_path / "game.npz", **arrays)
+    with pytest.raises(TraceError, match=rf"game\.npz: the record lacks {name}\."):
+        load(tmp_path / "game.npz")
+
+
+@pytest.mark.parametrize("name", [name for name in ARRAYS if name != "wanted"])
+def test_an_array_of_another_length_is_named(game_record, name):
+    values = game_record[name]
+    short = values[:, :3] if name == "breaches" else values[:-1]
+    with pytest.raises(TraceError, match=f"{name} has shape"):
+        validate({**game_record, name: short})
+
+
+@pytest.mark.parametrize("name", ["position", "heading_deg", "speed_mps", "flag_position"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_states_must_be_finite(game_record, name, value):
+    broken = game_record[name].copy()
+    broken.flat[5] = value
+    with pytest.raises(TraceError, match=f"{name} holds NaN or infinity"):
+        validate({**game_record, name: broken})
+
+
+@pytest.mark.parametrize("key", META_KEYS)
+def test_a_missing_setting_is_named(game_record, key):
+    meta = {name: value for name, value in read_meta(game_record).items() if name != key}
+    with pytest.raises(TraceError, match=f"meta lacks {key}"):
+        validate({**game_record, "meta": np.array(json.dumps(meta))})
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"meta": np.array("{")}, "meta is not JSON"),
+        ({"meta": np.array("[]")}, "meta lacks"),
+        ({"breaches": np.array([[999.0, 0, 1, 1.0]])}, "step beyond 60"),
+        ({"breaches": np.array([[5.0, 0, 9, 1.0]])}, "boat beyond 3"),
+        ({"breaches": np.array([[-1.0, 0, 1, 1.0]])}, "breaches name a step"),
+    ],
+)
+def test_values_that_fit_nothing_are_refused(game_record, changes, words):
+    with pytest.raises(TraceError, match=words):
+        validate({**game_record, **changes})
+
+
+def test_teams_must_name_every_boat(game_record):
+    with pytest.raises(TraceError, match="one entry for each of the 4 boats"):
+        validate(with_meta(game_record, team=[0, 1]))
+
+
+def test_unknown_arrays_are_refused(game_record, game_meta):
+    with pytest.raises(TraceError, match="no array speeds; it has position"):
+        make_record(game_meta, speeds=np.zeros(3), **arrays_of(game_record))
+
+
+def test_a_folder_that_cannot_be_written_to(game_record, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(TraceError, match="Choose a folder you may write to"):
+        save(game_record, tmp_path / "file" / "game.npz")
+
+
+def test_a_recorded_game_is_what_the_env_showed():
+    env = MctfEnv(GameConfig.preset("aamas2024", max_time_s=2.0))
+    env.reset(seed=5)
+    recorder = GameRecorder()
+    recorder.start(env.view(), meta_of(env.config, seed=5))
+    views = [env.view()]
+    while env.agents:
+        commands = np.tile([1.5, 20.0], (6, 1))
+        absolute = absolute_commands(commands, env.view().heading_deg)
+        env.step({name: tuple(commands[k]) for k, name in enumerate(env.agents)})
+        views.append(env.view())
+        recorder.step(env.view(), absolute, absolute)
+    record = recorder.finish()
+    assert record["position"].shape == (21, 6, 2)
+    np.testing.assert_array_equal(record["position"], [view.position for view in views])
+    np.testing.assert_array_equal(record["heading_deg"], [view.heading_deg for view in views])
+    np.testing.assert_array_equal(record["captures"], [view.captures for view in views])
+    assert (record["reason"] == NOT_COVERED).all()
+    assert not record["intervened"].any()
+    assert np.isnan(record["certificate_m"]).all()
+    assert record["breaches"].shape == (0, 4)
+
+
+def view_of(record, step):
+    state = np.zeros((4, 11))
+    state[:, :2] = record["position"][step]
+    state[:, 2], state[:, 3] = record["heading_deg"][step], record["speed_mps"][step]
+    marks = {name: record[name][step] for name in ("has_flag", "is_tagged", "oob", "flag_position", "captures")}
+    return SimpleNamespace(state=state, time_s=0.1 * step, **marks)
+
+
+def test_recording_step_by_step_gives_the_same_record(game_record, game_meta):
+    recorder = GameRecorder()
+    recorder.start(view_of(game_record, 0), game_meta)
+    for step in range(60):
+        commands = [game_record[name][step] for name in ("wanted", "sent", "reason", "intervened", "certificate_m")]
+        recorder.step(view_of(game_record, step + 1), *commands)
+    again = recorder.finish(game_record["breaches"])
+    for name in ARRAYS:
+        np.testing.assert_array_equal(again[name], game_record[name])
+
+
+def test_a_step_that_does_not_fit_leaves_the_recording_whole(game_record, game_meta):
+    recorder = GameRecorder()
+    recorder.start(view_of(game_record, 0), game_meta)
+    with pytest.raises(TraceError, match=r"sent has shape \(3, 2\), expected \(4, 2\)"):
+        recorder.step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((3, 2)))
+    recorder.step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((4, 2)))
+    assert recorder.finish()["wanted"].shape == (1, 4, 2)
+
+
+def test_a_game_without_a_step_is_a_record(game_record, game_meta, tmp_path):
+    recorder = GameRecorder()
+    recorder.start(view_of(game_record, 0), game_meta)
+    record = load(save(recorder.finish(), tmp_path / "game.npz"))
+    assert record["wanted"].shape == (0, 4, 2)
+
+
+def test_recording_needs_a_start(game_record):
+    with pytest.raises(TraceError, match=r"Call start\(\) before step"):
+        GameRecorder().step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((4, 2)))
+    with pytest.raises(TraceError, match=r"Call start\(\) before finish"):
+        GameRecorder().finish()
+    with pytest.raises(TraceError, match="meta lacks dt_s"):
+        GameRecorder().start(view_of(game_record, 0), {})
+
+
+@given(st.floats(-360, 360), st.floats(-180, 180))
+def test_absolute_headings_are_wrapped_and_agree_with_the_relative_ones(relative_deg, heading_deg):
+    absolute = absolute_commands(np.array([[1.5, relative_deg]]), np.array([heading_deg]))
+    assert absolute[0, 0] == 1.5
+    assert -180.0 <= absolute[0, 1] <= 180.0
+    difference = (absolute[0, 1] - heading_deg - relative_deg) % 360.0
+    assert min(difference, 360.0 - difference) < 1e-9
+
+
+def gaps(*gaps_m):
+    position = np.zeros((len(gaps_m), 2, 2))
+    position[:, 1, 0] = gaps_m
+    return position
+
+
+@pytest.mark.parametrize(
+    ("gaps_m", "rows"),
+    [
+        ((5, 2, 1.5, 2, 5, 2.25), [[1, 0, 1, 1.5], [5, 0, 1, 2.25]]),
+        ((5, 2.5, 5), [[1, 0, 1, 2.5]]),  # exactly on the radius is inside
+        ((2, 5, 5), []),  # the start itself is not counted
+        ((2, 2.1, 5), [[1, 0, 1, 2.1]]),  # but a pair that starts inside counts at the first step
+        ((5,), []),
+    ],
+)
+def test_breaches_are_entries_into_the_radius(gaps_m, rows):
+    np.testing.assert_allclose(find_breaches(gaps(*gaps_m), 2.5), np.array(rows).reshape(-1, 4))
+
+
+def test_breaches_of_several_pairs_come_in_order_of_time():
+    position = np.zeros((4, 3, 2))
+    position[:, 1, 0] = [9, 9, 9, 1]
+    position[:, 2, 0] = [20, 20, 9.5, 20]
+    np.testing.assert_allclose(find_breaches(position, 2.0), [[2, 1, 2, 0.5], [3, 0, 1, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("position", "separation_m", "words"),
+    [
+        (np.zeros((3, 2)), 2.5, "positions have shape"),
+        (gaps(1), 0.0, "must be positive"),
+        (gaps(1), np.nan, "positive"),
+    ],
+)
+def test_breaches_of_nonsense(position, separation_m, words):
+    with pytest.raises(TraceError, match=words):
+        find_breaches(position, separation_m)
+
+
+def test_a_record_has_all_of_a_config(game_meta):
+    assert game_meta["flag_home"] == [(10.0, 20.0), (70.0, 20.0)]
+    assert game_meta["agent_radius_m"] == 1.25
+    assert game_meta["platforms"] == ["heron"] * 4
+    uneven = meta_of(GameConfig.preset("aamas2024", team_size=1, agent_radius_m=(1.0, 2.0)))
+    assert uneven["agent_radius_m"] == (1.0, 2.0)
+    with pytest.raises(TraceError, match="unknown separation; a record takes separation_m"):
+        meta_of(GameConfig.preset("aamas2024"), separation=2.5)
