@@ -1,1 +1,21 @@
-"""The safety shield."""
+"""The safety shield: wanted heading and speed in, safe heading and speed out."""
+
+from .commands import Commands
+from .config import ShieldConfig
+from .decision import Decision, Decisions, Reason
+from .exceptions import SteerclearError
+from .fleet import Fleet
+from .shield import Shield
+from .surroundings import Surroundings
+
+__all__ = [
+    "Commands",
+    "Decision",
+    "Decisions",
+    "Fleet",
+    "Reason",
+    "Shield",
+    "ShieldConfig",
+    "SteerclearError",
+    "Surroundings",
+]

@@ -222,14 +222,17 @@ def worst_merit(ours: BoolArray, work: Work) -> float:
 
 
 @kernel
+def unchanged(i: int, plan: Plan) -> bool:
+    """Whether boat i's command is the wanted one, bit for bit."""
+    return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
+
+
+@kernel
 def mark_answer(count: int, reason: int, plan: Plan) -> None:
     """Give the reason to the movers whose command changed."""
     for m in range(count):
         i = plan.movers[m]
-        same = (
-            plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
-        )
-        if not same:
+        if not unchanged(i, plan):
             plan.reason[i] = reason
 
 
@@ -251,7 +254,7 @@ def ladder(
     Escapes are searched from the present state, the one under way first. When even the best leaves somebody short
     (reason BEST_EFFORT) it is still carried out: avoidance does not switch itself off. A program's answer that
     leaves a better worst margin than any escape is kept (reason QP_RELAXED). When only fixed things are at stake and
-    no escape does better by them than the wanted command, that one passes: they are softer than boats.
+    no escape does better by them than the program's answer or the wanted command, that one is sent.
     """
     before = worst_merit(ours, work)
     for m in range(count):
@@ -260,7 +263,7 @@ def ladder(
         plan.commands, 0, True, plan.moving, state, margin_m, ours, boats, fixed, plans, tuning, memory, work
     )
     after = worst_merit(ours, work)
-    if not good and before < FIXED_LOST and before > after:
+    if not good and before >= after:
         check(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
         mark_answer(count, QP_RELAXED, plan)
         return
@@ -272,13 +275,7 @@ def ladder(
 
 
 @kernel
-def only_fixed(ours: BoolArray, work: Work) -> bool:
-    """Whether all boats keep clear of boats, so that only fixed things are at stake."""
-    return worst_merit(ours, work) >= FIXED_LOST
-
-
-@kernel
-def commit(done: int, state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan) -> None:
+def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan) -> None:
     """Keep every boat's manoeuvre for the next decision, as an absolute heading."""
     for i in range(ours.shape[0]):
         if not ours[i]:
@@ -293,6 +290,20 @@ def commit(done: int, state: Array, ours: BoolArray, memory: Memory, work: Work,
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
         memory.escaping[i] = ladder_move
+
+
+@kernel
+def finish(
+    safe: bool, count: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array,
+    tuning: Tuning, memory: Memory, work: Work, plan: Plan,
+) -> None:
+    """Name the reasons of a checked answer, or go down the ladder without one; then remember the escapes."""
+    if safe:
+        mark_answer(count, QP, plan)
+    else:
+        count = pick_movers(ours, work, plan)
+        ladder(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+    commit(state, ours, memory, work, plan)
 
 
 @kernel
@@ -325,9 +336,4 @@ def decide_compiled(
         if not take_answer(plan.z, count, state, boats, tuning, plan):
             break
         safe = check(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
-    if safe:
-        mark_answer(count, QP, plan)
-    else:
-        count = pick_movers(ours, work, plan)
-        ladder(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
-    commit(1, state, ours, memory, work, plan)
+    finish(safe, count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)

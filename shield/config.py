@@ -1,0 +1,111 @@
+"""`ShieldConfig`: every setting of the shield, with its unit, validated when built."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import Any
+
+from .exceptions import ConfigError
+
+COORDINATION = ("team", "per_boat")
+
+
+@dataclass(frozen=True)
+class ShieldConfig:
+    """Settings of the shield.
+
+    Attributes:
+        separation_m: distance to keep between boat centres, m.
+        buffer_m: added to the separation for rounding and sampling, m.
+        dt_s: step of the decision loop and of the boat model, s.
+        certificate: name of the certificate, see `certificates.CERTIFICATES`.
+        coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
+            that team-mates hold course and take their share of the answer (for boats that cannot talk).
+        solver: QP backend, a name known to qpsolvers.
+        opponent_share: share of its turn rate and acceleration an opponent is granted against us, 0 to 1; 0 takes
+            opponents to hold course and speed.
+        response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
+        margin_cap_m: margins above this shrink freely, m.
+        tail_s: how long courses are run on straight beyond the horizon, s.
+        horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
+        hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
+        speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
+        position_error_m: bound on the error of every reported position, m; widens the separation twice.
+        track_error_mps: growth of a neighbour's position error with the age of its track, m/s.
+        max_track_age_s: tracks older than this are refused, s.
+        delay_s: time from decision to effect, s: boats are run on by it before deciding.
+        edge_m: distance to keep from the field edge, m; None: the edge is not kept.
+        hull_m: distance to keep from walls of obstacles, m.
+
+    Raises:
+        ConfigError: a value is of the wrong type, not finite or out of range.
+    """
+
+    separation_m: float = 2.5
+    buffer_m: float = 0.05
+    dt_s: float = 0.1
+    certificate: str = "turning_circle"
+    coordination: str = "team"
+    solver: str = "daqp"
+    opponent_share: float = 0.5
+    response_per_s: float = math.inf
+    margin_cap_m: float = 1.0
+    tail_s: float = 5.0
+    horizon_s: float | None = None
+    hysteresis_m: float = 0.3
+    speed_weight: float = 0.1
+    position_error_m: float = 0.0
+    track_error_mps: float = 0.5
+    max_track_age_s: float = 2.0
+    delay_s: float = 0.0
+    edge_m: float | None = 0.2
+    hull_m: float = 1.0
+
+    def __post_init__(self) -> None:
+        from .certificates import CERTIFICATES
+        from .program import check_solver
+
+        for entry in fields(self):
+            _check_number(entry.name, getattr(self, entry.name))
+        if not 0.0 <= self.opponent_share <= 1.0:
+            raise ConfigError(f"opponent_share is {self.opponent_share}; give a share between 0 and 1")
+        if self.certificate not in CERTIFICATES:
+            raise ConfigError(f"unknown certificate {self.certificate!r}; choose one of {', '.join(CERTIFICATES)}")
+        if self.coordination not in COORDINATION:
+            raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
+        check_solver(self.solver)
+
+    @classmethod
+    def of(cls, **settings: Any) -> ShieldConfig:
+        """Build from keyword settings; an unknown key is an error that names the nearest known one.
+
+        Raises:
+            ConfigError: unknown key, or a bad value.
+        """
+        known = [entry.name for entry in fields(cls)]
+        for key in settings:
+            if key not in known:
+                near = get_close_matches(key, known, 1)
+                hint = f"; did you mean {near[0]!r}?" if near else f"; known settings: {', '.join(known)}"
+                raise ConfigError(f"unknown shield setting {key!r}{hint}")
+        return cls(**settings)
+
+
+_POSITIVE = {"separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s"}
+_MAY_BE_NONE = {"horizon_s", "edge_m"}
+_MAY_BE_INFINITE = {"response_per_s", "max_track_age_s"}
+
+
+def _check_number(name: str, value: object) -> None:
+    """Numbers are finite (where not said otherwise) and >= 0, or > 0 where zero makes no sense."""
+    if isinstance(value, str) or (value is None and name in _MAY_BE_NONE):
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+        raise ConfigError(f"{name} is {value!r}; give a number")
+    if math.isinf(value) and name not in _MAY_BE_INFINITE:
+        raise ConfigError(f"{name} is {value}; give a finite number")
+    if value < 0 or (value == 0 and name in _POSITIVE):
+        bound = "> 0" if name in _POSITIVE else ">= 0"
+        raise ConfigError(f"{name} is {value}; it must be {bound}")

@@ -1,0 +1,143 @@
+"""What the shield answers: one frozen `Decision` per boat, kept as arrays until somebody looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import overload
+
+import numpy as np
+
+from . import flow
+from .commands import Commands
+from .fleet import Fleet
+from .jit import Array, BoolArray, IntArray
+
+
+class Reason(IntEnum):
+    """Why a command is what it is."""
+
+    PASSED = flow.PASSED
+    """The wanted command leaves every boat its escape; it is sent bit for bit."""
+    QP = flow.QP
+    """The least change, found by the quadratic program, re-checked with the full boat model."""
+    QP_RELAXED = flow.QP_RELAXED
+    """Not all rows could hold; the program's answer with reported slack, better than any escape."""
+    ESCAPE = flow.ESCAPE
+    """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats."""
+    BEST_EFFORT = flow.BEST_EFFORT
+    """No manoeuvre keeps the margin; the one that keeps most of it."""
+    HELD = flow.HELD
+    """The wanted command was not finite; the boat is told to stop on its course."""
+    NOT_COVERED = flow.NOT_COVERED
+    """The shield does not decide for this boat."""
+
+
+FALLBACKS = {Reason.ESCAPE: "escape manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One boat's decision.
+
+    Attributes:
+        boat: name of the boat.
+        wanted_heading_rad, wanted_speed_mps: wanted command, heading absolute, clockwise from north.
+        sent_heading_rad, sent_speed_mps: command to send.
+        intervened: whether the two differ in any bit.
+        reason: why.
+        binding: names of the boats (or "field") that bind.
+        certificate_m: verified margin beyond the separation, m; inf when nobody is near.
+        slack_m: margin given up, m.
+        fallback: name of the fallback used, or None.
+        solve_time_s: time of the whole decision, s.
+    """
+
+    boat: str
+    wanted_heading_rad: float
+    wanted_speed_mps: float
+    sent_heading_rad: float
+    sent_speed_mps: float
+    intervened: bool
+    reason: Reason
+    binding: tuple[str, ...]
+    certificate_m: float
+    slack_m: float
+    fallback: str | None
+    solve_time_s: float
+
+
+@dataclass(frozen=True)
+class Decisions(Sequence[Decision]):
+    """Decisions for all boats of a fleet, in its order; indexing builds the `Decision` of one boat.
+
+    Attributes:
+        fleet: the fleet decided on.
+        wanted, sent: commands, in the same frame.
+        intervened: (n,) bool.
+        reason: (n,) values of `Reason`.
+        certificate_m: (n,) margins, m.
+        slack_m: (n,) m.
+        bound: (n,) index of the binding neighbour, -1 none, -2 fixed things.
+        solve_time_s: time of the whole decision, s.
+    """
+
+    fleet: Fleet
+    wanted: Commands
+    sent: Commands
+    intervened: BoolArray
+    reason: IntArray
+    certificate_m: Array
+    slack_m: Array
+    bound: IntArray
+    solve_time_s: float
+
+    def __len__(self) -> int:
+        return len(self.reason)
+
+    @overload
+    def __getitem__(self, index: int) -> Decision: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Decision]: ...
+    def __getitem__(self, index: int | slice) -> Decision | Sequence[Decision]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"no boat {index} in a fleet of {len(self)}")
+        return self._decision(index % len(self))
+
+    def __iter__(self) -> Iterator[Decision]:
+        return (self[i] for i in range(len(self)))
+
+    def _decision(self, i: int) -> Decision:
+        heading = self.fleet.heading_rad[i]
+        wanted_speed, wanted_heading = self.wanted.absolute(i, heading)
+        sent_speed, sent_heading = self.sent.absolute(i, heading)
+        reason = Reason(int(self.reason[i]))
+        margin = float(self.certificate_m[i])
+        return Decision(
+            boat=self.fleet.names[i],
+            wanted_heading_rad=wanted_heading,
+            wanted_speed_mps=wanted_speed,
+            sent_heading_rad=sent_heading,
+            sent_speed_mps=sent_speed,
+            intervened=bool(self.intervened[i]),
+            reason=reason,
+            binding=self._binding(int(self.bound[i])),
+            certificate_m=margin if margin < 1e5 else math.inf,
+            slack_m=float(self.slack_m[i]),
+            fallback=FALLBACKS.get(reason),
+            solve_time_s=self.solve_time_s,
+        )
+
+    def _binding(self, bound: int) -> tuple[str, ...]:
+        if bound == -2:
+            return ("field",)
+        return (self.fleet.names[bound],) if bound >= 0 else ()
+
+    @property
+    def count_intervened(self) -> int:
+        """Number of boats whose command was changed."""
+        return int(np.count_nonzero(self.intervened))

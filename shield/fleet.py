@@ -1,0 +1,150 @@
+"""`Fleet`: all boats seen at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .exceptions import FleetError
+from .jit import Array, BoolArray, IntArray
+from .platforms import Platform
+from .platforms import layout as L
+
+_SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """State of n boats, own and others.
+
+    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly.
+
+    Attributes:
+        state: (n, N_STATE) rows as in `platforms.layout`; autopilot memory may be NaN where it is not known.
+        team: (n,) team of each boat.
+        platforms: names (or `Platform` objects) of the n boats.
+        controlled: (n,) boats the shield decides for.
+        names: names for messages and reports.
+        age_s: (n,) age of each track, s; None: all fresh.
+        position_error_m: (n,) bound on each position's error, m; None: as in the settings.
+    """
+
+    state: Array
+    team: IntArray
+    platforms: tuple[str | Platform, ...]
+    controlled: BoolArray
+    names: tuple[str, ...]
+    age_s: Array | None = None
+    position_error_m: Array | None = field(default=None)
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        position_m: ArrayLike,
+        heading_rad: ArrayLike,
+        speed_mps: ArrayLike,
+        team: ArrayLike,
+        platforms: str | Platform | Sequence[str | Platform],
+        controlled: ArrayLike | None = None,
+        names: Sequence[str] | None = None,
+        thrust: ArrayLike | None = None,
+        heading_error_rad: ArrayLike | None = None,
+        age_s: ArrayLike | None = None,
+        position_error_m: ArrayLike | None = None,
+    ) -> Fleet:
+        """Fleet from plain arrays.
+
+        Args:
+            position_m: (n, 2) east and north, m.
+            heading_rad: (n,) clockwise from north, rad.
+            speed_mps: (n,) m/s.
+            team: (n,) integers.
+            platforms: one platform for all, or n of them.
+            controlled: (n,) bool; None: the boats of team 0.
+            names: n names; None: boat_0, boat_1, ...
+            thrust: (n,) thrust in percent where known, else NaN (taken from the speed).
+            heading_error_rad: (n,) last error the heading controller saw where known, else NaN.
+            age_s: (n,) age of each track, s.
+            position_error_m: (n,) bound on the position error, m.
+
+        Raises:
+            FleetError: shapes do not fit together.
+        """
+        position = _shaped("position_m", position_m, (None, 2))
+        n = len(position)
+        state = np.zeros((n, L.N_STATE))
+        state[:, L.X : L.Y + 1] = position
+        state[:, L.HEADING] = np.degrees(_shaped("heading_rad", heading_rad, (n,)))
+        state[:, L.SPEED] = _shaped("speed_mps", speed_mps, (n,))
+        state[:, L.THRUST] = np.nan if thrust is None else _shaped("thrust", thrust, (n,))
+        state[:, L.SPEED_ERROR] = np.nan
+        state[:, L.HEADING_ERROR] = np.nan
+        if heading_error_rad is not None:
+            state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
+        state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+        teams = _shaped("team", team, (n,)).astype(np.int64)
+        kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
+        fleet = cls(
+            state=state,
+            team=teams,
+            platforms=kinds,
+            controlled=teams == 0 if controlled is None else _shaped("controlled", controlled, (n,)).astype(np.bool_),
+            names=tuple(f"boat_{i}" for i in range(n)) if names is None else tuple(names),
+            age_s=None if age_s is None else _shaped("age_s", age_s, (n,)),
+            position_error_m=None if position_error_m is None else _shaped("position_error_m", position_error_m, (n,)),
+        )
+        fleet.check()
+        return fleet
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    def check(self) -> None:
+        """Check shapes and values.
+
+        Raises:
+            FleetError: shapes do not fit together, or a position, heading or speed is not finite.
+        """
+        n = len(self.state)
+        if self.state.ndim != 2 or self.state.shape[1] != L.N_STATE:
+            raise FleetError(f"state has shape {self.state.shape}; give (n, {L.N_STATE}), see platforms.layout")
+        for name in ("team", "platforms", "controlled", "names"):
+            if len(getattr(self, name)) != n:
+                raise FleetError(f"{name} has {len(getattr(self, name))} entries for {n} boats; give one per boat")
+        bad = np.argwhere(~np.isfinite(self.state[:, _SEEN]))
+        if len(bad):
+            i, column = bad[0]
+            what = ("position", "position", "heading", "speed")[column]
+            raise FleetError(f"{what} of boat {self.names[i]!r} is not finite; leave boats without a track out")
+
+    @property
+    def position_m(self) -> Array:
+        """Positions east and north, m, (n, 2)."""
+        return self.state[:, L.X : L.Y + 1]
+
+    @property
+    def heading_rad(self) -> Array:
+        """Headings clockwise from north, rad, (n,)."""
+        return np.radians(self.state[:, L.HEADING])
+
+    @property
+    def speed_mps(self) -> Array:
+        """Speeds, m/s, (n,)."""
+        return self.state[:, L.SPEED]
+
+
+def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """Value as a float array of that shape (None matches any length)."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise FleetError(f"{name} is not an array of numbers ({error})") from None
+    fits = array.ndim == len(shape) and all(w is None or w == g for w, g in zip(shape, array.shape, strict=True))
+    if not fits:
+        wanted = tuple("n" if entry is None else entry for entry in shape)
+        raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
+    return array

@@ -1,0 +1,220 @@
+"""`Shield`: the fleet and the wanted commands in, safe commands out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import flow
+from .commands import Commands
+from .config import ShieldConfig
+from .decision import Decisions
+from .exceptions import FleetError
+from .fleet import Fleet
+from .flow import Plan
+from .jit import Array, BoolArray
+from .platforms import layout as L
+from .program import Program, solve
+from .scene import Boats, Fixed, Memory, Work, new_memory, new_work
+from .setup import boats_of, plans_of, tuning_of
+from .surroundings import OPEN_WATER, Surroundings
+from .tracks import prepare
+
+MOST_ROWS = 3000
+"""Programs with more rows than this go to the ladder instead."""
+
+
+@dataclass
+class _Seat:
+    """Working memory of one decider: the team, or one boat of it."""
+
+    memory: Memory
+    work: Work
+    plan: Plan
+
+
+class Shield:
+    """Filters commanded heading and speed so that boats keep their distance.
+
+    Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it, and otherwise
+    the least change that keeps one,
+
+        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
+
+    with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
+    of each boat; the same sequence of inputs from `reset` on gives the same bits.
+
+    Args:
+        config: settings; None takes the defaults.
+        surroundings: field edge, obstacles and keep-out circles.
+        **settings: single settings by name, instead of ``config``.
+
+    Raises:
+        ConfigError: a setting is unknown or out of range.
+    """
+
+    def __init__(
+        self, config: ShieldConfig | None = None, surroundings: Surroundings = OPEN_WATER, **settings: Any
+    ) -> None:
+        if config is not None and settings:
+            raise FleetError("give either a ShieldConfig or single settings, not both")
+        self.config = config if config is not None else ShieldConfig.of(**settings)
+        self.surroundings = surroundings
+        self._tuning = tuning_of(self.config)
+        self._plans = plans_of(self.config)
+        self._packed: dict[Surroundings, Fixed] = {}
+        self._seats: list[_Seat] = []
+        self._boats: Boats | None = None
+        self._key: tuple[Any, ...] | None = None
+        self._sent: Array | None = None
+
+    def reset(self) -> None:
+        """Forget all escapes, as before a new game."""
+        self._key = None
+        self._sent = None
+
+    def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
+        """Decide for all controlled boats of a fleet.
+
+        Args:
+            fleet: all boats seen now.
+            wanted: command of each boat, n rows; rows of boats not controlled are passed through.
+            surroundings: fixed things now, when they differ from the ones given at construction.
+
+        Returns:
+            One decision per boat, in the fleet's order.
+
+        Raises:
+            FleetError: shapes do not fit, a state is not finite or a track too old.
+        """
+        started = time.perf_counter()
+        if len(wanted) != len(fleet):
+            raise FleetError(f"{len(wanted)} commands for {len(fleet)} boats; give one row per boat")
+        boats = self._scene(fleet)
+        state, margin = prepare(fleet, self.config, boats.params, self._sent)
+        asked = wanted.as_relative_deg(state[:, L.HEADING])
+        fixed = self._fixed(self.surroundings if surroundings is None else surroundings)
+        if self.config.coordination == "team":
+            seat = self._seats[0]
+            self._run(seat, state, asked, margin, fleet.controlled, boats, fixed)
+            answer = _Answer(seat.plan, seat.work, len(fleet))
+        else:
+            answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
+        return self._report(fleet, wanted, state, answer, started)
+
+    def _scene(self, fleet: Fleet) -> Boats:
+        """Boat constants; fresh working memory when the fleet is not the one of the last call."""
+        key = (fleet.platforms, fleet.names, fleet.team.tobytes())
+        if key != self._key or self._boats is None:
+            fleet.check()
+            self._boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
+            n = len(fleet)
+            seats = 1 if self.config.coordination == "team" else n
+            rows = min(n * (n + 5) + 2, MOST_ROWS)
+            samples = int(self._boats.samples.max())
+            self._seats = [
+                _Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)
+            ]
+            self._key, self._sent = key, None
+        return self._boats
+
+    def _fixed(self, surroundings: Surroundings) -> Fixed:
+        if surroundings not in self._packed:
+            if len(self._packed) > 64:
+                self._packed.clear()
+            self._packed[surroundings] = surroundings.pack(self.config)
+        return self._packed[surroundings]
+
+    def _run(
+        self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, fixed: Fixed
+    ) -> None:
+        """The stages of `flow` with the QP backend in between."""
+        memory, work, plan = seat.memory, seat.work, seat.plan
+        scene = (state, margin, ours, boats, fixed)
+        rest = (self._plans, self._tuning, memory, work, plan)
+        safe = flow.screen(state, wanted, margin, ours, boats, fixed, *rest)
+        count = 0
+        for _ in range(flow.ROUNDS):
+            if safe:
+                break
+            count = flow.pick_movers(ours, work, plan)
+            rows = flow.build(count, *scene, self._tuning, work, plan)
+            z = self._solve(count, rows, plan) if rows >= 0 else None
+            if z is None or not flow.take_answer(z, count, state, boats, self._tuning, plan):
+                break
+            safe = flow.check(count, *scene, *rest)
+        flow.finish(safe, count, *scene, *rest)
+
+    def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
+        """Answer of the program, relaxed with slack when it has none."""
+        n = 2 * count
+        z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
+        if z is not None:
+            return z
+        flow.add_slack(count, rows, plan)
+        n += 2
+        return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
+
+    def _each(
+        self, state: Array, wanted: Array, margin: Array, controlled: BoolArray, boats: Boats, fixed: Fixed
+    ) -> _Answer:
+        """One program per boat: it knows its own wanted command and takes team-mates to hold theirs."""
+        answer = _Answer.empty(len(state))
+        straight = np.zeros_like(wanted)
+        straight[:, 0] = state[:, L.SPEED]
+        for i in np.flatnonzero(controlled):
+            asked = straight.copy()
+            asked[i] = wanted[i]
+            seat = self._seats[i]
+            self._run(seat, state, asked, margin, controlled, boats, fixed)
+            answer.take(i, seat.plan, seat.work)
+        return answer
+
+    def _report(
+        self, fleet: Fleet, wanted: Commands, state: Array, answer: _Answer, started: float
+    ) -> Decisions:
+        changed = answer.reason != flow.NOT_COVERED
+        changed &= answer.reason != flow.PASSED
+        sent = wanted.replaced(changed, answer.commands, state[:, L.HEADING]) if changed.any() else wanted
+        if self.config.delay_s > 0:
+            relative = sent.as_relative_deg(state[:, L.HEADING])
+            self._sent = np.stack([relative[:, 0], state[:, L.HEADING] + relative[:, 1]], axis=1)
+        return Decisions(
+            fleet=fleet,
+            wanted=wanted,
+            sent=sent,
+            intervened=changed,
+            reason=answer.reason,
+            certificate_m=answer.margin,
+            slack_m=answer.slack,
+            bound=answer.bound,
+            solve_time_s=time.perf_counter() - started,
+        )
+
+
+class _Answer:
+    """Arrays of an answer, copied out of working memory."""
+
+    def __init__(self, plan: Plan, work: Work, n: int) -> None:
+        self.commands = plan.commands.copy()
+        self.reason = plan.reason.copy()
+        self.slack = plan.slack_m.copy()
+        self.margin = work.clear[:n, 0].copy()
+        self.bound = work.bound[:n].copy()
+
+    @classmethod
+    def empty(cls, n: int) -> _Answer:
+        """An answer that covers nobody."""
+        answer = cls.__new__(cls)
+        answer.commands, answer.slack = np.zeros((n, 2)), np.zeros(n)
+        answer.reason, answer.bound = np.full(n, flow.NOT_COVERED), np.full(n, -1)
+        answer.margin = np.full(n, np.inf)
+        return answer
+
+    def take(self, i: int, plan: Plan, work: Work) -> None:
+        """Take boat i's row of another decider's answer."""
+        self.commands[i], self.reason[i], self.slack[i] = plan.commands[i], plan.reason[i], plan.slack_m[i]
+        self.margin[i], self.bound[i] = work.clear[i, 0], work.bound[i]

@@ -1,0 +1,68 @@
+"""`Surroundings`: field edge, obstacles and keep-out circles the boats stay clear of, softer than boats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .config import ShieldConfig
+from .exceptions import ConfigError
+from .scene import Fixed
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Fixed things, in m, east and north.
+
+    Attributes:
+        field: (xmin, ymin, xmax, ymax) to stay inside, or None.
+        circles: (x, y, radius) of round obstacles.
+        polygons: corner lists of polygonal obstacles.
+        keep_out: (x, y, radius) the boat's centre stays out of, such as the own flag's circle.
+
+    Raises:
+        ConfigError: a value is not finite, a radius negative, a polygon has fewer than three corners, or the field
+            is empty.
+    """
+
+    field: tuple[float, float, float, float] | None = None
+    circles: Sequence[tuple[float, float, float]] = ()
+    polygons: Sequence[Sequence[Point]] = ()
+    keep_out: Sequence[tuple[float, float, float]] = ()
+
+    def __post_init__(self) -> None:
+        for name, values in (("field", [self.field or ()]), ("circles", self.circles), ("keep_out", self.keep_out)):
+            for row in values:
+                if not all(math.isfinite(value) for value in row):
+                    raise ConfigError(f"{name} holds a value that is not finite: {row}")
+        if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out)):
+            raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
+        if any(len(polygon) < 3 for polygon in self.polygons):
+            raise ConfigError("a polygon has fewer than three corners")
+        if self.field is not None and not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
+            raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
+
+    def pack(self, config: ShieldConfig) -> Fixed:
+        """Arrays for compiled code, widened by the distances of the settings."""
+        edge = np.array([-np.inf, -np.inf, np.inf, np.inf])
+        if self.field is not None and config.edge_m is not None:
+            edge = np.array(self.field) + config.edge_m * np.array([1.0, 1.0, -1.0, -1.0])
+        circles = [(x, y, r + config.hull_m) for x, y, r in self.circles] + list(self.keep_out)
+        segments = [
+            (*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))
+        ]
+        return Fixed(
+            field=edge.astype(np.float64),
+            circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
+            segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
+            segment_m=config.hull_m,
+        )
+
+
+OPEN_WATER = Surroundings()
+"""No edge, no obstacle."""

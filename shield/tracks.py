@@ -1,0 +1,109 @@
+"""Tracks made ready for a decision: memory filled in, age and delay run on, error margins."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .config import ShieldConfig
+from .exceptions import FleetError
+from .fleet import Fleet
+from .jit import Array, kernel
+from .platforms import layout as L
+from .platforms.step import step_boat
+
+
+@kernel
+def fill_memory(state: Array, params: Array) -> None:
+    """Replace unknown (NaN) thrust by the one that holds the speed, unknown rudder and integrals by 0; in place."""
+    for i in range(state.shape[0]):
+        if math.isnan(state[i, L.THRUST]):
+            state[i, L.THRUST] = thrust_at(params[i], state[i, L.SPEED])
+        for column in (L.RUDDER, L.SPEED_INTEGRAL, L.HEADING_INTEGRAL, L.TURN_RATE):
+            if math.isnan(state[i, column]):
+                state[i, column] = 0.0
+
+
+@kernel
+def thrust_at(params: Array, speed_mps: float) -> float:
+    """Thrust, percent, that holds a straight-line speed, m/s; the thrust map's end beyond it."""
+    size = int(params[L.MAP_SIZE])
+    for k in range(1, size):
+        low, high = params[L.MAP_SPEED + k - 1], params[L.MAP_SPEED + k]
+        if speed_mps <= high and high > low:
+            part = max(0.0, (speed_mps - low) / (high - low))
+            start = params[L.MAP_THRUST + k - 1]
+            return start + part * (params[L.MAP_THRUST + k] - start)
+    return min(params[L.MAP_THRUST + size - 1], params[L.MAX_THRUST])
+
+
+@kernel
+def run_on(state: Array, seconds: Array) -> None:
+    """Move boats straight on for their number of seconds, in place."""
+    for i in range(state.shape[0]):
+        heading = math.radians(state[i, L.HEADING])
+        state[i, L.X] += state[i, L.SPEED] * seconds[i] * math.sin(heading)
+        state[i, L.Y] += state[i, L.SPEED] * seconds[i] * math.cos(heading)
+
+
+@kernel
+def run_on_commands(state: Array, who: Array, params: Array, target: Array, steps: int, dt_s: float) -> None:
+    """Step boats of ``who`` under the last command sent: ``target`` is (speed m/s, absolute heading deg)."""
+    for _ in range(steps):
+        for i in range(state.shape[0]):
+            if who[i]:
+                error = (target[i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
+                step_boat(params[i], state[i], target[i, 0], error, dt_s)
+
+
+def prepare(fleet: Fleet, config: ShieldConfig, params: Array, last_sent: Array | None) -> tuple[Array, Array]:
+    """State at the moment the command takes effect, and each boat's error margin.
+
+    Tracks are run on straight by their age and by the delay; own boats are run through the delay by the model under
+    the last command sent. The error margin of a boat is its bound plus ``track_error_mps`` times age plus delay.
+
+    Args:
+        fleet: what was seen.
+        config: settings.
+        params: (n, N_PARAM) platform rows.
+        last_sent: (n, 2) last commands sent, speed m/s and absolute heading deg, or None.
+
+    Returns:
+        State (n, N_STATE), a copy, and margins (n,), m.
+
+    Raises:
+        FleetError: a value is not finite, or a track is older than ``max_track_age_s``.
+    """
+    state = fleet.state.copy()
+    if not np.isfinite(state[:, : L.SPEED + 1]).all():
+        fleet.check()
+    fill_memory(state, params)
+    n = len(state)
+    margin = np.full(n, config.position_error_m)
+    if fleet.position_error_m is not None:
+        margin = np.maximum(margin, fleet.position_error_m)
+    if fleet.age_s is not None:
+        _check_age(fleet, config)
+        run_on(state, fleet.age_s)
+        margin = margin + config.track_error_mps * fleet.age_s
+    steps = round(config.delay_s / config.dt_s)
+    if steps > 0:
+        own = fleet.controlled if last_sent is not None else np.zeros(n, np.bool_)
+        run_on(state, np.where(own, 0.0, config.delay_s))
+        if last_sent is not None:
+            run_on_commands(state, own, params, last_sent, steps, config.dt_s)
+        margin = margin + np.where(fleet.controlled, 0.0, config.track_error_mps * config.delay_s)
+    return state, margin
+
+
+def _check_age(fleet: Fleet, config: ShieldConfig) -> None:
+    age = fleet.age_s
+    if age is None or not (np.isfinite(age).all() and (age >= 0).all()):
+        raise FleetError("age_s holds a value that is negative or not finite; give seconds since each track's fix")
+    worst = int(np.argmax(age))
+    if age[worst] > config.max_track_age_s:
+        raise FleetError(
+            f"track of {fleet.names[worst]!r} is {age[worst]:.2f} s old, limit {config.max_track_age_s} s; "
+            "refresh it or leave the boat out"
+        )
