@@ -1,1 +1,34 @@
-"""Policies: scripted opponents, submissions and learned ones, by name."""
+"""Team policies: the organisers' opponents and other scripted ones, competition submissions, any of the user's own.
+
+``make("medium")`` builds one by name, ``make("path/to/submission.zip")`` from a file; `from_agents` and `from_callable`
+take objects and functions. `make_batch` builds the scripted ones for a `BatchedMctf`.
+"""
+
+from .actions import HOLD, ActionReader, to_command
+from .adapters import from_agents, from_callable
+from .guard import GuardedTeam
+from .protocol import Action, BatchPolicy, TeamPolicy
+from .registry import describe, make, make_batch, names
+from .report import Failure, PolicyReport
+from .sb3 import load_sb3
+from .submissions import load_submission
+
+__all__ = [
+    "HOLD",
+    "Action",
+    "ActionReader",
+    "BatchPolicy",
+    "Failure",
+    "GuardedTeam",
+    "PolicyReport",
+    "TeamPolicy",
+    "describe",
+    "from_agents",
+    "from_callable",
+    "load_sb3",
+    "load_submission",
+    "make",
+    "make_batch",
+    "names",
+    "to_command",
+]

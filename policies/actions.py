@@ -1,0 +1,109 @@
+"""Checks one answer of foreign code and turns it into a command; the conversion itself is the game's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from steerclear.env.actions import ActionDecoder, action_kinds
+from steerclear.env.field import field_points
+from steerclear.shield.exceptions import GameError, PolicyError
+
+from .scripted.team import game_core
+
+HOLD = (0.0, 0.0)
+"""Action of a boat that gave no usable answer: speed 0, heading as it is."""
+MAX_SPEED_FACTOR = 10.0
+"""A speed beyond this many times the boat's top speed is taken for an error, not for a wish to be clipped."""
+MAX_HEADING_DEG = 360.0
+"""A relative heading beyond this is taken for an error."""
+
+
+class ActionReader:
+    """Reads actions for the boats of one env.
+
+    Args:
+        env: the `MctfEnv` (or a wrapper round one).
+
+    Raises:
+        PolicyError: ``env`` is no such env.
+    """
+
+    def __init__(self, env: Any) -> None:
+        core = game_core(env)
+        kinds = getattr(getattr(env, "unwrapped", env), "action_kinds", None)
+        self._core = core
+        self._kinds = kinds if kinds is not None else action_kinds(core.config, "discrete")
+        self._numbers = {agent_id: i for i, agent_id in enumerate(core.config.agent_ids)}
+        points = field_points(core.field.size)
+        self._decoder = ActionDecoder(core.config, self._kinds, core.max_speed_mps, points, core.field.size)
+
+    def command(self, agent_id: str, action: Any) -> tuple[float, float]:
+        """Speed m/s and relative heading deg an action asks for, from where the boat is now.
+
+        Args:
+            agent_id: whose action it is.
+            action: a whole number, a pair (speed m/s, relative heading deg) or the name of a field point.
+
+        Raises:
+            PolicyError: the action is none of these, not finite, or absurdly large.
+        """
+        found = self.problem(agent_id, action)
+        if found is not None:
+            raise PolicyError(f"{found[0]}: {found[1]}")
+        row = self._decode(agent_id, action)
+        return float(row[0]), float(row[1])
+
+    def problem(self, agent_id: str, action: Any) -> tuple[str, str] | None:
+        """What is wrong with an action, as (kind, explanation); None when it can be used."""
+        if action is None:
+            return "no answer", "compute_action returned None; return an action"
+        numeric = _as_numbers(action)
+        if numeric is not None and not np.isfinite(numeric).all():
+            return "not finite", f"{_short(action)} is not finite"
+        try:
+            row = self._decode(agent_id, action)
+        except GameError as error:
+            return "no action", _short(str(error), 300)
+        except (TypeError, ValueError, OverflowError) as error:
+            return "no action", f"{_short(action)} cannot be read: {_short(str(error))}"
+        return self._too_large(agent_id, row)
+
+    def _decode(self, agent_id: str, action: Any) -> np.ndarray:
+        row = self._decoder.decode({agent_id: action}, self._core.state[0])
+        return row[self._numbers[agent_id]]
+
+    def _too_large(self, agent_id: str, row: np.ndarray) -> tuple[str, str] | None:
+        limit_mps = MAX_SPEED_FACTOR * float(self._core.max_speed_mps[self._numbers[agent_id]])
+        if abs(row[0]) > limit_mps:
+            return "too large", f"speed {row[0]:g} m/s is beyond {limit_mps:g} m/s"
+        if abs(row[1]) > MAX_HEADING_DEG:
+            return "too large", f"relative heading {row[1]:g} deg is beyond {MAX_HEADING_DEG:g} deg"
+        return None
+
+
+def to_command(env: Any, agent_id: str, action: Any) -> tuple[float, float]:
+    """One action as (speed m/s, relative heading deg); see `ActionReader.command`, which is quicker for many.
+
+    Raises:
+        PolicyError: ``env`` is no `MctfEnv`, the agent is unknown, or the action is unusable.
+    """
+    reader = ActionReader(env)
+    if agent_id not in game_core(env).config.agent_ids:
+        raise PolicyError(f"unknown agent {agent_id!r}; agents are {', '.join(game_core(env).config.agent_ids)}")
+    return reader.command(agent_id, action)
+
+
+def _as_numbers(action: Any) -> np.ndarray | None:
+    """The action as floats, or None when it holds no numbers or too large ones (the game's decoder refuses those)."""
+    if isinstance(action, (str, bytes)):
+        return None
+    try:
+        return np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _short(what: Any, length: int = 80) -> str:
+    text = what if isinstance(what, str) else repr(what)
+    return text if len(text) <= length else text[: length - 1] + "…"

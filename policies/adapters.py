@@ -1,0 +1,102 @@
+"""Policies made of the user's own objects: Pyquaticus-style agents, or any callable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import PolicyError
+
+from .guard import Answer, ForeignCode, GuardedTeam
+
+AgentFactory = Callable[[str, Any], Any]
+"""``factory(agent_id, env) -> agent`` with ``compute_action(obs, info)``."""
+
+
+class AgentsCode(ForeignCode):
+    """Agents with ``compute_action(obs, info)``, given all observations and infos by agent id as Pyquaticus gives them.
+
+    Args:
+        agents: agents by id, or a factory called with (agent_id, env) when a game begins.
+    """
+
+    def __init__(self, agents: Mapping[str, Any] | AgentFactory) -> None:
+        if not callable(agents) and not isinstance(agents, Mapping):
+            raise PolicyError("agents must be a dict agent_id -> agent, or a function of (agent_id, env)")
+        self._source = agents
+        self._agents: dict[str, Any] = {}
+
+    def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Take (or make) the agents of this game."""
+        if isinstance(self._source, Mapping):
+            missing = [agent_id for agent_id in agent_ids if agent_id not in self._source]
+            if missing:
+                raise PolicyError(f"no agent for {', '.join(missing)}; agents are {', '.join(self._source) or 'none'}")
+            self._agents = {agent_id: self._source[agent_id] for agent_id in agent_ids}
+        else:
+            self._agents = {agent_id: self._source(agent_id, env) for agent_id in agent_ids}
+        for agent_id, agent in self._agents.items():
+            if not callable(getattr(agent, "compute_action", None)):
+                raise PolicyError(f"agent {agent_id} ({type(agent).__name__}) has no compute_action(obs, info)")
+
+    def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
+        """Ask each boat's agent."""
+        return lambda agent_id: self._agents[agent_id].compute_action(observations, infos)
+
+
+class CallableCode(ForeignCode):
+    """Functions of one boat's normalised observation.
+
+    Args:
+        functions: one for all boats, or by agent id.
+    """
+
+    def __init__(self, functions: Callable[[np.ndarray], Any] | Mapping[str, Callable[[np.ndarray], Any]]) -> None:
+        parts = list(functions.values()) if isinstance(functions, Mapping) else [functions]
+        if not parts or not all(callable(part) for part in parts):
+            raise PolicyError("give a function f(obs) -> action, or a dict agent_id -> such functions")
+        self._functions = functions
+
+    def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Check that every boat has a function."""
+        if isinstance(self._functions, Mapping):
+            missing = [agent_id for agent_id in agent_ids if agent_id not in self._functions]
+            if missing:
+                raise PolicyError(f"no function for {', '.join(missing)}; there are {', '.join(self._functions)}")
+
+    def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
+        """Ask each boat's function."""
+        functions = self._functions
+        if isinstance(functions, Mapping):
+            return lambda agent_id: functions[agent_id](observations[agent_id])
+        return lambda agent_id: functions(observations[agent_id])
+
+
+def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") -> GuardedTeam:
+    """A team of Pyquaticus-style agents: objects with ``compute_action(obs, info)``.
+
+    Args:
+        agents: {agent_id: agent}, or ``factory(agent_id, env)``, often the agents' class itself, called at each reset;
+            a dict serves only the env its agents were built with.
+        name: name for records and reports.
+
+    Raises:
+        PolicyError: neither a dict nor callable.
+    """
+    return GuardedTeam(name, AgentsCode(agents))
+
+
+def from_callable(
+    function: Callable[[np.ndarray], Any] | Mapping[str, Callable[[np.ndarray], Any]], name: str = "callable"
+) -> GuardedTeam:
+    """A team that asks ``function(observation)`` for each boat.
+
+    Args:
+        function: gets a boat's normalised observation (n_obs,) float32, returns its action; or a dict of such by agent.
+        name: name for records and reports.
+
+    Raises:
+        PolicyError: not callable.
+    """
+    return GuardedTeam(name, CallableCode(function))

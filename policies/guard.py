@@ -1,0 +1,127 @@
+"""`GuardedTeam`: plays foreign code one boat at a time, so that whatever it does the game goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import PolicyError
+
+from .actions import HOLD, ActionReader
+from .protocol import Action
+from .report import PolicyReport, Reporter
+from .scripted.team import boat_numbers, game_core
+
+Answer = Callable[[str], Any]
+"""``answer(agent_id) -> action``."""
+
+
+class ForeignCode(ABC):
+    """What a `GuardedTeam` drives; the base class of the adapters in this package."""
+
+    @abstractmethod
+    def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """A game begins; what is raised here ends it, since no boat could play."""
+
+    @abstractmethod
+    def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
+        """What answers for each boat in this step. Not guarded: must not run foreign code."""
+
+    def around(self) -> contextlib.AbstractContextManager[Any]:
+        """What must hold while foreign code runs, such as its working directory."""
+        return contextlib.nullcontext()
+
+    def close(self) -> None:  # noqa: B027 (most code holds nothing)
+        """Give back what the code holds."""
+
+
+class GuardedTeam:
+    """A `TeamPolicy` round foreign code. A boat whose code raises or answers nonsense holds for that step.
+
+    `report` says which agent, game and step, what, how often, and how long calls took. Each kind of failure is logged
+    once. Code that never returns is not interrupted.
+
+    Args:
+        name: name for records and reports.
+        code: the code's adapter.
+    """
+
+    def __init__(self, name: str, code: ForeignCode) -> None:
+        self.name = name
+        self.code = code
+        self._ids: list[str] = []
+        self._reporter = Reporter(name)
+
+    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Begin a game.
+
+        Raises:
+            PolicyError: not an `MctfEnv`, unusable agent ids, or the code cannot begin.
+        """
+        core = game_core(env)
+        boat_numbers(core, agent_ids)
+        self._ids = list(agent_ids)
+        self._reader = ActionReader(env)
+        self._reporter.begin(core.config.dt_s)
+        try:
+            self.code.begin(env, self._ids, seed)
+        except PolicyError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise PolicyError(f"policy {self.name!r} cannot begin a game: {describe_error(error)}") from error
+
+    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, Action]:
+        """The code's own actions, unchanged; ``HOLD`` where there is no usable one.
+
+        Raises:
+            PolicyError: `reset` was not called, or observations or infos lack what the code is entitled to.
+        """
+        if not self._ids:
+            raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        answer = self.code.prepare(observations, infos)
+        with self.code.around():
+            answers = {agent_id: self._ask(answer, agent_id) for agent_id in self._ids}
+        actions = {agent_id: self._checked(agent_id, *answers[agent_id]) for agent_id in self._ids}
+        self._reporter.next_step()
+        return actions
+
+    def report(self) -> PolicyReport:
+        """Failures and times over all games so far."""
+        return self._reporter.report()
+
+    def close(self) -> None:
+        """Give back what the code holds, such as temporary files; may be called again."""
+        self.code.close()
+
+    def _ask(self, answer: Answer, agent_id: str) -> tuple[Any, BaseException | None]:
+        started_ns = time.perf_counter_ns()
+        try:
+            return answer(agent_id), None
+        except (Exception, SystemExit) as error:  # an entry that calls exit() does not end the game; Ctrl-C does
+            return None, error
+        finally:
+            self._reporter.timed(agent_id, time.perf_counter_ns() - started_ns)
+
+    def _checked(self, agent_id: str, action: Any, error: BaseException | None) -> Action:
+        if error is not None:
+            self._reporter.failed(agent_id, f"raised {type(error).__name__}", describe_error(error))
+            return HOLD
+        found = self._reader.problem(agent_id, action)
+        if found is None:
+            return action
+        self._reporter.failed(agent_id, *found)
+        return HOLD
+
+
+def describe_error(error: BaseException) -> str:
+    """Type, text and place of an error raised by foreign code, in one line."""
+    text = " ".join(str(error).split())
+    where = error.__traceback__
+    while where is not None and where.tb_next is not None:
+        where = where.tb_next
+    place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
+    return f"{type(error).__name__}: {text[:300]}{place}"

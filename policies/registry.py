@@ -1,0 +1,178 @@
+"""Policies by name: `make` builds one for a game, `make_batch` for a batch of games."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.exceptions import PolicyError
+
+from .keyboard import KeyboardTeam, Keys
+from .protocol import BatchPolicy, TeamPolicy
+from .scripted.batch import ScriptedBatch
+from .scripted.layout import Behaviour
+from .scripted.plan import Plan, by_name, checked_fraction, checked_points, everyone, hidden, in_roles
+from .scripted.team import ScriptedTeam
+
+Roles = str | Sequence[str] | None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A named policy: what it does, and the plan its options make."""
+
+    description: str
+    plan: Callable[..., Plan]
+
+
+def _single(behaviour: Behaviour) -> Callable[[], Plan]:
+    return lambda: Plan(everyone(behaviour))
+
+
+def _easy(roles: Roles = None) -> Plan:
+    return Plan(in_roles(Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND, roles))
+
+
+def _medium(roles: Roles = None) -> Plan:
+    return Plan(in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles))
+
+
+def _hard(roles: Roles = None) -> Plan:
+    if roles is None:
+        return Plan(everyone(Behaviour.HARD))
+    return Plan(in_roles(Behaviour.HARD_ATTACK, Behaviour.HARD_DEFEND, roles))
+
+
+def _hidden(composition: str | int | None = None) -> Plan:
+    return Plan(hidden(composition))
+
+
+def _rammer(target_team_mates: bool = False, speed_fraction: float = 1.0) -> Plan:
+    if not isinstance(target_team_mates, bool):
+        raise PolicyError(f"target_team_mates is {target_team_mates!r}; give True or False")
+    return Plan(
+        everyone(Behaviour.RAMMER),
+        speed_fraction=checked_fraction(speed_fraction),
+        target_team_mates=target_team_mates,
+    )
+
+
+def _waypoints(points: Any = None, speed_fraction: float = 1.0) -> Plan:
+    return Plan(
+        everyone(Behaviour.WAYPOINTS), points=checked_points(points), speed_fraction=checked_fraction(speed_fraction)
+    )
+
+
+def _mixed(boats: str | Sequence[str] = "medium_attack") -> Plan:
+    return Plan(by_name(boats))
+
+
+ENTRIES: dict[str, Entry] = {
+    "easy": Entry("organisers' easy team: fixed paths, two attackers and a defender (roles=...)", _easy),
+    "easy_attack": Entry("every boat loops own base, their flag, own base", _single(Behaviour.EASY_ATTACK)),
+    "easy_defend": Entry("every boat patrols in front of its base", _single(Behaviour.EASY_DEFEND)),
+    "medium": Entry("organisers' medium team: potential fields, two attackers and a defender (roles=...)", _medium),
+    "medium_attack": Entry("every boat goes for the flag, pushed off opponents", _single(Behaviour.MEDIUM_ATTACK)),
+    "medium_defend": Entry("every boat chases intruders in its half", _single(Behaviour.MEDIUM_DEFEND)),
+    "hidden": Entry(
+        "organisers' hidden team: medium; defends, attacks or is mixed, by seed (composition=...)", _hidden
+    ),
+    "hard": Entry("every boat attacks, and defends while its flag is threatened (roles=... fixes who does)", _hard),
+    "hard_attack": Entry("bolder medium_attack; all return when one has the flag", _single(Behaviour.HARD_ATTACK)),
+    "hard_defend": Entry("every boat stays between its flag and the nearest opponent", _single(Behaviour.HARD_DEFEND)),
+    "hold": Entry("every boat stops", _single(Behaviour.HOLD)),
+    "random": Entry("seeded random walk: discrete actions held for 1 to 5 s", _single(Behaviour.RANDOM)),
+    "rammer": Entry("lead pursuit of the nearest opponent (target_team_mates=..., speed_fraction=...)", _rammer),
+    "waypoints": Entry("seeded random waypoints, or given ones (points=..., speed_fraction=...)", _waypoints),
+    "mixed": Entry("any mix of the scripted boats (boats='medium_attack,rammer,hold')", _mixed),
+}
+"""The scripted policies; "keyboard" is the one named policy that is not scripted."""
+
+KEYBOARD = "keyboard"
+SB3_PREFIX = "sb3:"
+KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..., others='medium')"
+
+
+def names() -> list[str]:
+    """Names `make` knows, besides paths of submissions and ``sb3:PATH.zip``."""
+    return [*ENTRIES, KEYBOARD]
+
+
+def describe() -> dict[str, str]:
+    """What each named policy does, in a line."""
+    return {name: entry.description for name, entry in ENTRIES.items()} | {KEYBOARD: KEYBOARD_DESCRIPTION}
+
+
+def make(name_or_path: str | Path, **options: Any) -> TeamPolicy:
+    """A team policy by name or from a file.
+
+    Args:
+        name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; or ``sb3:PATH.zip``.
+        **options: the policy's own options, see `describe`.
+
+    Raises:
+        PolicyError: an unknown name or option (the message names near matches), or a file that cannot be loaded.
+    """
+    text = str(name_or_path)
+    if text in ENTRIES:
+        return ScriptedTeam(text, _plan(text, options))
+    if text == KEYBOARD:
+        return _call(_keyboard, KEYBOARD, options)
+    if text.startswith(SB3_PREFIX):
+        from .sb3 import load_sb3
+
+        return _call(load_sb3, text, options, text.removeprefix(SB3_PREFIX))
+    if looks_like_path(text):
+        from .submissions import load_submission
+
+        return _call(load_submission, text, options, text)
+    raise unknown_policy(text)
+
+
+def make_batch(name: str, **options: Any) -> BatchPolicy:
+    """A scripted policy for a whole batch of games.
+
+    Raises:
+        PolicyError: an unknown name or option, or a policy that only plays single games.
+    """
+    if name in ENTRIES:
+        return ScriptedBatch(name, _plan(name, options))
+    if name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
+        raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)}")
+    raise unknown_policy(name)
+
+
+def looks_like_path(text: str) -> bool:
+    """Whether a policy's name is meant as a path: it exists, has a separator, or ends like a submission's file."""
+    return "/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists()
+
+
+def unknown_policy(name: str) -> PolicyError:
+    """The error for a name nobody knows."""
+    near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
+    hint = f"did you mean {', '.join(near)}? " if near else ""
+    known = f"known: {', '.join(names())}; or give a submission's folder or zip, or sb3:PATH.zip"
+    return PolicyError(f"unknown policy {name!r}; {hint}{known}")
+
+
+def _plan(name: str, options: dict[str, Any]) -> Plan:
+    return _call(ENTRIES[name].plan, name, options)
+
+
+def _keyboard(others: str | TeamPolicy = "medium", agent: int | str = 0, keys: Keys | None = None) -> TeamPolicy:
+    return KeyboardTeam(make(others) if isinstance(others, str) else others, agent, keys)
+
+
+def _call(build: Callable[..., Any], name: str, options: dict[str, Any], *first: Any) -> Any:
+    """``build(*first, **options)``, with misspelt options explained."""
+    known = list(inspect.signature(build).parameters)[len(first) :]
+    for option in options:
+        if option not in known:
+            near = difflib.get_close_matches(option, known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]!r}?" if near else f"its options are: {', '.join(known) or 'none'}"
+            raise PolicyError(f"policy {name!r} has no option {option!r}; {hint}")
+    return build(*first, **options)

@@ -1,0 +1,136 @@
+"""Attackers: a fixed loop (easy) and potential fields that pull to the flag and push off opponents (medium, hard)."""
+
+from __future__ import annotations
+
+import math
+
+from steerclear.shield.jit import Array, kernel
+from steerclear.shield.platforms import layout as L
+
+from .geometry import bearing_deg, boat_to_boat, is_turned, own_end_point, to_boat, unit
+from .layout import GOAL, HEIGHT, MAX_SPEED, WIDTH, Game
+from .paths import follow
+
+MEDIUM_REACH_M = 60.0
+HARD_REACH_M = 30.0
+WALL_REACH_M = 10.0
+GOAL_WEIGHT = 1.25
+STALEMATE = 0.1
+WALL_BIAS = 1.25
+# own-end fractions (along, across): scrimmage line starboard, their flag, scrimmage line port, own flag
+EASY_LOOP = ((0.5, 0.25), (0.875, 0.5), (0.5, 0.75), (0.125, 0.5))
+POINT_REACHED_M = 2.5
+HOME_REACHED_M = 6.0  # the own flag's keep-out circle is larger than POINT_REACHED_M
+
+
+@kernel
+def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
+    """Loop own base -> opponent's flag -> back at full speed; a tag restarts the loop.
+
+    Returns:
+        Speed m/s and relative heading deg.
+    """
+    if game.is_tagged[boat]:
+        memory[GOAL] = 0.0
+    goal = int(memory[GOAL])
+    reach_m = HOME_REACHED_M if goal == 3 else POINT_REACHED_M
+    along, across = EASY_LOOP[goal]
+    x, y = own_end_point(game, game.team[boat], along, across)
+    if math.hypot(x - game.state[boat, L.X], y - game.state[boat, L.Y]) <= reach_m:
+        memory[GOAL] = (goal + 1) % 4
+        along, across = EASY_LOOP[(goal + 1) % 4]
+        x, y = own_end_point(game, game.team[boat], along, across)
+    return follow(game, boat, x, y)
+
+
+@kernel
+def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tuple[float, float]:
+    """Drawn to the flag (with it: to the own flag home), pushed off opponents and near walls, at full speed.
+
+    ``shares_flag``: a team-mate's carrying the flag also sends this boat home.
+    """
+    team = game.team[boat]
+    push_right, push_forward = push(game, boat, reach_m)
+    homeward = game.has_flag[boat] or (shares_flag and team_has_flag(game, team))
+    x, y = game.flag_home[team] if homeward else game.flag_position[1 - team]
+    right, forward = unit(*to_boat(game, boat, x, y))
+    if not homeward and is_stalemate(right, forward, push_right, push_forward):
+        right, forward = to_far_wall(game, boat)
+    else:
+        right, forward = GOAL_WEIGHT * right + push_right, GOAL_WEIGHT * forward + push_forward
+    return game.limits[boat, MAX_SPEED], bearing_deg(right, forward)
+
+
+@kernel
+def is_stalemate(right: float, forward: float, push_right: float, push_forward: float) -> bool:
+    """Whether pull and push nearly cancel (compared in size per boat axis, as the reference opponents do)."""
+    return abs(abs(right) - abs(push_right)) <= STALEMATE and abs(abs(forward) - abs(push_forward)) <= STALEMATE
+
+
+@kernel
+def to_far_wall(game: Game, boat: int) -> tuple[float, float]:
+    """Way out of a stalemate: the farther long wall, with a bias to one so that the choice sticks."""
+    y, height = game.state[boat, L.Y], game.field[HEIGHT]
+    turned = is_turned(game, game.team[boat])
+    starboard, port = (height - y, y) if turned else (y, height - y)
+    to_starboard = abs(starboard) > WALL_BIAS * abs(port)
+    y_wall = height if to_starboard == turned else 0.0
+    return to_boat(game, boat, game.state[boat, L.X], y_wall)
+
+
+@kernel
+def push(game: Game, boat: int, reach_m: float) -> tuple[float, float]:
+    """Unit vector away from opponents (all of them, tagged or not) and walls ahead, each weighted by 1/distance."""
+    right, forward = push_of_walls(game, boat, WALL_REACH_M, reach_m)
+    for other in range(game.team.size):
+        if game.team[other] != game.team[boat]:
+            r, f = weighted(*boat_to_boat(game, boat, other), reach_m)
+            right, forward = right + r, forward + f
+    right, forward = unit(right, forward)
+    return -right, -forward
+
+
+@kernel
+def weighted(right: float, forward: float, reach_m: float) -> tuple[float, float]:
+    """Direction to a thing to keep off, times reach / distance; zero beyond the reach."""
+    distance = math.hypot(right, forward)
+    if distance >= reach_m or distance == 0.0:
+        return 0.0, 0.0
+    return right * reach_m / distance**2, forward * reach_m / distance**2
+
+
+@kernel
+def push_of_walls(game: Game, boat: int, wall_reach_m: float, reach_m: float) -> tuple[float, float]:
+    """Weighted sum of the nearest points of walls that are ahead and within ``wall_reach_m`` (one per axis)."""
+    x, y = game.state[boat, L.X], game.state[boat, L.Y]
+    width, height = game.field[WIDTH], game.field[HEIGHT]
+    near_y, far_y, near_x, far_x = 0.0, height, 0.0, width
+    if is_turned(game, game.team[boat]):
+        near_y, far_y, near_x, far_x = height, 0.0, width, 0.0
+    right, forward = weighted_wall(game, boat, x, near_y, wall_reach_m, reach_m)
+    if right == 0.0 and forward == 0.0:
+        right, forward = weighted_wall(game, boat, x, far_y, wall_reach_m, reach_m)
+    r, f = weighted_wall(game, boat, near_x, y, wall_reach_m, reach_m)
+    if r == 0.0 and f == 0.0:
+        r, f = weighted_wall(game, boat, far_x, y, wall_reach_m, reach_m)
+    return right + r, forward + f
+
+
+@kernel
+def weighted_wall(
+    game: Game, boat: int, x: float, y: float, wall_reach_m: float, reach_m: float
+) -> tuple[float, float]:
+    """A wall's nearest point, weighted, or zero when it is not ahead or further than ``wall_reach_m``."""
+    right, forward = to_boat(game, boat, x, y)
+    if forward <= 0.0 or math.hypot(right, forward) >= wall_reach_m:
+        return 0.0, 0.0
+    return weighted(right, forward, reach_m)
+
+
+@kernel
+def team_has_flag(game: Game, team: int) -> bool:
+    """Whether any boat of the team carries the flag."""
+    for boat in range(game.team.size):  # noqa: SIM110 (numba compiles no generators in any())
+        if game.team[boat] == team and game.has_flag[boat]:
+            return True
+    return False

@@ -1,0 +1,140 @@
+"""Boats that drive to points: fixed paths, given or random waypoints, a random walk."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from steerclear.shield.jit import Array, kernel
+from steerclear.shield.platforms import layout as L
+
+from .geometry import bearing_deg, draw, own_end_point, to_boat, wrap_deg
+from .layout import (
+    GOAL,
+    GOAL_X,
+    GOAL_Y,
+    HEIGHT,
+    HELD_HEADING,
+    HELD_SPEED,
+    KEEPOUT,
+    MAX_SPEED,
+    RADIUS,
+    REACHED,
+    SPEED_FRACTION,
+    STEP,
+    TIME_LEFT,
+    WIDTH,
+    Game,
+)
+
+DEFENCE_PATROL = ((0.375, 0.75), (0.375, 0.25))  # own-end fractions, in front of the base, port then starboard
+PATROL_REACHED_M = 2.5
+WAYPOINT_REACHED_M = 3.0
+WAYPOINT_TIMEOUT_S = 60.0
+WALL_MARGIN_M = 5.0
+HOLD_MIN_S, HOLD_MAX_S = 1.0, 5.0
+
+
+@kernel
+def follow(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
+    """Full speed to a point, stop within the boat's own radius of it."""
+    right, forward = to_boat(game, boat, x_m, y_m)
+    speed = 0.0 if math.hypot(right, forward) <= game.limits[boat, RADIUS] else game.limits[boat, MAX_SPEED]
+    return speed, bearing_deg(right, forward)
+
+
+@kernel
+def easy_defend(game: Game, boat: int, memory: Array) -> tuple[float, float]:
+    """Patrol between two points in front of the own base at full speed."""
+    goal = int(memory[GOAL])
+    for _ in range(2):
+        along, across = DEFENCE_PATROL[goal]
+        x, y = own_end_point(game, game.team[boat], along, across)
+        if math.hypot(x - game.state[boat, L.X], y - game.state[boat, L.Y]) > PATROL_REACHED_M:
+            break
+        goal = 1 - goal
+    memory[GOAL] = goal
+    return follow(game, boat, x, y)
+
+
+@kernel
+def waypoints(
+    game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int
+) -> tuple[float, float]:
+    """Drive from waypoint to waypoint: the given ones in turn, or random ones when ``given`` is empty.
+
+    A waypoint not reached in ``WAYPOINT_TIMEOUT_S`` is given up, so that a boat cannot circle one for ever.
+    """
+    x, y = game.state[boat, L.X], game.state[boat, L.Y]
+    memory[TIME_LEFT] -= game.field[STEP]
+    started = memory[GOAL] > 0.0
+    arrived = started and math.hypot(memory[GOAL_X] - x, memory[GOAL_Y] - y) <= WAYPOINT_REACHED_M
+    if arrived:
+        memory[REACHED] += 1.0
+    if arrived or not started or memory[TIME_LEFT] <= 0.0:
+        next_waypoint(game, boat, memory, given, streams, slot)
+    right, forward = to_boat(game, boat, memory[GOAL_X], memory[GOAL_Y])
+    return game.field[SPEED_FRACTION] * game.limits[boat, MAX_SPEED], bearing_deg(right, forward)
+
+
+@kernel
+def next_waypoint(game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int) -> None:
+    """Put the next waypoint into the memory row."""
+    if given.shape[0] > 0:
+        number = int(memory[GOAL]) % given.shape[0]
+        memory[GOAL_X], memory[GOAL_Y] = given[number, 0], given[number, 1]
+    else:
+        memory[GOAL_X], memory[GOAL_Y] = random_point(game, boat, streams, slot)
+    memory[GOAL] += 1.0
+    memory[TIME_LEFT] = WAYPOINT_TIMEOUT_S
+
+
+@kernel
+def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple[float, float]:
+    """Uniform in the field, off the walls, and outside the own flag's keep-out, which the boat cannot enter."""
+    home = game.flag_home[game.team[boat]]
+    clear_m = game.field[KEEPOUT] + game.limits[boat, RADIUS] + WAYPOINT_REACHED_M
+    x = y = 0.0
+    for _ in range(20):
+        x = spread(draw(streams, slot), game.field[WIDTH])
+        y = spread(draw(streams, slot), game.field[HEIGHT])
+        if math.hypot(x - home[0], y - home[1]) > clear_m:
+            break
+    return x, y
+
+
+@kernel
+def spread(fraction: float, length_m: float) -> float:
+    """``fraction`` of the way between the two wall margins; the middle of a field too narrow for margins."""
+    margin = min(WALL_MARGIN_M, 0.5 * length_m)
+    return margin + fraction * (length_m - 2.0 * margin)
+
+
+@kernel
+def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> tuple[float, float]:
+    """Draw one of the 17 discrete actions, hold its absolute heading and speed for 1 to 5 s, draw again.
+
+    A draw whose straight course would leave the field is turned to a random point inside it.
+    """
+    memory[TIME_LEFT] -= game.field[STEP]
+    if memory[TIME_LEFT] <= 0.0:
+        draw_course(game, boat, memory, streams, slot)
+    return memory[HELD_SPEED], wrap_deg(memory[HELD_HEADING] - game.state[boat, L.HEADING])
+
+
+@kernel
+def draw_course(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> None:
+    """Put a new held course into the memory row."""
+    hold_s = HOLD_MIN_S + (HOLD_MAX_S - HOLD_MIN_S) * draw(streams, slot)
+    action = min(int(17.0 * draw(streams, slot)), 16)
+    speed = 0.0 if action == 16 else game.limits[boat, MAX_SPEED] * (1.0 if action < 8 else 0.5)
+    heading = game.state[boat, L.HEADING] + (0.0 if action == 16 else 180.0 - 45.0 * (action % 8))
+    ahead_m = WALL_MARGIN_M + game.limits[boat, MAX_SPEED] * hold_s
+    x, y = game.state[boat, L.X], game.state[boat, L.Y]
+    x_ahead = x + ahead_m * math.sin(math.radians(heading))
+    y_ahead = y + ahead_m * math.cos(math.radians(heading))
+    if not (0.0 < x_ahead < game.field[WIDTH] and 0.0 < y_ahead < game.field[HEIGHT]):
+        x_inside, y_inside = random_point(game, boat, streams, slot)
+        heading = math.degrees(math.atan2(x_inside - x, y_inside - y))
+        speed = max(speed, 0.5 * game.limits[boat, MAX_SPEED])
+    memory[TIME_LEFT], memory[HELD_SPEED], memory[HELD_HEADING] = hold_s, speed, heading

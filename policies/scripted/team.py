@@ -1,0 +1,97 @@
+"""`ScriptedTeam`: the same scripted play as a `TeamPolicy` in one `MctfEnv`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.env.core import BatchedMctf
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.jit import IntArray
+
+from .batch import ScriptedBatch
+from .layout import Behaviour
+from .plan import Plan
+
+
+class ScriptedTeam:
+    """A scripted team in one game: a thin front over `ScriptedBatch`, so that one game plays as one of a batch.
+
+    Reads the live game, not the observations.
+
+    Args:
+        name: name for records and reports.
+        plan: who does what.
+    """
+
+    def __init__(self, name: str, plan: Plan) -> None:
+        self.name = name
+        self._batch = ScriptedBatch(name, plan)
+        self._ids: list[str] = []
+
+    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Begin a game.
+
+        Args:
+            env: the `MctfEnv`, or a wrapper round one.
+            agent_ids: boats of one team.
+            seed: seed of random play; chooses the hidden opponent's composition.
+
+        Raises:
+            PolicyError: not such an env, unknown boats, boats of both teams, or roles that do not fit the team.
+        """
+        self._core = game_core(env)
+        self._ids = list(agent_ids)
+        boats = boat_numbers(self._core, self._ids)
+        self._team = int(self._core.team[boats[0]])
+        self._batch.reset(self._core, self._team, seed, boats)
+
+    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+        """Actions (speed m/s, relative heading deg) of the boats; the arguments are not read.
+
+        Raises:
+            PolicyError: `reset` was not called.
+        """
+        if not self._ids:
+            raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        rows = self._batch.act(self._core, self._team)[0].tolist()
+        return {agent_id: (row[0], row[1]) for agent_id, row in zip(self._ids, rows, strict=True)}
+
+    @property
+    def behaviours(self) -> dict[str, Behaviour]:
+        """What each boat does in this game."""
+        return dict(zip(self._ids, self._batch.behaviours[0], strict=True))
+
+    @property
+    def waypoints_reached(self) -> dict[str, int]:
+        """Waypoints reached so far, by boat; zero for boats that drive none."""
+        return dict(zip(self._ids, self._batch.waypoints_reached[0].tolist(), strict=True))
+
+
+def game_core(env: Any) -> BatchedMctf:
+    """The game behind an `MctfEnv` or a wrapper round one.
+
+    Raises:
+        PolicyError: there is none.
+    """
+    core = getattr(getattr(env, "unwrapped", env), "core", None)
+    if not isinstance(core, BatchedMctf) or core.n_games != 1:
+        raise PolicyError(f"scripted policies need an MctfEnv, not {type(env).__name__}; use make_batch for batches")
+    return core
+
+
+def boat_numbers(core: BatchedMctf, agent_ids: Sequence[str]) -> IntArray:
+    """Numbers of boats of one team.
+
+    Raises:
+        PolicyError: none, unknown or repeated boats, or boats of both teams.
+    """
+    known = core.config.agent_ids
+    unknown = [agent_id for agent_id in agent_ids if agent_id not in known]
+    if unknown or not agent_ids or len(set(agent_ids)) != len(agent_ids):
+        raise PolicyError(f"agent_ids are {list(agent_ids)}; give different ones of {', '.join(known)}")
+    boats = np.array([known.index(agent_id) for agent_id in agent_ids], dtype=np.int64)
+    if np.unique(core.team[boats]).size != 1:
+        raise PolicyError(f"agent_ids {list(agent_ids)} are of both teams; one policy plays one team")
+    return boats

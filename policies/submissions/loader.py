@@ -1,0 +1,145 @@
+"""Loads a competition submission and plays it unchanged."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import PolicyError
+
+from ..guard import Answer, ForeignCode, GuardedTeam, describe_error
+from .history import CONFIG_FILE, History, ObservationSettings
+from .sandbox import Sandbox
+from .stage import ENTRY_FILE, MAX_BYTES, Stage
+
+CLASS_NAME = "solution"
+METHOD_NAME = "compute_action"
+
+
+class GlobalState(dict[Any, Any]):
+    """The global state, which also answers ``global_state[agent_id]`` with itself.
+
+    Submissions read it both ways: keyed by the state's own keys, or by agent id first like the observations.
+    """
+
+    def __init__(self, state: Mapping[Any, Any], agent_ids: Sequence[str]) -> None:
+        super().__init__(state)
+        self._ids = frozenset(agent_ids)
+
+    def __missing__(self, key: Any) -> Any:
+        if key in self._ids:
+            return self
+        raise KeyError(key)
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        """As in a dict, agent ids included."""
+        return self if key in self._ids else super().get(key, default)
+
+
+class SubmissionCode(ForeignCode):
+    """A ``solution`` object and the folder it lives in.
+
+    Args:
+        source: folder, zip, or its ``solution.py``.
+        max_bytes: largest unpacked size of a zip.
+
+    Raises:
+        PolicyError: it cannot be loaded or built, or asks for observations this game does not make.
+    """
+
+    def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
+        self.stage = Stage(source, max_bytes)
+        self._sandbox = Sandbox(self.stage.folder)
+        try:
+            self._class, settings = self._load()
+            self._build()
+        except BaseException:
+            self.close()
+            raise
+        self._history = History(settings)
+
+    def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """A fresh instance for each game, built and run from the game's seed."""
+        seed_libraries(seed)
+        self._instance = self._build()
+        self._history.clear()
+
+    def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
+        """Copies, so that nothing the submission writes into them reaches the game or its opponent."""
+        try:
+            raw = {agent_id: dict(infos[agent_id]["unnorm_obs"]) for agent_id in observations}
+            state = GlobalState(next(iter(infos.values()))["global_state"], tuple(observations))
+        except (KeyError, StopIteration, TypeError) as error:
+            raise PolicyError(f"infos lack {error} for a submission; pass those of MctfEnv.reset or step") from error
+        normalized = {agent_id: np.array(row) for agent_id, row in observations.items()}
+        normalized, raw = self._history.push(normalized, raw)
+        compute_action = getattr(self._instance, METHOD_NAME)
+        return lambda agent_id: compute_action(agent_id, normalized, raw, state)
+
+    def around(self) -> contextlib.AbstractContextManager[Any]:
+        """Working directory and imports of the submission."""
+        return self._sandbox.active()
+
+    def close(self) -> None:
+        """Remove the temporary folder."""
+        self.stage.close()
+
+    def _load(self) -> tuple[type, ObservationSettings]:
+        with self._sandbox.active():
+            settings = ObservationSettings()
+            if (self.stage.folder / CONFIG_FILE).is_file():
+                settings = ObservationSettings.from_module(self._run(CONFIG_FILE))
+            found = getattr(self._run(ENTRY_FILE), CLASS_NAME, None)
+        if not isinstance(found, type):
+            raise PolicyError(f"{ENTRY_FILE} of {self.stage.source} has no class {CLASS_NAME!r}; define one")
+        if not callable(getattr(found, METHOD_NAME, None)):
+            raise PolicyError(f"class {CLASS_NAME!r} of {self.stage.source} has no method {METHOD_NAME!r}; define one")
+        return found, settings
+
+    def _run(self, file: str) -> Any:
+        try:
+            return self._sandbox.load(file)
+        except (Exception, SystemExit) as error:
+            raise self._unusable(f"{file} cannot be imported", error) from error
+
+    def _build(self) -> Any:
+        with self._sandbox.active():
+            try:
+                return self._class()
+            except (Exception, SystemExit) as error:
+                raise self._unusable(f"{CLASS_NAME}() cannot be built", error) from error
+
+    def _unusable(self, what: str, error: BaseException) -> PolicyError:
+        remedy = ""
+        if isinstance(error, ModuleNotFoundError):
+            remedy = f"; install {error.name!r} here or put it beside {ENTRY_FILE}"
+        return PolicyError(f"submission {self.stage.source}: {what}: {describe_error(error)}{remedy}")
+
+
+def seed_libraries(seed: int) -> None:
+    """Seed the global random numbers a submission may draw from: Python's, NumPy's and, if loaded, PyTorch's."""
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002 (the submission's own choice of generator)
+    torch = sys.modules.get("torch")
+    if torch is not None and hasattr(torch, "manual_seed"):
+        torch.manual_seed(seed)
+
+
+def load_submission(path: str | Path, name: str | None = None, max_bytes: int = MAX_BYTES) -> GuardedTeam:
+    """A competition submission as a team policy.
+
+    Args:
+        path: folder or zip with ``solution.py``, or that file.
+        name: name for records and reports; None takes the folder's or zip's.
+        max_bytes: largest unpacked size of a zip.
+
+    Raises:
+        PolicyError: it cannot be loaded or built; the message says why and where.
+    """
+    code = SubmissionCode(path, max_bytes)
+    return GuardedTeam(name or code.stage.source.stem, code)

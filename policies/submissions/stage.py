@@ -1,0 +1,148 @@
+"""`Stage`: a private folder in which a submission finds its files, whether it came as a folder or as a zip."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import shutil
+import stat
+import tempfile
+import weakref
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from steerclear.shield.exceptions import PolicyError
+
+ENTRY_FILE = "solution.py"
+MAX_BYTES = 2 * 1024**3
+"""Largest size of an unpacked zip, bytes."""
+MAX_FILES = 20_000
+"""Most files in a zip."""
+WORKING_DIR = "working_dir"
+"""Name under which the competition's own template looks for its files; in the stage it leads back to the stage."""
+_CHUNK = 1 << 20
+
+
+class Stage:
+    """A temporary folder with the submission's files at its top; removed by `close` or when collected.
+
+    A folder's files are linked, not copied, so that what the submission writes beside itself stays out of the folder.
+
+    Args:
+        source: folder, zip, or the ``solution.py`` itself.
+        max_bytes: largest unpacked size of a zip.
+
+    Raises:
+        PolicyError: there is no submission there, or the zip is broken, unsafe or too large.
+    """
+
+    def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
+        self.source = Path(source).expanduser().absolute()
+        if self.source.name == ENTRY_FILE and self.source.is_file():
+            self.source = self.source.parent
+        if not self.source.exists():
+            raise PolicyError(f"there is no submission at {self.source}; give a folder or a zip with {ENTRY_FILE}")
+        top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
+        self._clean = weakref.finalize(self, shutil.rmtree, top, ignore_errors=True)
+        try:
+            self.folder = self._fill(top, max_bytes)
+        except BaseException:
+            self.close()
+            raise
+
+    def _fill(self, top: Path, max_bytes: int) -> Path:
+        if self.source.is_dir():
+            folder = link_folder(find_entry(self.source), top)
+        else:
+            unpack(self.source, top, max_bytes)
+            folder = find_entry(top)
+        with contextlib.suppress(OSError):  # a file system without links: only the template's own paths need it
+            (folder / WORKING_DIR).symlink_to(".", target_is_directory=True)
+        return folder
+
+    def close(self) -> None:
+        """Remove the folder; may be called again."""
+        self._clean()
+
+
+def find_entry(folder: Path) -> Path:
+    """The folder that holds ``solution.py``: this one, or its only subfolder that has it.
+
+    Raises:
+        PolicyError: none or several.
+    """
+    if (folder / ENTRY_FILE).is_file():
+        return folder
+    inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
+    if len(inside) != 1:
+        found = "none there" if not inside else "several: " + ", ".join(path.name for path in inside)
+        raise PolicyError(f"a submission needs one {ENTRY_FILE} at its top ({found}); looked in {folder}")
+    return inside[0]
+
+
+def link_folder(source: Path, top: Path) -> Path:
+    """Links in ``top`` to everything in ``source``; the source itself where links cannot be made."""
+    try:
+        for path in source.iterdir():
+            if path.name != "__pycache__":
+                (top / path.name).symlink_to(path, target_is_directory=path.is_dir())
+    except OSError:
+        return source
+    return top
+
+
+def unpack(archive: Path, top: Path, max_bytes: int) -> None:
+    """Unpack a zip after checking every name, kind and size in it.
+
+    Raises:
+        PolicyError: not a zip, broken, encrypted, too large, or with a member that would land outside ``top``.
+    """
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            members = opened.infolist()
+            check_members(archive, members, max_bytes)
+            for member in members:
+                if not member.is_dir():
+                    _write(opened, member, top)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+        raise PolicyError(f"{archive} cannot be unpacked: {error}; zip the folder with {ENTRY_FILE} again") from error
+
+
+def check_members(archive: Path, members: list[zipfile.ZipInfo], max_bytes: int) -> None:
+    """Refuse an archive that is too large or holds anything but plain files and folders inside it.
+
+    Raises:
+        PolicyError: which member, and why.
+    """
+    if len(members) > MAX_FILES:
+        raise PolicyError(f"{archive} has {len(members)} files, more than {MAX_FILES}; leave out what is not needed")
+    total = sum(member.file_size for member in members)
+    if total > max_bytes:
+        raise PolicyError(f"{archive} unpacks to {total} bytes, more than {max_bytes}; raise max_bytes if you trust it")
+    for member in members:
+        mode = member.external_attr >> 16
+        if mode and stat.S_IFMT(mode) not in (0, stat.S_IFREG, stat.S_IFDIR):
+            raise PolicyError(f"{archive}: {member.filename!r} is a link or a device; zip plain files only")
+        if not is_inside(member.filename):
+            raise PolicyError(f"{archive}: {member.filename!r} would land outside its folder; zip relative paths only")
+        if member.flag_bits & 1:
+            raise PolicyError(f"{archive}: {member.filename!r} is encrypted; zip without a password")
+
+
+def is_inside(name: str) -> bool:
+    """Whether a member's name stays below the folder it is unpacked in, on any system."""
+    parts = PurePosixPath(name).parts
+    return bool(parts) and not name.startswith("/") and ".." not in parts and not re.search(r"[\\\0:]", name)
+
+
+def _write(opened: zipfile.ZipFile, member: zipfile.ZipInfo, top: Path) -> None:
+    """Write one member, stopping at the size the archive declared (a bomb lies about it)."""
+    target = top / PurePosixPath(member.filename)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    left = member.file_size
+    with opened.open(member) as packed, target.open("wb") as file:
+        while chunk := packed.read(_CHUNK):
+            left -= len(chunk)
+            if left < 0:
+                raise zipfile.BadZipFile(f"{member.filename!r} is larger than declared")
+            file.write(chunk)
