@@ -1,0 +1,298 @@
+import os
+import subprocess
+
+import imageio.v3 as iio
+import imageio_ffmpeg
+import numpy as np
+import pygame
+import pytest
+from PIL import Image
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import read_meta
+from steerclear.env.render import THEMES, Arena, Overlay, Picture, Renderer, Scene, save_animation, save_frame
+from steerclear.env.render.picture import pixels
+from steerclear.env.render.renderer import MODES
+from steerclear.shield.exceptions import ConfigError, TraceError
+
+WIDTH_PX = 640
+
+
+@pytest.fixture
+def no_display(monkeypatch):
+    """A machine without a screen."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture
+def game():
+    env = MctfEnv(GameConfig.preset("aamas2024", max_time_s=30.0))
+    env.reset(seed=1)
+    yield env
+    env.close()
+
+
+def drawn(record, step, theme="light", width_px=WIDTH_PX, **changes):
+    arena = Arena.from_meta({**read_meta(record), **changes})
+    return pixels(Picture(arena, width_px, theme).draw(Scene.from_record(record, step, arena.dt_s)))
+
+
+def share_of(image, colour, tolerance=6):
+    return float((np.abs(image.astype(int) - colour).max(axis=-1) <= tolerance).mean())
+
+
+def advance(env, steps=3):
+    for _ in range(steps):
+        env.step(dict.fromkeys(env.agents, (2.0, 30.0)))
+
+
+@pytest.mark.usefixtures("no_display")
+def test_live_frames_need_no_display_and_show_the_game(game):
+    environment = dict(os.environ)
+    renderer = Renderer(game.config, "rgb_array", WIDTH_PX)
+    first = renderer.draw(game.view())
+    advance(game)
+    second = renderer.draw(game.view())
+    renderer.close()
+    renderer.close()
+    assert first.dtype == np.uint8
+    assert first.shape[1:] == (WIDTH_PX, 3)
+    assert first.shape[0] % 16 == 0
+    assert len(np.unique(first.reshape(-1, 3), axis=0)) > 50
+    assert 0.0005 < np.any(first != second, axis=-1).mean() < 0.2
+    assert dict(os.environ) == environment
+
+
+@pytest.mark.usefixtures("no_display")
+def test_the_env_draws(game):
+    env = MctfEnv(game.config, render_mode="rgb_array")
+    env.reset(seed=1)
+    first = env.render()
+    advance(env)
+    second = env.render()
+    assert first.shape == second.shape
+    assert np.any(first != second)
+    env.close()
+
+
+def test_the_same_moment_gives_the_same_picture(game):
+    frames = [Renderer(game.config, width_px=WIDTH_PX).draw(game.view()) for _ in range(2)]
+    np.testing.assert_array_equal(*frames)
+
+
+def test_boats_are_drawn_where_they_are_in_their_colours(game_record):
+    arena = Arena.from_meta(read_meta(game_record))
+    scene = Scene.from_record(game_record, 5, arena.dt_s)
+    picture = Picture(arena, 1280)
+    image = pixels(picture.draw(scene))
+    for boat, centre in enumerate(scene.position_m):
+        x, y = picture._canvas.to_px(centre)
+        around = image[round(y) - 8 : round(y) + 9, round(x) - 8 : round(x) + 9]
+        assert share_of(around, THEMES["light"].team[arena.team[boat]]) > 0.1
+
+
+def test_moving_a_boat_changes_its_two_places_only(game_record):
+    arena = Arena.from_meta({**read_meta(game_record), "shielded": []})
+    here = Scene.from_record(game_record, 0, arena.dt_s)
+    moved = here.position_m.copy()
+    moved[3] += (6.0, 4.0)
+    there = Scene(**{**vars(here), "position_m": moved})
+    picture = Picture(arena, 1280)
+    changed = np.any(pixels(picture.draw(here)) != pixels(picture.draw(there)), axis=-1)
+    rows, columns = np.nonzero(changed)
+    x, y = picture._canvas.to_px(moved[3])
+    assert changed.any()
+    assert columns.min() > x - 6 * 15.4 - 160
+    assert columns.max() < x + 160
+    assert rows.min() > y - 160
+
+
+def test_a_changed_command_shows_in_its_own_colour(game_record):
+    colour = THEMES["light"].changed
+    legend = share_of(drawn(game_record, 5, width_px=1280), colour)
+    assert share_of(drawn(game_record, 12, width_px=1280), colour) > legend + 0.0003
+
+
+def test_a_breach_shows_in_its_own_colour(game_record):
+    step = int(game_record["breaches"][0, 0])
+    assert step > 1
+    colour = THEMES["light"].breach
+    calm, breach = drawn(game_record, 0, width_px=1280), drawn(game_record, step, width_px=1280)
+    assert share_of(breach, colour) > share_of(calm, colour) + 0.0002
+
+
+@pytest.mark.parametrize("name", ["is_tagged", "has_flag", "oob", "captures"])
+def test_every_mark_changes_the_picture(game_record, name):
+    arena = Arena.from_meta(read_meta(game_record))
+    picture = Picture(arena, WIDTH_PX)
+    scene = Scene.from_record(game_record, 5, arena.dt_s)
+    values = np.array(getattr(scene, name))
+    values[0] = not values[0] if values.dtype == bool else values[0] + 1
+    changes = {name: values}
+    if name == "has_flag":  # the flag itself tells who carries it
+        changes["flag_position_m"] = np.array([scene.flag_position_m[0], scene.position_m[0]])
+    other = Scene(**{**vars(scene), **changes})
+    assert np.any(pixels(picture.draw(scene)) != pixels(picture.draw(other)))
+
+
+def test_a_command_that_is_not_finite_is_left_out(game_record):
+    drawn(game_record, 31)
+    assert np.isnan(game_record["wanted"][31, 1]).all()
+
+
+def test_commands_can_be_switched_off(game_record):
+    arena = Arena.from_meta(read_meta(game_record))
+    picture, scene = Picture(arena, WIDTH_PX), Scene.from_record(game_record, 5, arena.dt_s)
+    assert np.any(pixels(picture.draw(scene)) != pixels(picture.draw(scene, show_commands=False)))
+
+
+def test_a_live_overlay_is_drawn(game):
+    renderer = Renderer(game.config, width_px=WIDTH_PX)
+    wanted = np.tile([2.0, 90.0], (6, 1))
+    sent = wanted.copy()
+    sent[0] = [1.0, 0.0]
+    changed = np.arange(6) == 0
+    overlay = Overlay(wanted, sent, np.where(changed, 1, 6), changed, np.full(6, np.nan))
+    assert np.any(renderer.draw(game.view(), overlay) != renderer.draw(game.view()))
+
+
+def test_obstacles_and_a_slanted_line_between_the_halves_are_drawn(game_record):
+    plain = drawn(game_record, 0, obstacles=None)
+    assert share_of(drawn(game_record, 0), THEMES["light"].obstacle) > share_of(plain, THEMES["light"].obstacle)
+    slanted = drawn(game_record, 0, scrimmage=((30.0, 0.0), (50.0, 40.0)))
+    top, bottom = slanted[80], slanted[-60]
+    blue = THEMES["light"].water[0]
+    assert share_of(top, blue) > share_of(bottom, blue) + 0.1
+
+
+def test_dark_is_darker(game_record):
+    assert drawn(game_record, 0, "dark").mean() < 0.5 * drawn(game_record, 0).mean()
+
+
+@pytest.mark.parametrize("bounds", [(160.0, 80.0), (30.0, 60.0)])
+def test_fields_of_any_shape_fit_the_picture(game_record, bounds):
+    image = drawn(game_record, 0, env_bounds_m=bounds)
+    assert image.shape[1] == WIDTH_PX
+    assert share_of(image[-45], THEMES["light"].edge, 60) < 0.9
+
+
+def test_a_new_game_clears_the_tracks(game):
+    renderer = Renderer(game.config, width_px=WIDTH_PX)
+    fresh = renderer.draw(game.view())
+    for _ in range(5):
+        advance(game)
+        renderer.draw(game.view())
+    game.reset(seed=1)
+    np.testing.assert_array_equal(renderer.draw(game.view()), fresh)
+
+
+def test_a_window_opens_takes_keys_and_closes(monkeypatch, game):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    renderer = Renderer(game.config, "human", WIDTH_PX, speedup=100.0)
+    assert renderer.keys() == set()
+    assert renderer.draw(game.view()) is None
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_LEFT))
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_w))
+    assert renderer.keys() == {"left", "w"}
+    pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_w))
+    assert renderer.keys() == {"left"}
+    assert not renderer.window_closed
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    renderer.draw(game.view())
+    assert renderer.window_closed
+    renderer.close()
+    assert not pygame.display.get_init()
+
+
+def test_no_display_is_one_clear_error(monkeypatch, game):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "nonsense")
+    with pytest.raises(ConfigError, match="Use render_mode='rgb_array'"):
+        Renderer(game.config, "human", WIDTH_PX).draw(game.view())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"mode": "ansi"}, f"choose {MODES[0]} or {MODES[1]}"),
+        ({"width_px": 10}, "choose 320 to 4096"),
+        ({"theme": "pink"}, "choose light or dark"),
+        ({"speedup": 0.0}, "must be positive"),
+        ({"speedup": float("nan")}, "must be positive"),
+    ],
+)
+def test_settings_that_cannot_be_used(arguments, words):
+    with pytest.raises(ConfigError, match=words):
+        Renderer(GameConfig.preset("aamas2024"), **arguments)
+
+
+def test_settings_of_a_game_that_cannot_be_drawn(game_meta):
+    with pytest.raises(TraceError, match="cannot be drawn"):
+        Renderer({**game_meta, "env_bounds_m": 3})
+    with pytest.raises(TraceError, match="cannot be drawn"):
+        Renderer({name: value for name, value in game_meta.items() if name != "team"})
+
+
+def test_a_frame_is_saved(game_record, tmp_path):
+    path = save_frame(game_record, -1, tmp_path / "deep" / "last.png", WIDTH_PX)
+    np.testing.assert_array_equal(iio.imread(path), drawn(game_record, 60))
+    for step in (61, -62):
+        with pytest.raises(ConfigError, match="the record has 0 to 60"):
+            save_frame(game_record, step, tmp_path / "none.png")
+
+
+def read_mp4(path):
+    """Frames of a film; imageio's own reader leaves its pipes open."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    content = subprocess.run(command, capture_output=True, check=True).stdout
+    return np.frombuffer(content, np.uint8).reshape(-1, 400, WIDTH_PX, 3)
+
+
+@pytest.mark.parametrize("ending", ["gif", "mp4"])
+def test_a_film_shows_the_game(game_record, tmp_path, ending):
+    calls = []
+    path = save_animation(
+        game_record,
+        tmp_path / f"game.{ending}",
+        fps=10.0,
+        speedup=10.0,
+        progress=lambda done, of: calls.append((done, of)),
+        width_px=WIDTH_PX,
+    )
+    frames = iio.imread(path, index=None) if ending == "gif" else read_mp4(path)
+    assert calls == [(k, 7) for k in range(1, 8)]  # 6 s of game at ten times its speed, ten pictures a second
+    assert frames.shape[0] == 7
+    for frame, step in zip(frames, range(0, 61, 10), strict=True):
+        error = np.abs(frame[..., :3].astype(int) - drawn(game_record, step)).mean()
+        assert error < 4.0
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_stretch_of_a_game_can_be_filmed(game_record, tmp_path):
+    path = save_animation(game_record, tmp_path / "a.gif", 10.0, 10.0, start_s=2.0, end_s=4.0, width_px=WIDTH_PX)
+    with Image.open(path) as film:
+        assert film.n_frames == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"path": "a.avi"}, "end the name in .mp4 or .gif"),
+        ({"fps": 0.0}, "choose 0 < fps <= 100"),
+        ({"speedup": -1.0}, "speedup > 0"),
+        ({"start_s": 7.0}, "the record lasts from 0 to 6.0 s"),
+        ({"start_s": 3.0, "end_s": 2.0}, "cannot show 3.0 s to 2.0 s"),
+    ],
+)
+def test_films_that_cannot_be_made(game_record, tmp_path, arguments, words):
+    arguments = {"path": "a.gif", **arguments}
+    path = tmp_path / arguments.pop("path")
+    with pytest.raises(ConfigError, match=words):
+        save_animation(game_record, path, **arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_of_an_incomplete_record(game_record, tmp_path):
+    broken = {name: values for name, values in game_record.items() if name != "sent"}
+    with pytest.raises(TraceError, match="lacks sent"):
+        save_animation(broken, tmp_path / "a.gif")
