@@ -22,15 +22,24 @@ TOLERANCE = 1e-10
 
 
 @kernel
+def _dot(a: Array, b: Array) -> float:
+    """Inner product; rows may be slices of a wider array, for which numpy's is slow."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@kernel
 def _solve_gram(C: Array, active: IntArray, count: int, rhs: Array, gram: Array, out: Array) -> bool:
     """Solve (N N^T) out = rhs for the active rows N by Cholesky; False when they are dependent."""
     for i in range(count):
         for j in range(i + 1):
-            total = np.dot(C[active[i]], C[active[j]])
+            total = _dot(C[active[i]], C[active[j]])
             for k in range(j):
                 total -= gram[i, k] * gram[j, k]
             if i == j:
-                if total <= 1e-13 * (1.0 + np.dot(C[active[i]], C[active[i]])):
+                if total <= 1e-13 * (1.0 + _dot(C[active[i]], C[active[i]])):
                     return False
                 gram[i, i] = math.sqrt(total)
             else:
@@ -53,10 +62,68 @@ def _most_violated(C: Array, d: Array, z: Array) -> tuple[int, float]:
     """Row with the largest violation relative to its norm; -1 when all hold."""
     worst, index = TOLERANCE, -1
     for r in range(C.shape[0]):
-        lack = d[r] - np.dot(C[r], z)
+        lack = d[r] - _dot(C[r], z)
         if lack > worst:
             worst, index = lack, r
     return index, worst
+
+
+@kernel
+def _dual_direction(C: Array, entering: int, active: IntArray, count: int, gram: Array, rhs: Array, r: Array) -> bool:
+    """Change ``r`` of the active multipliers per unit of the entering one."""
+    for i in range(count):
+        rhs[i] = _dot(C[active[i]], C[entering])
+    return _solve_gram(C, active, count, rhs, gram, r)
+
+
+@kernel
+def _first_to_leave(dual: Array, r: Array, count: int) -> tuple[int, float]:
+    """Active row whose multiplier reaches zero first, and the step at which it does."""
+    blocking, step = -1, np.inf
+    for i in range(count):
+        if r[i] > 1e-14 and dual[i] / r[i] < step:
+            blocking, step = i, dual[i] / r[i]
+    return blocking, step
+
+
+@kernel
+def _drop(active: IntArray, dual: Array, leaving: int, count: int) -> None:
+    for i in range(leaving, count - 1):
+        active[i], dual[i] = active[i + 1], dual[i + 1]
+
+
+@kernel
+def _make_active(
+    C: Array, d: Array, z: Array, entering: int, active: IntArray, dual: Array, count: int, gram: Array
+) -> tuple[int, int]:
+    """Steps until row ``entering`` is satisfied and active; returns the status and the new active count."""
+    n = C.shape[1]
+    r, rhs, direction = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n)
+    own = 0.0
+    for _ in range(n + 2):
+        if not _dual_direction(C, entering, active, count, gram, rhs, r):
+            return STALLED, count
+        direction[:] = C[entering]
+        for i in range(count):
+            direction -= r[i] * C[active[i]]
+        slope = _dot(direction, C[entering])
+        leaving, dual_step = _first_to_leave(dual, r, count)
+        full_step = np.inf
+        if slope > 1e-12 * _dot(C[entering], C[entering]) and count < n:
+            full_step = (d[entering] - _dot(C[entering], z)) / slope
+        step = min(full_step, dual_step)
+        if step == np.inf:
+            return INFEASIBLE, count
+        if full_step != np.inf:
+            z += step * direction
+        dual[:count] -= step * r[:count]
+        own += step
+        if step == full_step:
+            active[count], dual[count] = entering, own
+            return OPTIMAL, count + 1
+        _drop(active, dual, leaving, count)
+        count -= 1
+    return STALLED, count
 
 
 @kernel
@@ -74,48 +141,13 @@ def project(C: Array, d: Array, z0: Array, z: Array) -> int:
     """
     rows, n = C.shape
     z[:] = z0
-    active = np.zeros(n + 1, np.int64)
-    dual = np.zeros(n + 2)
-    gram = np.zeros((n + 1, n + 1))
-    rhs = np.zeros(n + 1)
-    step_dual = np.zeros(n + 1)
-    direction = np.zeros(n)
+    active, dual, gram = np.zeros(n + 1, np.int64), np.zeros(n + 1), np.zeros((n + 1, n + 1))
     count = 0
     for _ in range(10 * (rows + n) + 10):
         entering, _lack = _most_violated(C, d, z)
         if entering < 0:
             return OPTIMAL
-        entering_dual = 0.0
-        while True:
-            for i in range(count):
-                rhs[i] = np.dot(C[active[i]], C[entering])
-            if not _solve_gram(C, active, count, rhs, gram, step_dual):
-                return STALLED
-            direction[:] = C[entering]
-            for i in range(count):
-                direction -= step_dual[i] * C[active[i]]
-            slope = np.dot(direction, C[entering])
-            scale = np.dot(C[entering], C[entering])
-            blocking, dual_step = -1, np.inf
-            for i in range(count):
-                if step_dual[i] > 1e-14 and dual[i] / step_dual[i] < dual_step:
-                    blocking, dual_step = i, dual[i] / step_dual[i]
-            primal_step = np.inf
-            if slope > 1e-12 * scale and count < n:
-                primal_step = (d[entering] - np.dot(C[entering], z)) / slope
-            step = min(primal_step, dual_step)
-            if step == np.inf:
-                return INFEASIBLE
-            if primal_step != np.inf:
-                z += step * direction
-            for i in range(count):
-                dual[i] -= step * step_dual[i]
-            entering_dual += step
-            if step == primal_step:
-                active[count], dual[count] = entering, entering_dual
-                count += 1
-                break
-            for i in range(blocking, count - 1):
-                active[i], dual[i] = active[i + 1], dual[i + 1]
-            count -= 1
+        status, count = _make_active(C, d, z, entering, active, dual, count, gram)
+        if status != OPTIMAL:
+            return status
     return STALLED

@@ -18,14 +18,30 @@ from .surroundings import OPEN_WATER, Surroundings
 
 @kernel
 def decide_games(
-    state: Array, wanted: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning,
-    memory: Memory, work: Work, plan: Plan, margin_m: Array, sent: Array, reason: IntArray, clearance_m: Array,
+    state: Array,
+    wanted: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+    margin_m: Array,
+    sent: Array,
+    reason: IntArray,
+    clearance_m: Array,
 ) -> None:
     """Decide for every game in turn; arrays carry a leading games axis."""
     n = state.shape[1]
     for b in range(state.shape[0]):
         own = Memory(
-            memory.kept[b], memory.side[b], memory.target_deg[b], memory.speed_mps[b], memory.margin_m[b],
+            memory.kept[b],
+            memory.side[b],
+            memory.target_deg[b],
+            memory.speed_mps[b],
+            memory.margin_m[b],
             memory.escaping[b],
         )
         decide_compiled(state[b], wanted[b], margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
@@ -106,8 +122,20 @@ class BatchedShield:
         if not np.isfinite(state[:, :, :6]).all():
             raise FleetError("a boat's position, heading, speed, thrust or rudder is not finite")
         decide_games(
-            state, wanted, ours, self._boats, self._fixed, self._plans, self._tuning, self._memory, self._work,
-            self._plan, self._margin, self.sent, self.reason, self.certificate_m,
+            state,
+            wanted,
+            ours,
+            self._boats,
+            self._fixed,
+            self._plans,
+            self._tuning,
+            self._memory,
+            self._work,
+            self._plan,
+            self._margin,
+            self.sent,
+            self.reason,
+            self.certificate_m,
         )
         return self.sent
 

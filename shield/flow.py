@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .active_set import OPTIMAL, project
-from .certificates.assign import assign_plans, kept_turn
+from .certificates.assign import assign_plans
 from .certificates.clearance import MARGIN
 from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, mark_near
 from .jit import Array, BoolArray, IntArray, kernel
@@ -20,7 +20,7 @@ from .platforms import layout as L
 from .platforms.actuator import command_for_turn
 from .platforms.step import step_boat
 from .platforms.usv import wrap_degrees
-from .rows import BOX_ROW, FIXED_ROW, PAIR_ROW, build_rows, inputs_of
+from .rows import BOX_ROW, build_rows, inputs_of
 from .scene import Boats, Fixed, Memory, Tuning, Work
 
 PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED = range(7)
@@ -96,8 +96,17 @@ def set_targets(ours: BoolArray, tuning: Tuning, memory: Memory, work: Work) -> 
 
 @kernel
 def screen(
-    state: Array, wanted: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array,
-    tuning: Tuning, memory: Memory, work: Work, plan: Plan,
+    state: Array,
+    wanted: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> bool:
     """Check the wanted commands as they are; True when every boat still has its escape after them.
 
@@ -119,9 +128,7 @@ def screen(
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     plan.kept_commands[:] = plan.commands
-    return assign_plans(
-        plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work
-    )
+    return assign_plans(plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work)
 
 
 @kernel
@@ -145,18 +152,47 @@ def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
 
 @kernel
 def build(
-    count: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, tuning: Tuning, work: Work,
+    count: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
     plan: Plan,
 ) -> int:
     """Linearise about the candidate commands; returns the number of rows, -1 when there are too many."""
     movers = plan.movers[:count]
     inputs_of(
-        plan.commands, plan.kept_commands, movers, state, boats, tuning, work, plan.wanted_turn, plan.gain,
-        plan.z_now, plan.z0,
+        plan.commands,
+        plan.kept_commands,
+        movers,
+        state,
+        boats,
+        tuning,
+        work,
+        plan.wanted_turn,
+        plan.gain,
+        plan.z_now,
+        plan.z0,
     )
     return build_rows(
-        movers, plan.place, state, margin_m, ours, boats, fixed, tuning, work, plan.gain,
-        plan.z_now[: 2 * count], plan.C[:, : 2 * count], plan.d, plan.kind, plan.label,
+        movers,
+        plan.place,
+        state,
+        margin_m,
+        ours,
+        boats,
+        fixed,
+        tuning,
+        work,
+        plan.gain,
+        plan.z_now[: 2 * count],
+        plan.C[:, : 2 * count],
+        plan.d,
+        plan.kind,
+        plan.label,
     )
 
 
@@ -200,15 +236,22 @@ def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning
 
 @kernel
 def check(
-    count: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning,
-    memory: Memory, work: Work, plan: Plan,
+    count: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> bool:
     """Exact re-check of candidate commands: full model one step on, then an escape for everybody."""
     for m in range(count):
         predict(plan.movers[m], plan.commands, state, boats, tuning, work)
-    return assign_plans(
-        plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work
-    )
+    return assign_plans(plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work)
 
 
 @kernel
@@ -246,8 +289,17 @@ def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, p
 
 @kernel
 def ladder(
-    count: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning,
-    memory: Memory, work: Work, plan: Plan,
+    count: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> None:
     """No checked answer of the program: the movers take the escape that keeps the worst margin largest.
 
@@ -294,8 +346,18 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
 
 @kernel
 def finish(
-    safe: bool, count: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array,
-    tuning: Tuning, memory: Memory, work: Work, plan: Plan,
+    safe: bool,
+    count: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> None:
     """Name the reasons of a checked answer, or go down the ladder without one; then remember the escapes."""
     if safe:
@@ -320,8 +382,17 @@ def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
 
 @kernel
 def decide_compiled(
-    state: Array, wanted: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed, plans: Array,
-    tuning: Tuning, memory: Memory, work: Work, plan: Plan,
+    state: Array,
+    wanted: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> None:
     """The whole decision for one game; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
     safe = screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)

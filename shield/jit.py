@@ -39,6 +39,6 @@ def kernel(function: F) -> F:
     """
     compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if hasattr(cache_file, "_source_stamp"):
+    if cache_file is not None and hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = _tree_stamp()
     return cast(F, compiled)

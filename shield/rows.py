@@ -9,7 +9,9 @@ boat's path from its next position to there,
 
 and the row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command:
 
-    h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') [- the same for a team-mate j, whose side of n is opposite] >= target.
+    h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') >= target,
+
+less the same terms of a team-mate j, for whom n points the other way.
 """
 
 from __future__ import annotations
@@ -59,7 +61,17 @@ def speed_effect(i: int, command: Array, state: Array, boats: Boats, tuning: Tun
 
 @kernel
 def _add_effect(
-    C: Array, r: int, i: int, sign: float, k: int, nx: float, ny: float, path: Array, first: int, gain: Array, work: Work
+    C: Array,
+    r: int,
+    i: int,
+    sign: float,
+    k: int,
+    nx: float,
+    ny: float,
+    path: Array,
+    first: int,
+    gain: Array,
+    work: Work,
 ) -> None:
     """Add boat i's share to row r; ``gain`` holds d(psi)/d(z_t) in rad and d(v)/d(z_s) in m/s."""
     rx, ry = path[k, 0] - work.next_state[i, L.X], path[k, 1] - work.next_state[i, L.Y]
@@ -88,8 +100,17 @@ def _close_row(C: Array, d: Array, lack: float, r: int, z_now: Array) -> bool:
 
 @kernel
 def inputs_of(
-    commands: Array, wanted: Array, movers: IntArray, state: Array, boats: Boats, tuning: Tuning, work: Work,
-    wanted_turn: Array, gain: Array, z_now: Array, z0: Array,
+    commands: Array,
+    wanted: Array,
+    movers: IntArray,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    wanted_turn: Array,
+    gain: Array,
+    z_now: Array,
+    z0: Array,
 ) -> None:
     """Scaled inputs of the candidate (``z_now``) and the wanted commands (``z0``), and the gains of the movers.
 
@@ -112,8 +133,21 @@ def inputs_of(
 
 @kernel
 def _pair_row(
-    i: int, j: int, m: int, place: IntArray, state: Array, margin_m: Array, ours: BoolArray, boats: Boats,
-    tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int,
+    i: int,
+    j: int,
+    m: int,
+    place: IntArray,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    gain: Array,
+    z_now: Array,
+    C: Array,
+    d: Array,
+    r: int,
 ) -> bool:
     """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
     clear_of_boat(i, j, work.path[i], state, margin_m, ours, boats, tuning, work, -FAR)
@@ -163,8 +197,21 @@ def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> i
 
 @kernel
 def build_rows(
-    movers: IntArray, place: IntArray, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed,
-    tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, kind: IntArray, label: IntArray,
+    movers: IntArray,
+    place: IntArray,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+    gain: Array,
+    z_now: Array,
+    C: Array,
+    d: Array,
+    kind: IntArray,
+    label: IntArray,
 ) -> int:
     """Stack all rows of the movers; returns their number, or -1 when there are more than ``C`` can hold.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,7 +104,22 @@ class Shield:
             answer = _Answer(seat.plan, seat.work, len(fleet))
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        return self._report(fleet, wanted, state, answer, started)
+        return self._report(fleet, wanted, asked, state, answer, started)
+
+    def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
+        """Put this shield around a policy.
+
+        Args:
+            policy: a team policy (``reset`` and ``act``, as `steerclear.policies.make` builds them), or any function of
+                what is seen to `Commands`.
+            read: for a function: turns what it sees into a `Fleet`.
+
+        Raises:
+            ConfigError: the policy is neither, or ``read`` is missing.
+        """
+        from .wrappers.policy import wrap_policy
+
+        return wrap_policy(policy, self, read)
 
     def _scene(self, fleet: Fleet) -> Boats:
         """Boat constants; fresh working memory when the fleet is not the one of the last call."""
@@ -115,9 +131,7 @@ class Shield:
             seats = 1 if self.config.coordination == "team" else n
             rows = min(n * (n + 5) + 2, MOST_ROWS)
             samples = int(self._boats.samples.max())
-            self._seats = [
-                _Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)
-            ]
+            self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
             self._key, self._sent = key, None
         return self._boats
 
@@ -170,14 +184,14 @@ class Shield:
             asked[i] = wanted[i]
             seat = self._seats[i]
             self._run(seat, state, asked, margin, controlled, boats, fixed)
-            answer.take(i, seat.plan, seat.work)
+            answer.take(int(i), seat.plan, seat.work)
         return answer
 
     def _report(
-        self, fleet: Fleet, wanted: Commands, state: Array, answer: _Answer, started: float
+        self, fleet: Fleet, wanted: Commands, asked: Array, state: Array, answer: _Answer, started: float
     ) -> Decisions:
-        changed = answer.reason != flow.NOT_COVERED
-        changed &= answer.reason != flow.PASSED
+        changed = (answer.reason != flow.NOT_COVERED) & (answer.reason != flow.PASSED)
+        changed &= (answer.commands != asked).any(axis=1)
         sent = wanted.replaced(changed, answer.commands, state[:, L.HEADING]) if changed.any() else wanted
         if self.config.delay_s > 0:
             relative = sent.as_relative_deg(state[:, L.HEADING])
@@ -202,7 +216,7 @@ class _Answer:
         self.commands = plan.commands.copy()
         self.reason = plan.reason.copy()
         self.slack = plan.slack_m.copy()
-        self.margin = work.clear[:n, 0].copy()
+        self.margin = np.where(self.reason == flow.NOT_COVERED, np.inf, work.clear[:n, 0])
         self.bound = work.bound[:n].copy()
 
     @classmethod

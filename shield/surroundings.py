@@ -40,6 +40,10 @@ class Surroundings:
             for row in values:
                 if not all(math.isfinite(value) for value in row):
                     raise ConfigError(f"{name} holds a value that is not finite: {row}")
+        for name in ("circles", "keep_out"):
+            object.__setattr__(self, name, tuple(tuple(map(float, row)) for row in getattr(self, name)))
+        corners = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in self.polygons)
+        object.__setattr__(self, "polygons", corners)
         if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out)):
             raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
         if any(len(polygon) < 3 for polygon in self.polygons):
@@ -53,9 +57,7 @@ class Surroundings:
         if self.field is not None and config.edge_m is not None:
             edge = np.array(self.field) + config.edge_m * np.array([1.0, 1.0, -1.0, -1.0])
         circles = [(x, y, r + config.hull_m) for x, y, r in self.circles] + list(self.keep_out)
-        segments = [
-            (*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))
-        ]
+        segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return Fixed(
             field=edge.astype(np.float64),
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),

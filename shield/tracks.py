@@ -9,7 +9,7 @@ import numpy as np
 from .config import ShieldConfig
 from .exceptions import FleetError
 from .fleet import Fleet
-from .jit import Array, kernel
+from .jit import Array, BoolArray, kernel
 from .platforms import layout as L
 from .platforms.step import step_boat
 
@@ -48,7 +48,7 @@ def run_on(state: Array, seconds: Array) -> None:
 
 
 @kernel
-def run_on_commands(state: Array, who: Array, params: Array, target: Array, steps: int, dt_s: float) -> None:
+def run_on_commands(state: Array, who: BoolArray, params: Array, target: Array, steps: int, dt_s: float) -> None:
     """Step boats of ``who`` under the last command sent: ``target`` is (speed m/s, absolute heading deg)."""
     for _ in range(steps):
         for i in range(state.shape[0]):
@@ -89,7 +89,7 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, last_sent: Array 
         margin = margin + config.track_error_mps * fleet.age_s
     steps = round(config.delay_s / config.dt_s)
     if steps > 0:
-        own = fleet.controlled if last_sent is not None else np.zeros(n, np.bool_)
+        own: BoolArray = fleet.controlled if last_sent is not None else np.zeros(n, np.bool_)
         run_on(state, np.where(own, 0.0, config.delay_s))
         if last_sent is not None:
             run_on_commands(state, own, params, last_sent, steps, config.dt_s)

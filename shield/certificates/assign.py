@@ -138,8 +138,19 @@ def assign_plans(
                     continue
             good = False
             choose_plan(
-                i, commands[i, 0], done, exhaustive and sweep == 0, state, margin_m, ours, boats, fixed, plans,
-                tuning, memory, work,
+                i,
+                commands[i, 0],
+                done,
+                exhaustive and sweep == 0,
+                state,
+                margin_m,
+                ours,
+                boats,
+                fixed,
+                plans,
+                tuning,
+                memory,
+                work,
             )
         if good:
             break

@@ -49,7 +49,9 @@ def _finish(out: Array, best: float, radius_m: float) -> None:
 
 
 @kernel
-def clear_of_path(own: Array, other: Array, samples: int, tail: float, radius_m: float, floor_m: float, out: Array) -> None:
+def clear_of_path(
+    own: Array, other: Array, samples: int, tail: float, radius_m: float, floor_m: float, out: Array
+) -> None:
     """Clearance between two sampled paths, run on straight for ``tail`` samples at the end.
 
     Stops early once the margin is below ``floor_m``: such a manoeuvre is out of the running anyway.
@@ -73,7 +75,16 @@ def clear_of_path(own: Array, other: Array, samples: int, tail: float, radius_m:
 
 @kernel
 def clear_of_straight(
-    own: Array, x: float, y: float, sx: float, sy: float, samples: int, tail: float, radius_m: float, floor_m: float, out: Array
+    own: Array,
+    x: float,
+    y: float,
+    sx: float,
+    sy: float,
+    samples: int,
+    tail: float,
+    radius_m: float,
+    floor_m: float,
+    out: Array,
 ) -> None:
     """Clearance from a neighbour that keeps its velocity: at (x, y) m now, moving (sx, sy) m per sample."""
     best = FAR * FAR
@@ -141,9 +152,13 @@ def clear_of_pursuer(
 
     Args:
         own: the boat's path, m.
-        x, y: the neighbour's position now, m.
-        ux, uy: its heading as a unit vector (east, north).
-        speed_mps, top_speed_mps, acc_mps2: its speed, top speed and granted acceleration.
+        x: the neighbour's position now, east, m.
+        y: north, m.
+        ux: its heading as a unit vector, east.
+        uy: north.
+        speed_mps: its speed, m/s.
+        top_speed_mps: its top speed, m/s.
+        acc_mps2: acceleration granted to it, m/s^2.
         turn_rad: granted turn per sample, rad.
         lead: steer for the meeting point instead of the boat itself.
         sample_s: time between samples, s.
@@ -161,7 +176,10 @@ def clear_of_pursuer(
         ax, ay = own[k, 0] - x, own[k, 1] - y
         if lead:
             ax, ay = _aim(
-                own[k - 1, 0] - x, own[k - 1, 1] - y, own[k, 0] - own[k - 1, 0], own[k, 1] - own[k - 1, 1],
+                own[k - 1, 0] - x,
+                own[k - 1, 1] - y,
+                own[k, 0] - own[k - 1, 0],
+                own[k, 1] - own[k - 1, 1],
                 speed_mps * sample_s,
             )
         along, across = ux * ax + uy * ay, ux * ay - uy * ax

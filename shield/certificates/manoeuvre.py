@@ -71,15 +71,31 @@ def clear_of_opponent(
     heading = math.radians(state[j, L.HEADING])
     way = state[j, L.SPEED] * sample_s
     clear_of_straight(
-        path, state[j, L.X], state[j, L.Y], way * math.sin(heading), way * math.cos(heading),
-        boats.samples[i], tuning.tail_s / sample_s, radius_m, floor_m, out,
+        path,
+        state[j, L.X],
+        state[j, L.Y],
+        way * math.sin(heading),
+        way * math.cos(heading),
+        boats.samples[i],
+        tuning.tail_s / sample_s,
+        radius_m,
+        floor_m,
+        out,
     )
 
 
 @kernel
 def clear_of_hunter(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, radius_m: float, floor_m: float,
-    spare: Array, out: Array,
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    radius_m: float,
+    floor_m: float,
+    spare: Array,
+    out: Array,
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
@@ -92,8 +108,21 @@ def clear_of_hunter(
     out[MARGIN] = FAR
     for lead in range(2):
         clear_of_pursuer(
-            path, state[j, L.X], state[j, L.Y], math.sin(heading), math.cos(heading), speed, top,
-            boats.granted_acc_mps2[j], turn, lead == 1, sample_s, boats.samples[i], radius_m, floor_m, spare,
+            path,
+            state[j, L.X],
+            state[j, L.Y],
+            math.sin(heading),
+            math.cos(heading),
+            speed,
+            top,
+            boats.granted_acc_mps2[j],
+            turn,
+            lead == 1,
+            sample_s,
+            boats.samples[i],
+            radius_m,
+            floor_m,
+            spare,
         )
         if spare[MARGIN] < out[MARGIN]:
             out[:] = spare
@@ -103,7 +132,15 @@ def clear_of_hunter(
 
 @kernel
 def _rank_recovery(
-    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work, radius_m: float
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    radius_m: float,
 ) -> None:
     """Inside the radius no margin is left to compare: rank by not closing further and by the distance soon after."""
     sample_s = STRIDE * tuning.dt_s
@@ -156,7 +193,14 @@ def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
 
 @kernel
 def worst_clearance(
-    i: int, slot: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work,
+    i: int,
+    slot: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
     floor_m: float,
 ) -> None:
     """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses."""
@@ -176,7 +220,14 @@ def worst_clearance(
 
 @kernel
 def worst_hunter(
-    i: int, slot: int, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work,
+    i: int,
+    slot: int,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
     floor_m: float,
 ) -> None:
     """Lower the clearance in ``slot`` to that from hunting opponents where it is worse."""
@@ -202,8 +253,16 @@ def _separation(state: Array, i: int, j: int) -> float:
 
 @kernel
 def rate_path(
-    i: int, slot: int, best: float, state: Array, margin_m: Array, ours: BoolArray, boats: Boats, fixed: Fixed,
-    tuning: Tuning, work: Work,
+    i: int,
+    slot: int,
+    best: float,
+    state: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
 ) -> float:
     """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
@@ -228,7 +287,12 @@ def rate_path(
     if clear[MARGIN] < target:
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
     clear_of_surroundings(
-        work.path[slot], boats.static_samples[i], fixed.field, fixed.circles, fixed.segments, fixed.segment_m,
+        work.path[slot],
+        boats.static_samples[i],
+        fixed.field,
+        fixed.circles,
+        fixed.segments,
+        fixed.segment_m,
         work.fixed[slot],
     )
     spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
@@ -237,8 +301,16 @@ def rate_path(
 
 @kernel
 def lay_path(
-    i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, state: Array, boats: Boats,
-    tuning: Tuning, work: Work,
+    i: int,
+    slot: int,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    done: int,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
 ) -> None:
     """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ..jit import Array
 from . import layout as L
 from .actuator import actuate, largest_turn
 from .platform import Platform
@@ -58,7 +59,7 @@ def _acceleration(platform: Platform, dt_s: float) -> float:
     return float(max(b - a for a, b in zip(speeds, speeds[window:], strict=False))) / (window * dt_s)
 
 
-def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[object, object]:
+def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
     """Parameters and state of the boat once it has settled at top speed, heading north from the origin."""
     params, state = platform.pack(), fresh_state(0.0, 0.0, 0.0)
     for _ in range(int(LONGEST_S / dt_s)):
@@ -71,9 +72,9 @@ def _half_turn(platform: Platform, dt_s: float) -> float:
     params, state = cruise(platform, dt_s)
     turned, step = 0.0, 0
     while turned < 180.0 and step * dt_s < LONGEST_S:
-        before = state[L.HEADING]  # type: ignore[index]
+        before = state[L.HEADING]
         actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
-        turned += (state[L.HEADING] - before) % 360.0  # type: ignore[index]
+        turned += (state[L.HEADING] - before) % 360.0
         step += 1
     return step * dt_s
 
@@ -81,7 +82,7 @@ def _half_turn(platform: Platform, dt_s: float) -> float:
 def _stop(platform: Platform, dt_s: float) -> float:
     params, state = cruise(platform, dt_s)
     step = 0
-    while state[L.SPEED] > 0.05 * platform.max_speed_mps and step * dt_s < LONGEST_S:  # type: ignore[index]
+    while state[L.SPEED] > 0.05 * platform.max_speed_mps and step * dt_s < LONGEST_S:
         actuate(params, state, 0.0, 0.0, dt_s)
         step += 1
     return step * dt_s

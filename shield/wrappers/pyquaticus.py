@@ -1,0 +1,105 @@
+"""Reading a real Pyquaticus environment object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..exceptions import ConfigError
+from ..fleet import Fleet
+from ..jit import Array
+from ..platforms import get_platform
+from ..platforms import layout as L
+from ..surroundings import Surroundings
+from .reading import no_commands, obstacles_of
+
+HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
+
+
+class PyquaticusReader:
+    """Reads a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
+
+    The environment drives tagged and out-of-bounds boats itself, after the policy's action: those are not ours to
+    decide for and are treated as boats that hold their course.
+    """
+
+    filters_inside = False
+
+    def __init__(self, env: Any) -> None:
+        self.env = env
+        self.agent_ids: tuple[str, ...] = tuple(str(agent) for agent in env.players)
+        self._platforms = tuple(get_platform(name).name for name in env.dynamics)
+        for agent in self.agent_ids:  # lets the env take a discrete action and a corrected pair alike
+            env.act_space_checked[agent] = True
+            env.act_space_match[agent] = False
+
+    def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
+        """All boats now."""
+        players = list(self.env.players.values())
+        state = np.array([_row(player) for player in players])
+        teams = np.array([_team(player) for player in players], dtype=np.int64)
+        driven = np.array([bool(player.is_tagged) or bool(player.oob) for player in players])
+        return Fleet(state, teams, self._platforms, (teams == team) & ~driven, self.agent_ids)
+
+    def commands(self, actions: Mapping[str, Any]) -> Array:
+        """Commands of discrete actions and (speed, relative heading) pairs; field points through the env."""
+        values = no_commands(len(self.agent_ids))
+        for i, agent in enumerate(self.agent_ids):
+            if agent in actions:
+                values[i] = self._command(actions[agent], self.env.players[agent])
+        return values
+
+    def _command(self, action: Any, player: Any) -> tuple[float, float]:
+        top = float(player.get_max_speed())
+        if isinstance(action, str):
+            speed, heading = self.env._afp_to_speed_relheading(action, player)
+            return float(speed), float(heading)
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape == (2,):
+            return float(array[0]), float(array[1])
+        if array.ndim != 0 or not 0 <= int(array) <= 16:
+            raise ConfigError(f"action {action!r} of {player.id} is neither 0..16 nor (speed, relative heading)")
+        number = int(array)
+        if number == 16:
+            return 0.0, 0.0
+        return top * (1.0 if number < 8 else 0.5), HEADINGS_DEG[number % 8]
+
+    def surroundings(self, team: int, keep_out: bool) -> Surroundings:
+        """Field edge and obstacles; the own flag's circle while the flag is home."""
+        env = self.env
+        circles, polygons = obstacles_of(getattr(env, "config_dict", {}).get("obstacles"))
+        size = np.asarray(env.env_size, dtype=np.float64)
+        flag = env.flags[team]
+        circle: tuple[tuple[float, float, float], ...] = ()
+        if keep_out and not flag.taken:
+            radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius))
+            circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
+        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle)
+
+
+def _team(player: Any) -> int:
+    return int(getattr(player.team, "value", player.team))
+
+
+def _row(player: Any) -> Array:
+    """State row of a player, with its controllers' memory where it has any."""
+    row = np.zeros(L.N_STATE)
+    row[L.X], row[L.Y] = player.pos[0], player.pos[1]
+    row[L.HEADING], row[L.SPEED] = player.heading, player.speed
+    memory = getattr(player, "state", {})
+    row[L.THRUST] = memory.get("thrust", math.nan)
+    row[L.RUDDER] = memory.get("rudder", math.nan)
+    row[L.TURN_RATE] = memory.get("turn_rate", 0.0)
+    row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL] = _controller(player, "speed")
+    row[L.HEADING_ERROR], row[L.HEADING_INTEGRAL] = _controller(player, "heading")
+    return row
+
+
+def _controller(player: Any, name: str) -> tuple[float, float]:
+    controller = getattr(player, "_pid_controllers", {}).get(name)
+    error = getattr(controller, "_prev_error", None)
+    integral = float(getattr(controller, "_integral", 0.0))
+    return (math.nan if error is None else float(error)), integral

@@ -1,0 +1,80 @@
+"""Reading a game: how the shield gets absolute positions and commands out of an environment object.
+
+Positions come from the environment itself, never from observations: those are relative, rounded and may be normalised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..exceptions import ConfigError
+from ..fleet import Fleet
+from ..jit import Array
+from ..surroundings import Surroundings
+
+SIDES = {"blue": 0, "red": 1}
+
+
+class GameReader(Protocol):
+    """What the wrappers need to know of an environment."""
+
+    agent_ids: tuple[str, ...]
+    filters_inside: bool
+
+    def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
+        """All boats now; controlled are those of ``team`` that the shield can decide for."""
+
+    def commands(self, actions: Mapping[str, Any]) -> Array:
+        """(n, 2) speed m/s and relative heading deg of the actions; NaN rows for boats without a usable one."""
+
+    def surroundings(self, team: int, keep_out: bool) -> Surroundings:
+        """Field edge, obstacles and (with ``keep_out``) the own flag's circle while the flag is home."""
+
+
+def team_number(team: str | int) -> int:
+    """0 for "blue", 1 for "red".
+
+    Raises:
+        ConfigError: neither.
+    """
+    if team in (0, 1):
+        return int(team)
+    if team not in SIDES:
+        raise ConfigError(f"unknown team {team!r}; choose 'blue' or 'red'")
+    return SIDES[str(team)]
+
+
+def reader_of(env: Any) -> GameReader:
+    """The reader for an environment: ours, or a real Pyquaticus one.
+
+    Raises:
+        ConfigError: neither of the two.
+    """
+    from .mctf import MctfReader
+    from .pyquaticus import PyquaticusReader
+
+    base = getattr(env, "unwrapped", env)
+    if hasattr(base, "core") and hasattr(base, "command_filter"):
+        return MctfReader(base)
+    if hasattr(base, "players") and hasattr(base, "flag_homes"):
+        return PyquaticusReader(base)
+    raise ConfigError(
+        f"cannot read a game from {type(base).__name__}; give an MctfEnv, a Pyquaticus env, or use Shield.decide "
+        "with a Fleet of your own"
+    )
+
+
+def obstacles_of(obstacles: Mapping[str, Any] | None) -> tuple[list[Any], list[Any]]:
+    """Circles (x, y, radius) and polygons from {"circle": [(radius, (x, y))], "polygon": [((x, y), ...)]}."""
+    found = obstacles or {}
+    circles = [(float(c[0]), float(c[1]), float(r)) for r, c in found.get("circle") or ()]
+    polygons = [tuple((float(x), float(y)) for x, y in points) for points in found.get("polygon") or ()]
+    return circles, polygons
+
+
+def no_commands(n: int) -> Array:
+    """Commands nobody gave yet: (n, 2) NaN."""
+    return np.full((n, 2), np.nan)
