@@ -156,6 +156,14 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             self.render()
         return outcome
 
+    def decode(self, actions: Mapping[str, Any]) -> Array:
+        """Commands (n, 2), speed m/s and relative heading deg, of actions of any kind; the game stays as it is.
+
+        Raises:
+            GameError: an unknown agent or an action that is none.
+        """
+        return self._decoder.decode(actions, self.core.state[0])
+
     def state(self) -> np.ndarray:
         """Raw global state vector (n_global,) float32, in the order of ``global_state_normalizer.keys``."""
         return self._info_writer.global_vector().astype(np.float32)
