@@ -82,6 +82,8 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme, margin_px: 
         ("cross", theme.ink, 2, "tagged"),
     )
     for kind, colour, width, text in entries:
+        if x + 32 + font(14).size(text)[0] > surface.get_width() - margin_px:
+            break
         _draw_key(surface, kind, (x + 12, y), colour, width)
         x = draw_text(surface, text, (x + 32, y), theme.muted, 14).right + 26
     scale = f"grid 10 m   ·   {arena.bounds_m[0]:g} × {arena.bounds_m[1]:g} m"

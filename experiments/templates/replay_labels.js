@@ -25,10 +25,35 @@ function freePlace(spot, width, height, reach, taken) {
   return best;
 }
 
+/** Boxes over the flags and along the arrows of changed commands. */
+function marksToKeepClear(game, camera, step, poses) {
+  const boxes = [];
+  for (const team of [0, 1]) {
+    const x = camera.x(game.state("flag_position", 2 * team, step));
+    const y = camera.y(game.state("flag_position", 2 * team + 1, step));
+    boxes.push({ x: x - 4, y: y - 24, w: 22, h: 26 });
+  }
+  poses.forEach((pose, boat) => {
+    if (!game.intervened(boat, step)) return;
+    for (const name of ["wanted", "sent"]) {
+      const turn = game.command(`${name}_heading`, boat, step) * Math.PI / 180;
+      const length = game.command(`${name}_speed`, boat, step) * LOOKAHEAD_S * camera.scale;
+      if (!Number.isFinite(length)) continue;
+      for (let share = 0.1; share < 1.05; share += 0.1) {
+        const x = camera.x(pose.x) + Math.sin(turn) * length * share;
+        const y = camera.y(pose.y) - Math.cos(turn) * length * share;
+        boxes.push({ x: x - 4, y: y - 4, w: 8, h: 8 });
+      }
+    }
+  });
+  return boxes;
+}
+
 function drawLabels(context, game, camera, step, poses, colours, teamColour) {
   const reach = Math.max(game.meta.separation_m / 2 * camera.scale, 11);
   const spots = poses.map((pose) => ({ x: camera.x(pose.x), y: camera.y(pose.y) }));
   const taken = spots.map(({ x, y }) => ({ x: x - reach, y: y - reach, w: 2 * reach, h: 2 * reach }));
+  taken.push(...marksToKeepClear(game, camera, step, poses));
   const changed = spots.map((_, boat) => game.intervened(boat, step));
   const order = [...spots.keys()].sort((a, b) => changed[b] - changed[a]);
   context.textAlign = "center";

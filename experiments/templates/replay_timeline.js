@@ -18,7 +18,7 @@ function drawMarks(context, game, width, height, colours) {
 }
 
 function drawChanges(context, game, width, foot, colours) {
-  const columns = Math.max(1, Math.floor(width)), bars = new Float32Array(columns);
+  const columns = Math.max(1, Math.min(Math.floor(width), game.steps)), bars = new Float32Array(columns);
   for (let step = 0; step < game.steps; step++) {
     const column = Math.min(columns - 1, Math.floor(step / game.steps * columns));
     let changed = 0;
@@ -28,7 +28,7 @@ function drawChanges(context, game, width, foot, colours) {
   context.fillStyle = colours.changed;
   bars.forEach((share, column) => {
     const tall = Math.min(1, share) * (foot - BAND_TOP - 5);
-    if (share > 0) context.fillRect(column, foot - tall, 1, tall);
+    if (share > 0) context.fillRect(column * width / columns, foot - tall, width / columns, tall);
   });
 }
 
