@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from steerclear.env.config import GameConfig
+from steerclear.env.record_file import NOT_COVERED
 from steerclear.env.record_meta import meta_of
 from steerclear.shield.exceptions import TraceError
 
@@ -126,6 +127,8 @@ class Arena:
 
     def reason_text(self, code: int) -> str:
         """Return the text of a reason code, or its number when there is none."""
+        if code == NOT_COVERED:
+            return "no shield"
         known = 0 <= code < len(self.reason_names)
         words = self.reason_names[code].replace("_", " ").lower() if known else f"reason {code}"
         return words.replace("qp", "QP")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pygame
+from steerclear.env.record_file import NOT_COVERED
 from steerclear.env.render.arena import Arena
 from steerclear.env.render.boats import CLOSE_SEPARATIONS, MIN_HULL_PX, command_end
 from steerclear.env.render.canvas import Canvas, font
@@ -63,7 +64,8 @@ def _shield_text(scene: Scene, boat: int, arena: Arena) -> str:
         return ""
     certificate_m = float(scene.overlay.certificate_m[boat])
     margin = f"  {certificate_m:+.1f} m".replace("-", "−") if np.isfinite(certificate_m) else ""
-    return arena.reason_text(int(scene.overlay.reason[boat])) + margin
+    reason = int(scene.overlay.reason[boat])
+    return ("changed" if reason == NOT_COVERED else arena.reason_text(reason)) + margin
 
 
 def _draw_distance(

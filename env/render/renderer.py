@@ -26,7 +26,8 @@ class Renderer:
         width_px: Width of the picture; the height follows from the field.
         theme: "light" or "dark".
         show_commands: Draw wanted and sent commands when ``draw`` is given them.
-        speedup: In a window, how many times faster than real time to go at most.
+        speedup: In a window, how many times faster than real time to go at most; None does not wait. It may be
+            changed at any time.
 
     Raises:
         ConfigError: The mode, the width or the theme cannot be used.
@@ -39,26 +40,41 @@ class Renderer:
         width_px: int = 1280,
         theme: str = "light",
         show_commands: bool = True,
-        speedup: float = 1.0,
+        speedup: float | None = 1.0,
     ) -> None:
         if mode not in MODES:
             raise ConfigError(f"there is no render mode {mode!r}; choose {' or '.join(MODES)}.")
-        if not speedup > 0.0:
-            raise ConfigError(f"speedup is {speedup}; it must be positive.")
+        if speedup is not None and not speedup > 0.0:
+            raise ConfigError(f"speedup is {speedup}; it must be positive, or None to go as fast as can be.")
         self.mode, self.arena = mode, _arena_of(game)
         self.show_commands = show_commands
-        self._picture = Picture(self.arena, width_px, theme)
-        self._frames_per_s = speedup / self.arena.dt_s
+        self._looks = (width_px, theme)
+        self._picture = Picture(self.arena, *self._looks)
+        self.speedup = speedup
+        self.overlay: Overlay | None = None
+        """What `draw` shows when it is given no overlay: whoever sends the commands may leave them here."""
         self._window: Window | None = None
         self._track: deque[np.ndarray] = deque(maxlen=max(2, round(TRAIL_S / self.arena.dt_s)))
         self._last_s = -np.inf
+
+    def describe(self, game: Mapping[str, Any] | Arena) -> None:
+        """Take over what the game's config does not tell: shielded boats, separation, policies, reasons.
+
+        Args:
+            game: A record's ``meta``, see ``meta_of``, or an ``Arena``; of the same field.
+
+        Raises:
+            TraceError: The settings cannot be drawn.
+        """
+        self.arena = _arena_of(game)
+        self._picture = Picture(self.arena, *self._looks)
 
     def draw(self, view: Any, overlay: Overlay | None = None) -> np.ndarray | None:
         """Show a moment; the track behind the boats is made of the moments shown so far.
 
         Args:
             view: A ``GameView``.
-            overlay: Commands of the last step and what the shield made of them.
+            overlay: Commands of the last step and what the shield made of them; None takes ``self.overlay``.
 
         Returns:
             (height, width, 3) uint8 in mode "rgb_array", None in mode "human".
@@ -71,12 +87,13 @@ class Renderer:
         if float(view.time_s) != self._last_s or not self._track:
             self._track.append(np.array(view.state[:, :2], dtype=float))
         self._last_s = float(view.time_s)
-        surface = self._picture.draw(Scene.from_view(view, np.array(self._track), overlay), self.show_commands)
+        scene = Scene.from_view(view, np.array(self._track), overlay or self.overlay)
+        surface = self._picture.draw(scene, self.show_commands)
         if self.mode == "rgb_array":
             return pixels(surface)
         if self._window is None:
             self._window = Window(self._picture.size_px, "steerclear")
-        self._window.show(surface, self._frames_per_s)
+        self._window.show(surface, None if self.speedup is None else self.speedup / self.arena.dt_s)
         return None
 
     def keys(self) -> set[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from steerclear.env.record_file import NOT_COVERED
 from steerclear.env.render.arena import Arena
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
 
@@ -31,6 +32,20 @@ class Overlay:
     reason: np.ndarray
     intervened: np.ndarray
     certificate_m: np.ndarray
+
+    @classmethod
+    def of_commands(cls, wanted: np.ndarray, sent: np.ndarray) -> Overlay:
+        """Show commands of which nothing but the values is known; those that differ count as changed.
+
+        Args:
+            wanted: (n, 2) speed m/s and absolute heading deg asked for.
+            sent: (n, 2) likewise, what the boats were told.
+
+        Returns:
+            The overlay, without reasons and certificates.
+        """
+        changed = np.any(np.not_equal(wanted, sent), axis=1)
+        return cls(wanted, sent, np.full(len(changed), NOT_COVERED), changed, np.full(len(changed), np.nan))
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,17 @@ class Window:
         self.closed = False
         """Whether the user has closed the window."""
 
-    def show(self, surface: pygame.Surface, frames_per_s: float) -> None:
-        """Show a picture, answer the window system, and wait so that frames come no faster than asked."""
+    def show(self, surface: pygame.Surface, frames_per_s: float | None) -> None:
+        """Show a picture, answer the window system, and wait so that frames come no faster than asked.
+
+        Args:
+            surface: The picture.
+            frames_per_s: Most pictures per second; None does not wait.
+        """
         self._screen.blit(surface, (0, 0))
         pygame.display.flip()
         self.pump()
-        self._clock.tick(frames_per_s)
+        self._clock.tick(frames_per_s or 0)
 
     def pump(self) -> None:
         """Take in what the window system and the keyboard have to say."""

@@ -1,5 +1,7 @@
 // Unpacking the games that are embedded in this file. The writer (replay_data.py) describes the format.
 
+const NOT_COVERED = 6;  // reason code of a boat for which no shield decided
+
 /** Bytes of a base64 text, inflated when they were deflated. */
 async function unpack(text, deflated) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -100,6 +102,7 @@ class Game {
 
   reasonText(code) {
     const name = this.meta.reason_names[code];
+    if (code === NOT_COVERED) return "no shield";
     return (name === undefined ? "reason " + code : name.replaceAll("_", " ").toLowerCase()).replace("qp", "QP");
   }
 

@@ -10,6 +10,7 @@ from PIL import Image
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import read_meta
+from steerclear.env.record_meta import meta_of
 from steerclear.env.render import THEMES, Arena, Overlay, Picture, Renderer, Scene, save_animation, save_frame
 from steerclear.env.render.picture import pixels
 from steerclear.env.render.renderer import MODES
@@ -155,6 +156,45 @@ def test_a_live_overlay_is_drawn(game):
     changed = np.arange(6) == 0
     overlay = Overlay(wanted, sent, np.where(changed, 1, 6), changed, np.full(6, np.nan))
     assert np.any(renderer.draw(game.view(), overlay) != renderer.draw(game.view()))
+
+
+def test_an_overlay_left_with_the_renderer_is_drawn_until_another_is_given(game):
+    renderer = Renderer(game.config, width_px=WIDTH_PX)
+    plain = renderer.draw(game.view())
+    wanted = np.tile([2.0, 90.0], (6, 1))
+    sent = np.where(np.arange(6)[:, None] == 1, [1.0, 0.0], wanted)
+    overlay = Overlay.of_commands(wanted, sent)
+    assert overlay.intervened.tolist() == [False, True, False, False, False, False]
+    renderer.overlay = overlay
+    left = renderer.draw(game.view())
+    assert np.any(left != plain)
+    np.testing.assert_array_equal(left, renderer.draw(game.view(), overlay))
+
+
+def test_a_command_that_is_not_finite_counts_as_changed():
+    wanted, sent = np.array([[np.nan, 0.0], [1.0, 0.0]]), np.array([[0.0, 0.0], [1.0, 0.0]])
+    assert Overlay.of_commands(wanted, sent).intervened.tolist() == [True, False]
+
+
+def test_the_renderer_takes_over_what_the_config_does_not_tell(game):
+    renderer = Renderer(game.config, width_px=WIDTH_PX)
+    plain = renderer.draw(game.view())
+    renderer.describe(meta_of(game.config, policies={"blue": "medium"}, shielded=["agent_0"], separation_m=6.0))
+    told = renderer.draw(game.view())
+    assert renderer.arena.separation_m == 6.0
+    assert np.any(told[:60] != plain[:60])
+    assert np.any(told[60:] != plain[60:])
+
+
+def test_reasons_are_told_in_words(game_meta):
+    arena = Arena.from_meta(game_meta)
+    assert [arena.reason_text(code) for code in (1, 2, 4, 6, 9)] == [
+        "QP",
+        "QP relaxed",
+        "best effort",
+        "no shield",
+        "reason 9",
+    ]
 
 
 def test_obstacles_and_a_slanted_line_between_the_halves_are_drawn(game_record):
