@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from steerclear.env.actions import ActionDecoder, action_kinds
-from steerclear.env.field import field_points
 from steerclear.shield.exceptions import GameError, PolicyError
 
 from .scripted.team import game_core
@@ -30,13 +28,9 @@ class ActionReader:
     """
 
     def __init__(self, env: Any) -> None:
-        core = game_core(env)
-        kinds = getattr(getattr(env, "unwrapped", env), "action_kinds", None)
-        self._core = core
-        self._kinds = kinds if kinds is not None else action_kinds(core.config, "discrete")
-        self._numbers = {agent_id: i for i, agent_id in enumerate(core.config.agent_ids)}
-        points = field_points(core.field.size)
-        self._decoder = ActionDecoder(core.config, self._kinds, core.max_speed_mps, points, core.field.size)
+        self._core = game_core(env)
+        self._game = getattr(env, "unwrapped", env)
+        self._numbers = {agent_id: i for i, agent_id in enumerate(self._core.config.agent_ids)}
 
     def command(self, agent_id: str, action: Any) -> tuple[float, float]:
         """Speed m/s and relative heading deg an action asks for, from where the boat is now.
@@ -58,6 +52,8 @@ class ActionReader:
         """What is wrong with an action, as (kind, explanation); None when it can be used."""
         if action is None:
             return "no answer", "compute_action returned None; return an action"
+        if isinstance(action, (np.ndarray, np.generic)) and np.iscomplexobj(action):
+            return "no action", f"{_short(action)} has complex numbers"
         numeric = _as_numbers(action)
         if numeric is not None and not np.isfinite(numeric).all():
             return "not finite", f"{_short(action)} is not finite"
@@ -70,8 +66,7 @@ class ActionReader:
         return self._too_large(agent_id, row)
 
     def _decode(self, agent_id: str, action: Any) -> np.ndarray:
-        row = self._decoder.decode({agent_id: action}, self._core.state[0])
-        return row[self._numbers[agent_id]]
+        return self._game.decode({agent_id: action})[self._numbers[agent_id]]
 
     def _too_large(self, agent_id: str, row: np.ndarray) -> tuple[str, str] | None:
         limit_mps = MAX_SPEED_FACTOR * float(self._core.max_speed_mps[self._numbers[agent_id]])

@@ -15,7 +15,18 @@ from .keyboard import KeyboardTeam, Keys
 from .protocol import BatchPolicy, TeamPolicy
 from .scripted.batch import ScriptedBatch
 from .scripted.layout import Behaviour
-from .scripted.plan import Plan, by_name, checked_fraction, checked_points, everyone, hidden, in_roles
+from .scripted.plan import (
+    MEDIUM_REACH_M,
+    Plan,
+    by_name,
+    checked_fraction,
+    checked_points,
+    checked_reach,
+    composition_of,
+    everyone,
+    hidden,
+    in_roles,
+)
 from .scripted.team import ScriptedTeam
 
 Roles = str | Sequence[str] | None
@@ -37,8 +48,12 @@ def _easy(roles: Roles = None) -> Plan:
     return Plan(in_roles(Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND, roles))
 
 
-def _medium(roles: Roles = None) -> Plan:
-    return Plan(in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles))
+def _medium(roles: Roles = None, reach_m: float = MEDIUM_REACH_M) -> Plan:
+    return Plan(in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles), reach_m=checked_reach(reach_m))
+
+
+def _medium_attack(reach_m: float = MEDIUM_REACH_M) -> Plan:
+    return Plan(everyone(Behaviour.MEDIUM_ATTACK), reach_m=checked_reach(reach_m))
 
 
 def _hard(roles: Roles = None) -> Plan:
@@ -72,11 +87,13 @@ def _mixed(boats: str | Sequence[str] = "medium_attack") -> Plan:
 
 
 ENTRIES: dict[str, Entry] = {
-    "easy": Entry("organisers' easy team: fixed paths, two attackers and a defender (roles=...)", _easy),
+    "easy": Entry("organisers' easy team: fixed paths, two attack, one defends (roles=...)", _easy),
     "easy_attack": Entry("every boat loops own base, their flag, own base", _single(Behaviour.EASY_ATTACK)),
     "easy_defend": Entry("every boat patrols in front of its base", _single(Behaviour.EASY_DEFEND)),
-    "medium": Entry("organisers' medium team: potential fields, two attackers and a defender (roles=...)", _medium),
-    "medium_attack": Entry("every boat goes for the flag, pushed off opponents", _single(Behaviour.MEDIUM_ATTACK)),
+    "medium": Entry(
+        "organisers' medium team: potential fields, two attack, one defends (roles=..., reach_m=...)", _medium
+    ),
+    "medium_attack": Entry("every boat goes for the flag, pushed off opponents (reach_m=...)", _medium_attack),
     "medium_defend": Entry("every boat chases intruders in its half", _single(Behaviour.MEDIUM_DEFEND)),
     "hidden": Entry(
         "organisers' hidden team: medium; defends, attacks or is mixed, by seed (composition=...)", _hidden
@@ -93,6 +110,7 @@ ENTRIES: dict[str, Entry] = {
 """The scripted policies; "keyboard" is the one named policy that is not scripted."""
 
 KEYBOARD = "keyboard"
+HIDDEN = "hidden"
 SB3_PREFIX = "sb3:"
 KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..., others='medium')"
 
@@ -107,17 +125,21 @@ def describe() -> dict[str, str]:
     return {name: entry.description for name, entry in ENTRIES.items()} | {KEYBOARD: KEYBOARD_DESCRIPTION}
 
 
-def make(name_or_path: str | Path, **options: Any) -> TeamPolicy:
+def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> TeamPolicy:
     """A team policy by name or from a file.
 
     Args:
         name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; or ``sb3:PATH.zip``.
+        game: number of the game in its series: which of its teams the hidden opponent fields; without it the seed
+            decides. No other policy looks at it.
         **options: the policy's own options, see `describe`.
 
     Raises:
         PolicyError: an unknown name or option (the message names near matches), or a file that cannot be loaded.
     """
     text = str(name_or_path)
+    if text == HIDDEN and game is not None and options.get("composition") is None:
+        options["composition"] = composition_of(game)
     if text in ENTRIES:
         return ScriptedTeam(text, _plan(text, options))
     if text == KEYBOARD:

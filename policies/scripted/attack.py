@@ -11,7 +11,6 @@ from .geometry import bearing_deg, boat_to_boat, is_turned, own_end_point, to_bo
 from .layout import GOAL, HEIGHT, MAX_SPEED, WIDTH, Game
 from .paths import follow
 
-MEDIUM_REACH_M = 60.0
 HARD_REACH_M = 30.0
 WALL_REACH_M = 10.0
 GOAL_WEIGHT = 1.25

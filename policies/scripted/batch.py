@@ -104,6 +104,7 @@ def _field_row(core: BatchedMctf, plan: Plan) -> Array:
     row[S.STEP] = core.config.dt_s
     row[S.SPEED_FRACTION] = plan.speed_fraction
     row[S.HIT_TEAM_MATES] = float(plan.target_team_mates)
+    row[S.MEDIUM_REACH] = plan.reach_m
     return row
 
 

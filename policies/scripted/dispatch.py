@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 
-from .attack import HARD_REACH_M, MEDIUM_REACH_M, easy_attack, field_attack
+from .attack import HARD_REACH_M, easy_attack, field_attack
 from .defend import hard, hard_defend, medium_defend
-from .layout import Behaviour, Game
+from .layout import MEDIUM_REACH, Behaviour, Game
 from .paths import easy_defend, random_walk, waypoints
 from .ram import ram
 
@@ -25,7 +25,7 @@ def command_boat(
 ) -> tuple[float, float]:
     """Speed m/s and relative heading deg of one boat under its behaviour; advances its memory and stream."""
     if behaviour == MEDIUM_ATTACK:
-        return field_attack(game, boat, MEDIUM_REACH_M, False)
+        return field_attack(game, boat, game.field[MEDIUM_REACH], False)
     if behaviour == MEDIUM_DEFEND:
         return medium_defend(game, boat)
     if behaviour == EASY_ATTACK:

@@ -54,7 +54,9 @@ SPEED_FRACTION = 4
 """Share of its top speed a rammer or waypoint boat asks for."""
 HIT_TEAM_MATES = 5
 """1 when a rammer also aims at boats of its own team."""
-N_FIELD = 6
+MEDIUM_REACH = 6
+"""Distance within which opponents push a medium attacker off, m."""
+N_FIELD = 7
 
 # --- columns of a boat's limits --------------------------------------------------------------------
 MAX_SPEED = 0

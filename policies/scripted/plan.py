@@ -15,6 +15,7 @@ from .layout import Behaviour
 Cast = Callable[[int, int], Sequence[Behaviour]]
 """``cast(team_size, seed) -> behaviours``, one per boat."""
 
+MEDIUM_REACH_M = 60.0
 ROLES = ("attack", "defend")
 COMPOSITIONS = ("defend", "attack", "mixed")
 """The hidden opponent's teams, in the order in which consecutive seeds meet them."""
@@ -29,12 +30,14 @@ class Plan:
         points: waypoints in m, (k, 2) for all boats or (n_team, k, 2) per boat; None for random ones.
         speed_fraction: share of top speed that rammers and waypoint boats ask for.
         target_team_mates: rammers aim at boats of their own team too.
+        reach_m: opponents within this distance push a medium attacker off, m.
     """
 
     cast: Cast
     points: Array | None = None
     speed_fraction: float = 1.0
     target_team_mates: bool = False
+    reach_m: float = MEDIUM_REACH_M
 
 
 def everyone(behaviour: Behaviour) -> Cast:
@@ -88,11 +91,22 @@ def hidden(composition: str | int | None) -> Cast:
     fixed = composition
 
     def cast(team_size: int, seed: int) -> Sequence[Behaviour]:
-        chosen = COMPOSITIONS[seed % len(COMPOSITIONS)] if fixed is None else fixed
+        chosen = composition_of(seed) if fixed is None else fixed
         roles = None if chosen == "mixed" else chosen
         return in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles)(team_size, seed)
 
     return cast
+
+
+def composition_of(game: int) -> str:
+    """The hidden opponent's team in a game of a series.
+
+    Raises:
+        PolicyError: not a whole number from 0.
+    """
+    if isinstance(game, bool) or not isinstance(game, (int, np.integer)) or game < 0:
+        raise PolicyError(f"game is {game!r}; give the number of the game, from 0")
+    return COMPOSITIONS[int(game) % len(COMPOSITIONS)]
 
 
 def default_roles(team_size: int) -> list[str]:
@@ -140,6 +154,17 @@ def checked_points(points: Any) -> Array | None:
     if array.ndim not in (2, 3) or array.shape[-1] != 2 or array.size == 0 or not np.isfinite(array).all():
         raise PolicyError(f"points have shape {array.shape}; give finite (x, y) in m: (k, 2) or (boats, k, 2)")
     return array
+
+
+def checked_reach(reach_m: Any) -> float:
+    """A distance above 0, m.
+
+    Raises:
+        PolicyError: anything else.
+    """
+    if isinstance(reach_m, bool) or not isinstance(reach_m, (int, float)) or not 0 < reach_m < np.inf:
+        raise PolicyError(f"reach_m is {reach_m!r}; give a distance in m above 0")
+    return float(reach_m)
 
 
 def checked_fraction(speed_fraction: Any) -> float:

@@ -68,7 +68,8 @@ class Sandbox:
                 self._own[name] = module
 
     def _is_own(self, module: Any) -> bool:
-        places = [getattr(module, "__file__", None), *(getattr(module, "__path__", None) or ())]
+        known = getattr(module, "__dict__", {})  # not getattr: some modules make up any attribute
+        places = [known.get("__file__"), *(known.get("__path__") or ())]
         return any(self._contains(place) for place in places if isinstance(place, str))
 
     def _contains(self, place: str) -> bool:

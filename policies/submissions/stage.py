@@ -9,6 +9,7 @@ import stat
 import tempfile
 import weakref
 import zipfile
+import zlib
 from pathlib import Path, PurePosixPath
 
 from steerclear.shield.exceptions import PolicyError
@@ -104,7 +105,7 @@ def unpack(archive: Path, top: Path, max_bytes: int) -> None:
             for member in members:
                 if not member.is_dir():
                     _write(opened, member, top)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error) as error:
         raise PolicyError(f"{archive} cannot be unpacked: {error}; zip the folder with {ENTRY_FILE} again") from error
 
 
@@ -125,6 +126,8 @@ def check_members(archive: Path, members: list[zipfile.ZipInfo], max_bytes: int)
             raise PolicyError(f"{archive}: {member.filename!r} is a link or a device; zip plain files only")
         if not is_inside(member.filename):
             raise PolicyError(f"{archive}: {member.filename!r} would land outside its folder; zip relative paths only")
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise PolicyError(f"{archive}: {member.filename!r} is packed in an unusual way; zip it with plain deflate")
         if member.flag_bits & 1:
             raise PolicyError(f"{archive}: {member.filename!r} is encrypted; zip without a password")
 

@@ -1,0 +1,113 @@
+import importlib
+import json
+import zipfile
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.spaces import Box, Discrete
+from steerclear import policies
+from steerclear.policies.sb3 import saved_algorithm
+from steerclear.shield.exceptions import PolicyError
+
+OWN = ["agent_0", "agent_1"]
+
+
+class Shaped(gymnasium.Env):
+    """An environment that only has spaces."""
+
+    def __init__(self, observation_space, action_space):
+        self.observation_space, self.action_space = observation_space, action_space
+
+    def reset(self, *, seed=None, options=None):
+        return self.observation_space.sample(), {}
+
+    def step(self, action):
+        return self.observation_space.sample(), 0.0, True, False, {}
+
+
+@pytest.fixture
+def save(game, tmp_path):
+    """Saves an untrained model; answers its path."""
+    library = pytest.importorskip("stable_baselines3")
+
+    def save_model(algorithm, action_space, n_obs=None):
+        observations = Box(-1.0, 1.0, (n_obs or game[0].core.n_obs,), np.float32)
+        options = {"policy_kwargs": {"net_arch": [4]}, "seed": 0, "device": "cpu"}
+        options |= {"n_steps": 8, "batch_size": 8} if algorithm == "PPO" else {}
+        model = getattr(library, algorithm)("MlpPolicy", Shaped(observations, action_space), **options)
+        model.save(tmp_path / algorithm)
+        return tmp_path / f"{algorithm}.zip", model
+
+    return save_model
+
+
+def play(path, game):
+    env, observations, infos = game
+    team = policies.make(f"sb3:{path}")
+    team.reset(env, OWN, 0)
+    actions = team.act(observations, infos)
+    assert not team.report().failures
+    return actions
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "DQN"])
+def test_a_discrete_model_sends_numbers(game, save, algorithm):
+    path, model = save(algorithm, Discrete(17))
+    for agent_id, action in play(path, game).items():
+        assert type(action) is int
+        assert action == int(model.predict(game[1][agent_id], deterministic=True)[0])
+
+
+def test_a_box_model_sends_speed_and_heading(game, save):
+    path, model = save("A2C", Box(np.float32([0.0, -180.0]), np.float32([2.0, 180.0])))
+    for agent_id, action in play(path, game).items():
+        np.testing.assert_array_equal(action, model.predict(game[1][agent_id], deterministic=True)[0])
+
+
+def test_a_unit_box_model_is_scaled(game, save):
+    path, model = save("SAC", Box(-1.0, 1.0, (2,), np.float32))
+    for agent_id, action in play(path, game).items():
+        answer = model.predict(game[1][agent_id], deterministic=True)[0].astype(float)
+        assert action == pytest.approx((answer[0] + 1.0, 180.0 * answer[1]))
+
+
+def test_a_model_of_another_game_is_refused(game, save):
+    path, _ = save("PPO", Discrete(17), n_obs=7)
+    with pytest.raises(PolicyError, match=r"takes observations \(7,\)"):
+        play(path, game)
+
+
+def test_a_missing_extra_is_named(tmp_path, monkeypatch):
+    path = tmp_path / "model.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("data", json.dumps({"clip_range": 1}))
+
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(importlib, "import_module", missing)
+    with pytest.raises(PolicyError, match=r"steerclear\[train\]"):
+        policies.make(f"sb3:{path}")
+
+
+def test_files_that_are_no_model_are_refused(tmp_path):
+    with pytest.raises(PolicyError, match="no model at"):
+        policies.make("sb3:nothing.zip")
+    wrong = tmp_path / "wrong.zip"
+    wrong.write_bytes(b"x")
+    with pytest.raises(PolicyError, match="not a Stable-Baselines3 model"):
+        policies.make(f"sb3:{wrong}")
+    with pytest.raises(PolicyError, match="unknown algorithm 'PPP'"):
+        policies.make(f"sb3:{wrong}", algorithm="PPP")
+
+
+@pytest.mark.parametrize(
+    ("mark", "algorithm"),
+    [("clip_range", "PPO"), ("exploration_fraction", "DQN"), ("target_entropy", "SAC"), ("gae_lambda", "A2C")],
+)
+def test_the_algorithm_is_told_from_the_file(tmp_path, mark, algorithm):
+    path = tmp_path / "model.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("data", json.dumps({mark: 1}))
+    assert saved_algorithm(path) == algorithm

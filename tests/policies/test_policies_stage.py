@@ -1,0 +1,141 @@
+import stat
+import zipfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from steerclear.policies.submissions.stage import MAX_FILES, Stage, check_members, is_inside
+from steerclear.shield.exceptions import PolicyError
+
+SOLUTION = "class solution:\n    def compute_action(self, *args):\n        return 4\n"
+
+
+def pack(path, **files):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+    return path
+
+
+def staged(source, **options):
+    stage = Stage(source, **options)
+    try:
+        return {path.name: path.read_text() for path in stage.folder.iterdir() if path.is_file()}
+    finally:
+        stage.close()
+
+
+def test_a_zip_is_unpacked_and_removed(tmp_path):
+    source = pack(tmp_path / "entry.zip", **{"solution.py": SOLUTION, "nets/a.txt": "a"})
+    stage = Stage(source)
+    assert (stage.folder / "nets" / "a.txt").read_text() == "a"
+    assert (stage.folder / "working_dir" / "solution.py").read_text() == SOLUTION
+    stage.close()
+    assert not stage.folder.exists()
+    stage.close()
+
+
+def test_a_stage_nobody_holds_is_removed(tmp_path):
+    stage = Stage(pack(tmp_path / "entry.zip", **{"solution.py": SOLUTION}))
+    folder = stage.folder
+    del stage
+    assert not folder.exists()
+
+
+def test_the_entry_may_lie_in_the_only_folder_of_a_zip(tmp_path):
+    assert "solution.py" in staged(pack(tmp_path / "a.zip", **{"team/solution.py": SOLUTION, "team/b.txt": "b"}))
+    with pytest.raises(PolicyError, match="several: one, two"):
+        staged(pack(tmp_path / "b.zip", **{"one/solution.py": SOLUTION, "two/solution.py": SOLUTION}))
+    with pytest.raises(PolicyError, match="none there"):
+        staged(pack(tmp_path / "c.zip", **{"agent.py": SOLUTION}))
+
+
+def test_a_folder_is_linked_and_left_as_it_was(write_entry):
+    folder = write_entry(SOLUTION, **{"weights.txt": "w"})
+    stage = Stage(folder / "solution.py")
+    assert (stage.folder / "weights.txt").read_text() == "w"
+    (stage.folder / "log.txt").write_text("x")
+    stage.close()
+    assert sorted(path.name for path in folder.iterdir()) == ["solution.py", "weights.txt"]
+    assert (folder / "weights.txt").read_text() == "w"
+
+
+@pytest.mark.parametrize(
+    "name", ["../evil.txt", "a/../../evil.txt", "/evil.txt", "..\\evil.txt", "C:\\evil.txt", "C:evil.txt", "..", "a\0b"]
+)
+def test_a_zip_that_reaches_outside_is_refused_whole(tmp_path, name):
+    info = zipfile.ZipInfo("placeholder")
+    info.filename = name  # the constructor would clean it
+    with pytest.raises(PolicyError, match="outside its folder"):
+        check_members(tmp_path, [zipfile.ZipInfo("solution.py"), info], 10**9)
+
+
+def test_path_traversal_end_to_end(tmp_path):
+    source = pack(tmp_path / "evil.zip", **{"solution.py": SOLUTION, "../../evil.txt": "evil"})
+    with pytest.raises(PolicyError, match="outside its folder"):
+        Stage(source)
+    assert not list(Path(tmp_path).parent.rglob("evil.txt"))
+
+
+@given(st.lists(st.sampled_from(["..", ".", "a", "b.py", "", "/", "\\", ":"]), min_size=1, max_size=6))
+def test_names_taken_to_be_inside_are_inside(parts):
+    name = "/".join(parts)
+    if is_inside(name):
+        top = Path("/top")
+        assert (top / name).resolve().is_relative_to(top)
+
+
+def test_links_are_refused(tmp_path):
+    source = tmp_path / "link.zip"
+    link = zipfile.ZipInfo("passwords")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    with zipfile.ZipFile(source, "w") as archive:
+        archive.writestr("solution.py", SOLUTION)
+        archive.writestr(link, "/etc/passwd")
+    with pytest.raises(PolicyError, match="'passwords' is a link"):
+        Stage(source)
+
+
+def test_the_unpacked_size_is_bounded(tmp_path):
+    source = pack(tmp_path / "bomb.zip", **{"solution.py": SOLUTION, "zeros.bin": "0" * 1_000_000})
+    assert source.stat().st_size < 5000
+    with pytest.raises(PolicyError, match="more than 100000"):
+        Stage(source, max_bytes=100_000)
+    assert len(staged(source, max_bytes=2_000_000)["zeros.bin"]) == 1_000_000
+
+
+def test_the_number_of_files_is_bounded(tmp_path):
+    members = [zipfile.ZipInfo(f"{k}") for k in range(MAX_FILES + 1)]
+    with pytest.raises(PolicyError, match="leave out"):
+        check_members(tmp_path, members, 10**9)
+
+
+def test_an_encrypted_zip_is_refused(tmp_path):
+    member = zipfile.ZipInfo("solution.py")
+    member.flag_bits |= 1
+    with pytest.raises(PolicyError, match="without a password"):
+        check_members(tmp_path, [member], 10**9)
+
+
+def test_unusual_compression_is_refused(tmp_path):
+    member = zipfile.ZipInfo("solution.py")
+    member.compress_type = zipfile.ZIP_LZMA
+    with pytest.raises(PolicyError, match="plain deflate"):
+        check_members(tmp_path, [member], 10**9)
+
+
+def test_broken_zips_are_one_clear_error(tmp_path):
+    good = pack(tmp_path / "good.zip", **{"solution.py": SOLUTION * 50}).read_bytes()
+    spoiled = bytearray(good)
+    spoiled[60:70] = bytes(10)
+    for content in (b"", b"not a zip", good[: len(good) // 2], bytes(spoiled)):
+        source = tmp_path / "broken.zip"
+        source.write_bytes(content)
+        with pytest.raises(PolicyError, match="cannot be unpacked"):
+            Stage(source)
+
+
+def test_what_is_not_there_is_reported(tmp_path):
+    with pytest.raises(PolicyError, match="no submission at"):
+        Stage(tmp_path / "nothing.zip")
