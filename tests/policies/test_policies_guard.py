@@ -4,6 +4,7 @@ import time
 import numpy as np
 import pytest
 from steerclear import policies
+from steerclear.env.mctf import MctfEnv
 from steerclear.policies.guard import describe_error
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import PolicyError
@@ -227,6 +228,23 @@ def test_a_human_alone(game):
     team = policies.make(KEYBOARD, keys=lambda: {"up"})
     team.reset(env, ["agent_4"], 0)
     assert team.act(observations, infos) == {"agent_4": (2.0, 0.0)}
+
+
+class Windowed(MctfEnv):
+    """A game with a made-up window."""
+
+    renderer = None
+
+
+def test_keys_come_from_the_games_window_once_there_is_one():
+    env = Windowed("aamas2024")
+    observations, infos = env.reset(seed=1)
+    env.render_mode = "human"
+    team = policies.make(KEYBOARD, others="hold")
+    team.reset(env, ["agent_0", "agent_1"], 0)
+    assert team.act(observations, infos)["agent_0"] == (0.0, 0.0)
+    env.renderer = type("Renderer", (), {"keys": lambda self: {"up"}})()
+    assert team.act(observations, infos) == {"agent_0": (2.0, 0.0), "agent_1": (0.0, 0.0)}
 
 
 def test_the_keyboard_needs_a_window_and_a_boat_of_its_team(game):

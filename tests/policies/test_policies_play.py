@@ -1,3 +1,6 @@
+import math
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,8 +10,10 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.registry import ENTRIES
+from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.wrappers import ShieldedParallelEnv
 
 PRESETS = ("aamas2024", "mctf2025")
 SCRIPTED = tuple(ENTRIES)
@@ -241,3 +246,24 @@ def test_part_of_a_team_keeps_its_roles(game):
     team.reset(env, ["agent_5", "agent_3"], 0)
     assert [behaviour.name for behaviour in team.behaviours.values()] == ["MEDIUM_DEFEND", "MEDIUM_ATTACK"]
     assert list(team.act({}, {})) == ["agent_5", "agent_3"]
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_a_team_decides_in_less_than_60_us(name, game):
+    env, observations, infos = game
+    team = policies.make(name)
+    team.reset(env, env.possible_agents[:3], 0)
+    best = math.inf
+    for _ in range(200):
+        started = time.perf_counter()
+        team.act(observations, infos)
+        best = min(best, time.perf_counter() - started)
+    assert best < 60e-6
+
+
+def test_plays_in_a_shielded_env():
+    env = ShieldedParallelEnv(MctfEnv("aamas2024"), Shield(ShieldConfig()))
+    observations, infos = env.reset(seed=1)
+    for team in (policies.make("medium"), policies.from_callable(lambda obs: "CC")):
+        team.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
+        observations, *_, infos = env.step(team.act(observations, infos))
