@@ -14,7 +14,7 @@ import numpy as np
 from .active_set import OPTIMAL, project
 from .certificates.assign import assign_plans
 from .certificates.clearance import MARGIN
-from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, mark_near
+from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, look_around
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
@@ -30,6 +30,9 @@ ROUNDS = 3
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
+
+CLEARLY = 1e-2
+"""Difference of merit that counts when an answer of the program is weighed against an escape."""
 
 SLACK_COST = np.array([1e4, 1e2])
 """Weight of the squared slack of boat rows and of fixed-thing rows when they cannot all hold."""
@@ -113,7 +116,7 @@ def screen(
     An unusable (non-finite) command is replaced by holding course at zero speed before the check.
     """
     n = state.shape[0]
-    mark_near(state, margin_m, boats, tuning, work.near)
+    look_around(state, margin_m, boats, tuning, work)
     set_targets(ours, tuning, memory, work)
     for i in range(n):
         plan.commands[i] = wanted[i]
@@ -128,7 +131,7 @@ def screen(
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     plan.kept_commands[:] = plan.commands
-    return assign_plans(plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work)
+    return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
 
 
 @kernel
@@ -154,7 +157,6 @@ def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
 def build(
     count: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -181,7 +183,6 @@ def build(
         movers,
         plan.place,
         state,
-        margin_m,
         ours,
         boats,
         fixed,
@@ -238,7 +239,6 @@ def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning
 def check(
     count: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -251,7 +251,7 @@ def check(
     """Exact re-check of candidate commands: full model one step on, then an escape for everybody."""
     for m in range(count):
         predict(plan.movers[m], plan.commands, state, boats, tuning, work)
-    return assign_plans(plan.commands, 1, False, ours, state, margin_m, ours, boats, fixed, plans, tuning, memory, work)
+    return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
 
 
 @kernel
@@ -291,7 +291,6 @@ def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, p
 def ladder(
     count: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -311,12 +310,10 @@ def ladder(
     before = worst_merit(ours, work)
     for m in range(count):
         work.target[plan.movers[m]] = 0.0
-    good = assign_plans(
-        plan.commands, 0, True, plan.moving, state, margin_m, ours, boats, fixed, plans, tuning, memory, work
-    )
+    good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
     after = worst_merit(ours, work)
-    if not good and before >= after:
-        check(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+    if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
+        check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
         mark_answer(count, QP_RELAXED, plan)
         return
     for m in range(count):
@@ -349,7 +346,6 @@ def finish(
     safe: bool,
     count: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -364,7 +360,7 @@ def finish(
         mark_answer(count, QP, plan)
     else:
         count = pick_movers(ours, work, plan)
-        ladder(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+        ladder(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
     commit(state, ours, memory, work, plan)
 
 
@@ -401,10 +397,10 @@ def decide_compiled(
         if safe:
             break
         count = pick_movers(ours, work, plan)
-        rows = build(count, state, margin_m, ours, boats, fixed, tuning, work, plan)
+        rows = build(count, state, ours, boats, fixed, tuning, work, plan)
         if rows < 0 or not solve_compiled(count, rows, plan):
             break
         if not take_answer(plan.z, count, state, boats, tuning, plan):
             break
-        safe = check(count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
-    finish(safe, count, state, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+        safe = check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+    finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)

@@ -138,7 +138,6 @@ def _pair_row(
     m: int,
     place: IntArray,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     tuning: Tuning,
@@ -150,11 +149,10 @@ def _pair_row(
     r: int,
 ) -> bool:
     """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
-    clear_of_boat(i, j, work.path[i], state, margin_m, ours, boats, tuning, work, -FAR)
-    radius = tuning.radius_m + margin_m[i] + margin_m[j]
-    if hunts(i, j, ours, boats) and work.out[MARGIN] > -radius:
+    clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR)
+    if hunts(i, j, ours, boats) and not work.breach[i, j]:
         work.spare2[:] = work.out
-        clear_of_hunter(i, j, work.path[i], state, boats, tuning, radius, -FAR, work.spare, work.out)
+        clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR)
         if work.out[MARGIN] > work.spare2[MARGIN]:
             work.out[:] = work.spare2
     k, nx, ny = int(work.out[SAMPLE]), work.out[NORMAL_X], work.out[NORMAL_Y]
@@ -200,7 +198,6 @@ def build_rows(
     movers: IntArray,
     place: IntArray,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -226,7 +223,7 @@ def build_rows(
                 continue
             if r + 1 + 4 * movers.shape[0] + 1 > C.shape[0]:
                 return -1
-            if _pair_row(i, j, m, place, state, margin_m, ours, boats, tuning, work, gain, z_now, C, d, r):
+            if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
         clear_of_surroundings(

@@ -57,6 +57,7 @@ class Tuning(NamedTuple):
     Attributes:
         dt_s: step of decision and model, s.
         radius_m: separation radius with buffer, m.
+        buffer_m: the buffer in it, m.
         tail_s: how long straight runs are continued beyond the horizon, s.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         decay: factor by which a margin may shrink in one step; 0 lets it fall to 0 at once.
@@ -66,6 +67,7 @@ class Tuning(NamedTuple):
 
     dt_s: float
     radius_m: float
+    buffer_m: float
     tail_s: float
     hysteresis_m: float
     decay: float
@@ -108,6 +110,9 @@ class Work(NamedTuple):
         target: (n,) margin the boat must keep, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
+        breach: (n, n) pairs inside the separation.
+        radius: (n, n) radius to keep, m.
+        course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
     """
 
     next_state: Array
@@ -123,6 +128,9 @@ class Work(NamedTuple):
     target: Array
     bound: IntArray
     near: BoolArray
+    breach: BoolArray
+    radius: Array
+    course: Array
 
 
 def new_memory(*shape: int) -> Memory:
@@ -147,4 +155,7 @@ def new_work(boats: int, samples: int) -> Work:
         target=np.zeros(boats),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
+        breach=np.zeros((boats, boats), np.bool_),
+        radius=np.zeros((boats, boats)),
+        course=np.zeros((boats, 4)),
     )

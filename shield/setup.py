@@ -25,6 +25,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
     return Tuning(
         dt_s=config.dt_s,
         radius_m=config.separation_m + config.buffer_m,
+        buffer_m=config.buffer_m,
         tail_s=config.tail_s,
         hysteresis_m=config.hysteresis_m,
         decay=decay,

@@ -146,21 +146,20 @@ class Shield:
         self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, fixed: Fixed
     ) -> None:
         """The stages of `flow` with the QP backend in between."""
+        tuning, plans = self._tuning, self._plans
         memory, work, plan = seat.memory, seat.work, seat.plan
-        scene = (state, margin, ours, boats, fixed)
-        rest = (self._plans, self._tuning, memory, work, plan)
-        safe = flow.screen(state, wanted, margin, ours, boats, fixed, *rest)
+        safe = flow.screen(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
         count = 0
         for _ in range(flow.ROUNDS):
             if safe:
                 break
             count = flow.pick_movers(ours, work, plan)
-            rows = flow.build(count, *scene, self._tuning, work, plan)
+            rows = flow.build(count, state, ours, boats, fixed, tuning, work, plan)
             z = self._solve(count, rows, plan) if rows >= 0 else None
-            if z is None or not flow.take_answer(z, count, state, boats, self._tuning, plan):
+            if z is None or not flow.take_answer(z, count, state, boats, tuning, plan):
                 break
-            safe = flow.check(count, *scene, *rest)
-        flow.finish(safe, count, *scene, *rest)
+            safe = flow.check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        flow.finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
         """Answer of the program, relaxed with slack when it has none."""

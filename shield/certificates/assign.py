@@ -39,7 +39,6 @@ def choose_plan(
     done: int,
     exhaustive: bool,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -71,7 +70,7 @@ def choose_plan(
             side, togo = plans[q, 0], plans[q, 1]
             speed = wanted_mps if plans[q, 2] == COMMANDED else plans[q, 2] * top
         lay_path(i, trial, side, togo, speed, done, state, boats, tuning, work)
-        merit = rate_path(i, trial, best - bonus, state, margin_m, ours, boats, fixed, tuning, work)
+        merit = rate_path(i, trial, best - bonus, state, ours, boats, fixed, tuning, work)
         merit_kept = merit + (bonus if merit < FIXED_LOST else 1e-3 * bonus)
         if merit_kept > best:
             best = merit_kept
@@ -84,7 +83,6 @@ def choose_plan(
 def refresh(
     i: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -92,7 +90,7 @@ def refresh(
     work: Work,
 ) -> None:
     """Rate boat i's plan again against the others' present plans."""
-    work.merit[i] = rate_path(i, i, -1e9, state, margin_m, ours, boats, fixed, tuning, work)
+    work.merit[i] = rate_path(i, i, -1e9, state, ours, boats, fixed, tuning, work)
 
 
 @kernel
@@ -102,7 +100,6 @@ def assign_plans(
     exhaustive: bool,
     who: BoolArray,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -133,7 +130,7 @@ def assign_plans(
             if not who[i]:
                 continue
             if sweep > 0:
-                refresh(i, state, margin_m, ours, boats, fixed, tuning, work)
+                refresh(i, state, ours, boats, fixed, tuning, work)
                 if work.merit[i] >= PAIR_SAFE:
                     continue
             good = False
@@ -143,7 +140,6 @@ def assign_plans(
                 done,
                 exhaustive and sweep == 0,
                 state,
-                margin_m,
                 ours,
                 boats,
                 fixed,
@@ -157,6 +153,6 @@ def assign_plans(
     good = True
     for i in range(n):
         if ours[i]:
-            refresh(i, state, margin_m, ours, boats, fixed, tuning, work)
+            refresh(i, state, ours, boats, fixed, tuning, work)
             good = good and work.merit[i] >= PAIR_SAFE
     return good

@@ -33,6 +33,9 @@ STRAIGHT_SAFE = 100.0
 STRAIGHT_BASE = 300.0
 """Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
 
+NO_NEARER_M = 1e-3
+"""A pair inside the buffer may come nearer by no more than this, m."""
+
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
@@ -41,78 +44,85 @@ SLOWEST = 0.3
 
 
 @kernel
-def mark_near(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, near: BoolArray) -> None:
-    """Mark pairs close enough to matter.
+def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
     A pair is left out when its distance exceeds R_ij + (top speed i + top speed j) * (longer horizon + tail). No boat
     outruns its top speed, so on every path the certificate looks at the pair stays apart by more than R_ij: its
     margin is positive for every manoeuvre and every command, its row can never be the binding one, and leaving it
     out changes no decision.
+
+    The radius is the separation with error margins and buffer. A pair already inside the buffer must not come nearer
+    than it is; one inside the separation itself is in breach, see `_rank_recovery`.
     """
     n = state.shape[0]
     for i in range(n):
+        heading = math.radians(state[i, L.HEADING])
+        ux, uy = math.sin(heading), math.cos(heading)
+        way = state[i, L.SPEED] * tuning.dt_s
+        work.course[i, 0], work.course[i, 1] = state[i, L.X] + way * ux, state[i, L.Y] + way * uy
+        work.course[i, 2], work.course[i, 3] = ux, uy
         top_i = max(boats.params[i, L.MAX_SPEED], state[i, L.SPEED])
         for j in range(i):
             top = top_i + max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED])
             horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * STRIDE * tuning.dt_s + tuning.tail_s
-            reach = tuning.radius_m + margin_m[i] + margin_m[j] + top * horizon_s
+            radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
-            hit = dx * dx + dy * dy <= reach * reach
-            near[i, j] = hit
-            near[j, i] = hit
+            square = dx * dx + dy * dy
+            reach = radius + top * horizon_s
+            hit = square <= reach * reach
+            work.near[i, j], work.near[j, i] = hit, hit
+            if hit:
+                least = radius - tuning.buffer_m
+                now = math.sqrt(square)
+                work.breach[i, j] = now < least
+                work.breach[j, i] = now < least
+                held = max(least, min(radius, now - NO_NEARER_M))
+                work.radius[i, j], work.radius[j, i] = held, held
 
 
 @kernel
 def clear_of_opponent(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, radius_m: float, floor_m: float, out: Array
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float
 ) -> None:
     """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
     sample_s = STRIDE * tuning.dt_s
-    heading = math.radians(state[j, L.HEADING])
+    course = work.course[j]
     way = state[j, L.SPEED] * sample_s
     clear_of_straight(
         path,
-        state[j, L.X],
-        state[j, L.Y],
-        way * math.sin(heading),
-        way * math.cos(heading),
+        course[0],
+        course[1],
+        way * course[2],
+        way * course[3],
         boats.samples[i],
         tuning.tail_s / sample_s,
-        radius_m,
+        work.radius[i, j],
         floor_m,
-        out,
+        work.out,
     )
 
 
 @kernel
 def clear_of_hunter(
-    i: int,
-    j: int,
-    path: Array,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    radius_m: float,
-    floor_m: float,
-    spare: Array,
-    out: Array,
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
-    The worse of two hunters: one steers at the boat, one for the meeting point. ``spare`` is scratch.
+    The worse of two hunters: one steers at the boat, one for the meeting point.
     """
     sample_s = STRIDE * tuning.dt_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
-    heading = math.radians(state[j, L.HEADING])
+    course = work.course[j]
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, SLOWEST))
-    out[MARGIN] = FAR
+    work.out[MARGIN] = FAR
     for lead in range(2):
         clear_of_pursuer(
             path,
-            state[j, L.X],
-            state[j, L.Y],
-            math.sin(heading),
-            math.cos(heading),
+            course[0],
+            course[1],
+            course[2],
+            course[3],
             speed,
             top,
             boats.granted_acc_mps2[j],
@@ -120,69 +130,48 @@ def clear_of_hunter(
             lead == 1,
             sample_s,
             boats.samples[i],
-            radius_m,
+            work.radius[i, j],
             floor_m,
-            spare,
+            work.spare,
         )
-        if spare[MARGIN] < out[MARGIN]:
-            out[:] = spare
-            if out[MARGIN] < floor_m:
+        if work.spare[MARGIN] < work.out[MARGIN]:
+            work.out[:] = work.spare
+            if work.out[MARGIN] < floor_m:
                 return
 
 
 @kernel
 def _rank_recovery(
-    i: int,
-    j: int,
-    path: Array,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    radius_m: float,
+    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work
 ) -> None:
-    """Inside the radius no margin is left to compare: rank by not closing further and by the distance soon after."""
+    """In breach no margin is left to compare: rank by not closing further and by the distance soon after."""
     sample_s = STRIDE * tuning.dt_s
     k = min(boats.samples[i], max(1, int(RECOVERY_S / sample_s)))
     if ours[j]:
         x, y = work.path[j, k, 0], work.path[j, k, 1]
     else:
-        heading = math.radians(state[j, L.HEADING])
         way = state[j, L.SPEED] * k * sample_s
-        x, y = state[j, L.X] + way * math.sin(heading), state[j, L.Y] + way * math.cos(heading)
-    now = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
+        x, y = work.course[j, 0] + way * work.course[j, 2], work.course[j, 1] + way * work.course[j, 3]
     later = math.hypot(path[k, 0] - x, path[k, 1] - y)
-    least = work.out[MARGIN] + radius_m
-    work.out[MARGIN] = -1e-3 + min(0.0, later - radius_m) + 2.0 * min(0.0, least - now)
+    now = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
+    least = work.out[MARGIN] + work.radius[i, j]
+    work.out[MARGIN] = -1e-3 + min(0.0, later - work.radius[i, j]) + 2.0 * min(0.0, least - now)
 
 
 @kernel
 def clear_of_boat(
-    i: int,
-    j: int,
-    path: Array,
-    state: Array,
-    margin_m: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
+    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work, floor_m: float
 ) -> None:
     """Clearance row of boat i on ``path`` from boat j, into ``work.out``."""
-    radius = tuning.radius_m + margin_m[i] + margin_m[j]
-    dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
-    inside = dx * dx + dy * dy < radius * radius
-    floor = -FAR if inside else floor_m
+    floor = -FAR if work.breach[i, j] else floor_m
     if ours[j]:
         samples = min(boats.samples[i], boats.samples[j])
         tail = tuning.tail_s / (STRIDE * tuning.dt_s)
-        clear_of_path(path, work.path[j], samples, tail, radius, floor, work.out)
+        clear_of_path(path, work.path[j], samples, tail, work.radius[i, j], floor, work.out)
     else:
-        clear_of_opponent(i, j, path, state, boats, tuning, radius, floor, work.out)
-    if inside:
-        _rank_recovery(i, j, path, state, ours, boats, tuning, work, radius)
+        clear_of_opponent(i, j, path, state, boats, tuning, work, floor)
+    if work.breach[i, j]:
+        _rank_recovery(i, j, path, state, ours, boats, tuning, work)
 
 
 @kernel
@@ -196,7 +185,6 @@ def worst_clearance(
     i: int,
     slot: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     tuning: Tuning,
@@ -210,7 +198,7 @@ def worst_clearance(
     for j in range(state.shape[0]):
         if j == i or not work.near[i, j]:
             continue
-        clear_of_boat(i, j, work.path[slot], state, margin_m, ours, boats, tuning, work, floor_m)
+        clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, floor_m)
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j
@@ -223,7 +211,6 @@ def worst_hunter(
     i: int,
     slot: int,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     tuning: Tuning,
@@ -235,10 +222,9 @@ def worst_hunter(
     for j in range(state.shape[0]):
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
             continue
-        radius = tuning.radius_m + margin_m[i] + margin_m[j]
-        if _separation(state, i, j) < radius:
+        if work.breach[i, j]:
             continue
-        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, radius, floor_m, work.spare, work.out)
+        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m)
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j
@@ -247,17 +233,11 @@ def worst_hunter(
 
 
 @kernel
-def _separation(state: Array, i: int, j: int) -> float:
-    return math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
-
-
-@kernel
 def rate_path(
     i: int,
     slot: int,
     best: float,
     state: Array,
-    margin_m: Array,
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
@@ -273,7 +253,7 @@ def rate_path(
     target = work.target[i]
     clear = work.clear[slot]
     floor = best if best < STRAIGHT_SAFE else 0.0
-    worst_clearance(i, slot, state, margin_m, ours, boats, tuning, work, min(floor, 0.0))
+    worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
@@ -283,7 +263,7 @@ def rate_path(
     elif best >= STRAIGHT_SAFE:
         floor = min(target, best - STRAIGHT_BASE)
     if clear[MARGIN] >= floor:
-        worst_hunter(i, slot, state, margin_m, ours, boats, tuning, work, floor)
+        worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if clear[MARGIN] < target:
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
     clear_of_surroundings(
@@ -315,6 +295,5 @@ def lay_path(
     """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
     path = work.path[slot]
-    path[0, 0], path[0, 1] = state[i, L.X], state[i, L.Y]
     work.row[:] = work.next_state[i] if done == 1 else state[i]
     trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.samples[i], path)

@@ -1,6 +1,7 @@
 """Where a boat goes under an escape manoeuvre: turn to one side at full rudder, then straight, at a set speed.
 
-Paths are sampled every ``STRIDE`` steps of the boat's model; sample 0 is the boat's present position.
+Paths are sampled every ``STRIDE`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
+candidate command, or after the manoeuvre's own first step.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def trace_path(
     samples: int,
     path: Array,
 ) -> None:
-    """Fill ``path[1:samples + 1]`` with positions, m, along an escape manoeuvre.
+    """Fill ``path[: samples + 1]`` with positions, m, along an escape manoeuvre.
 
     Args:
         params: platform row of the boat.
@@ -57,12 +58,15 @@ def trace_path(
         togo_deg: turn to make before running straight, deg, >= 0.
         speed_mps: speed commanded throughout, m/s.
         dt_s: model step, s.
-        done: model steps already made since sample 0 (0, or 1 when ``row`` is the state after a command).
-        samples: number of samples to fill.
+        done: 1 when ``row`` is the state one step from now, 0 when it is the present one.
+        samples: number of samples after sample 0.
         path: shape (>= samples + 1, 2), float64.
     """
+    if done == 0:
+        togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
+    path[0, 0], path[0, 1] = row[L.X], row[L.Y]
     k = 1
-    step = done
+    step = 0
     while k <= samples:
         x, y, speed = row[L.X], row[L.Y], row[L.SPEED]
         straight = togo_deg <= 0.0
@@ -71,7 +75,7 @@ def trace_path(
         if step % STRIDE == 0:
             path[k, 0], path[k, 1] = row[L.X], row[L.Y]
             k += 1
-        if straight and step > done + 1 and abs(row[L.SPEED] - speed) < STEADY_SPEED and row[L.TURN_RATE] == 0.0:
+        if straight and step > 1 and abs(row[L.SPEED] - speed) < STEADY_SPEED and row[L.TURN_RATE] == 0.0:
             _run_on(row[L.X], row[L.Y], row[L.X] - x, row[L.Y] - y, step, k, samples, path)
             return
 

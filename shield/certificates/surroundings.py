@@ -37,11 +37,11 @@ def _away_from(x: float, y: float, px: float, py: float, radius: float, k: int, 
 def clear_of_surroundings(
     path: Array, samples: int, field: Array, circles: Array, segments: Array, hull_m: float, out: Array
 ) -> None:
-    """Least clearance, m, of a path from field edge, circles and wall segments over ``samples`` samples.
+    """Least clearance, m, of a path from field edge, circles and wall segments over samples 0 to ``samples``.
 
     Args:
         path: positions, m, shape (>= samples + 1, 2).
-        samples: samples to look at.
+        samples: last sample to look at.
         field: (xmin, ymin, xmax, ymax), m.
         circles: shape (c, 3): centre x, y and radius, m.
         segments: shape (s, 4): ends x0, y0, x1, y1, m.
@@ -49,7 +49,7 @@ def clear_of_surroundings(
         out: clearance row.
     """
     out[MARGIN] = FAR
-    for k in range(1, samples + 1):
+    for k in range(samples + 1):
         x, y = path[k, 0], path[k, 1]
         _edges(x, y, k, field, out)
         for c in range(circles.shape[0]):

@@ -20,7 +20,7 @@ class Limits:
 
     Attributes:
         top_speed_mps: top speed, m/s.
-        acceleration_mps2: highest acceleration, mean over any second of a full-speed start from rest, m/s^2.
+        acceleration_mps2: highest acceleration, mean over any second, from rest or out of a hard turn, m/s^2.
         turn_rate_dps: highest turn rate at top speed, deg/s.
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
@@ -46,17 +46,25 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
 
 
 def _acceleration(platform: Platform, dt_s: float) -> float:
-    params, state = platform.pack(), fresh_state(0.0, 0.0, 0.0)
-    speeds = [0.0]
+    """The larger of a start from rest and a rudder let go after a long hard turn, which gives its speed back."""
+    rest = fresh_state(0.0, 0.0, 0.0)
+    params, turning = cruise(platform, dt_s)
+    for _ in range(int(LONGEST_S / dt_s)):
+        actuate(params, turning, platform.max_speed_mps, 2.0 * largest_turn(params, turning, dt_s) + 1e-9, dt_s)
+    return max(_gain(platform, start, dt_s) for start in (rest, turning))
+
+
+def _gain(platform: Platform, state: Array, dt_s: float) -> float:
+    """Highest mean acceleration over any second of a straight run at full speed command, m/s^2."""
+    params = platform.pack()
+    speeds = [float(state[L.SPEED])]
+    window = max(1, round(1.0 / dt_s))
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
-        speeds.append(state[L.SPEED])
-        if state[L.SPEED] > 0.98 * platform.max_speed_mps:
+        speeds.append(float(state[L.SPEED]))
+        if state[L.SPEED] > 0.98 * platform.max_speed_mps and len(speeds) > window:
             break
-    window = max(1, round(1.0 / dt_s))
-    if len(speeds) <= window:
-        return float(max(speeds)) / (dt_s * (len(speeds) - 1))
-    return float(max(b - a for a, b in zip(speeds, speeds[window:], strict=False))) / (window * dt_s)
+    return max(b - a for a, b in zip(speeds, speeds[window:], strict=False)) / (window * dt_s)
 
 
 def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from typing import Any
 from ..fleet import Fleet
 from ..jit import Array
 from ..surroundings import Surroundings
-from .reading import obstacles_of
+from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 
 
 class MctfReader:
@@ -54,7 +54,7 @@ def _surroundings(config: Any, size: Any, flag: tuple[float, float], home: bool)
     circles, polygons = obstacles_of(config.obstacles)
     radius = config.agent_radius_m
     widest = max(radius) if isinstance(radius, (tuple, list)) else radius
-    circle = ((float(flag[0]), float(flag[1]), float(config.flag_keepout_m + widest)),)
+    circle = ((float(flag[0]), float(flag[1]), float(config.flag_keepout_m + widest + KEEP_OUT_MARGIN_M)),)
     return _surroundings_cached(
         (float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle if home else ()
     )

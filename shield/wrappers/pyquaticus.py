@@ -14,7 +14,7 @@ from ..jit import Array
 from ..platforms import get_platform
 from ..platforms import layout as L
 from ..surroundings import Surroundings
-from .reading import no_commands, obstacles_of
+from .reading import KEEP_OUT_MARGIN_M, no_commands, obstacles_of
 
 HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
 
@@ -75,7 +75,7 @@ class PyquaticusReader:
         flag = env.flags[team]
         circle: tuple[tuple[float, float, float], ...] = ()
         if keep_out and not flag.taken:
-            radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius))
+            radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
         return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle)
 

@@ -15,6 +15,9 @@ from ..fleet import Fleet
 from ..jit import Array
 from ..surroundings import Surroundings
 
+KEEP_OUT_MARGIN_M = 0.1
+"""Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""
+
 SIDES = {"blue": 0, "red": 1}
 
 
