@@ -24,8 +24,8 @@ class ShieldConfig:
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
         solver: QP backend, a name known to qpsolvers.
-        opponent_share: share of its turn rate and acceleration an opponent is granted against us, 0 to 1; 0 takes
-            opponents to hold course and speed.
+        opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
+            takes opponents to hold course and speed.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         margin_cap_m: margins above this shrink freely, m.
         tail_s: how long courses are run on straight beyond the horizon, s.
@@ -49,7 +49,7 @@ class ShieldConfig:
     certificate: str = "turning_circle"
     coordination: str = "team"
     solver: str = "daqp"
-    opponent_share: float = 0.5
+    opponent_share: float = 1.0
     response_per_s: float = math.inf
     margin_cap_m: float = 1.0
     tail_s: float = 5.0

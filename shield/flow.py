@@ -142,7 +142,7 @@ def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
         if ours[i] and work.merit[i] < PAIR_SAFE:
             plan.moving[i] = True
             j = work.bound[i]
-            if work.merit[i] < FIXED_LOST and j >= 0 and ours[j]:
+            if j >= 0 and ours[j]:
                 plan.moving[j] = True
     count = 0
     for i in range(n):

@@ -227,7 +227,14 @@ def build_rows(
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
         clear_of_surroundings(
-            work.path[i], boats.static_samples[i], fixed.field, fixed.circles, fixed.segments, fixed.segment_m, work.out
+            work.path[i],
+            boats.static_samples[i],
+            boats.samples[i],
+            fixed.field,
+            fixed.circles,
+            fixed.segments,
+            fixed.segment_m,
+            work.out,
         )
         if work.out[MARGIN] < FAR:
             C[r, :] = 0.0

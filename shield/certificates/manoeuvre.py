@@ -33,8 +33,8 @@ STRAIGHT_SAFE = 100.0
 STRAIGHT_BASE = 300.0
 """Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
 
-NO_NEARER_M = 1e-3
-"""A pair inside the buffer may come nearer by no more than this, m."""
+REGAIN_M = 0.01
+"""A pair inside the buffer must part by at least this in the next step, m."""
 
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
@@ -52,8 +52,8 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
     margin is positive for every manoeuvre and every command, its row can never be the binding one, and leaving it
     out changes no decision.
 
-    The radius is the separation with error margins and buffer. A pair already inside the buffer must not come nearer
-    than it is; one inside the separation itself is in breach, see `_rank_recovery`.
+    The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
+    again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
     n = state.shape[0]
     for i in range(n):
@@ -77,7 +77,7 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least
                 work.breach[j, i] = now < least
-                held = max(least, min(radius, now - NO_NEARER_M))
+                held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
 
 
@@ -269,6 +269,7 @@ def rate_path(
     clear_of_surroundings(
         work.path[slot],
         boats.static_samples[i],
+        boats.samples[i],
         fixed.field,
         fixed.circles,
         fixed.segments,

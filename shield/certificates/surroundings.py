@@ -35,13 +35,24 @@ def _away_from(x: float, y: float, px: float, py: float, radius: float, k: int, 
 
 @kernel
 def clear_of_surroundings(
-    path: Array, samples: int, field: Array, circles: Array, segments: Array, hull_m: float, out: Array
+    path: Array,
+    near_samples: int,
+    samples: int,
+    field: Array,
+    circles: Array,
+    segments: Array,
+    hull_m: float,
+    out: Array,
 ) -> None:
-    """Least clearance, m, of a path from field edge, circles and wall segments over samples 0 to ``samples``.
+    """Least clearance, m, of a path from field edge, circles and wall segments.
+
+    The edge is looked at only until a half turn could be over, since every straight run ends beyond it; the others over
+    the whole path.
 
     Args:
         path: positions, m, shape (>= samples + 1, 2).
-        samples: last sample to look at.
+        near_samples: last sample at which the edge counts.
+        samples: last sample.
         field: (xmin, ymin, xmax, ymax), m.
         circles: shape (c, 3): centre x, y and radius, m.
         segments: shape (s, 4): ends x0, y0, x1, y1, m.
@@ -49,9 +60,12 @@ def clear_of_surroundings(
         out: clearance row.
     """
     out[MARGIN] = FAR
+    for k in range(near_samples + 1):
+        _edges(path[k, 0], path[k, 1], k, field, out)
+    if circles.shape[0] + segments.shape[0] == 0:
+        return
     for k in range(samples + 1):
         x, y = path[k, 0], path[k, 1]
-        _edges(x, y, k, field, out)
         for c in range(circles.shape[0]):
             _away_from(x, y, circles[c, 0], circles[c, 1], circles[c, 2], k, out)
         for s in range(segments.shape[0]):
