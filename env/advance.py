@@ -1,4 +1,4 @@
-"""One step of all games: the compiled outer loop."""
+"""One step of all games, compiled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from steerclear.shield.jit import Array, kernel
 from . import rules as R
 from .arrays import Games, Rules
 from .collisions import check_collisions
-from .motion import move_boat
+from .motion import move_boats
+
+CHUNK = 64
+"""Games handled together, rule by rule."""
 
 
 @kernel
@@ -23,24 +26,23 @@ def first_unusable(commands: Array) -> int:
 
 
 @kernel
-def advance_game(rules: Rules, games: Games, b: int, commands: Array) -> None:
-    """Move the boats of game ``b`` under ``commands`` (n, 2) and apply the rules."""
-    games.events[b] = 0
-    R.recharge(rules, games, b)
-    for i in range(rules.n_boats):
-        move_boat(rules, games, b, i, commands[i])
-    games.time_s[b] += rules.dt_s
-    R.check_bounds(rules, games, b)
-    R.check_grabs(rules, games, b)
-    R.check_tags(rules, games, b)
-    R.check_captures(rules, games, b)
-    R.check_untags(rules, games, b)
-    R.check_end(rules, games, b)
-    check_collisions(rules, games, b)
-
-
-@kernel
 def advance_games(rules: Rules, games: Games, commands: Array) -> None:
-    """`advance_game` for every game; ``commands`` is (B, n, 2): speed m/s, relative heading deg."""
-    for b in range(games.state.shape[0]):
-        advance_game(rules, games, b, commands[b])
+    """Move all boats under ``commands`` (B, n, 2), speed m/s and relative heading deg, and apply the rules.
+
+    Games do not touch each other, so each rule runs over a chunk of games that fits into the cache.
+    """
+    n_games = games.state.shape[0]
+    games.events[:] = 0
+    for first in range(0, n_games, CHUNK):
+        last = min(first + CHUNK, n_games)
+        R.recharge(rules, games, first, last)
+        move_boats(rules, games, commands, first, last)
+        for b in range(first, last):
+            games.time_s[b] += rules.dt_s
+        R.check_bounds(rules, games, first, last)
+        R.check_grabs(rules, games, first, last)
+        R.check_tags(rules, games, first, last)
+        R.check_captures(rules, games, first, last)
+        R.check_untags(rules, games, first, last)
+        R.check_end(rules, games, first, last)
+        check_collisions(rules, games, first, last)

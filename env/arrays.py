@@ -11,7 +11,9 @@ from steerclear.shield.platforms.layout import N_STATE
 
 from .config import GameConfig
 from .field import FieldGeometry
+from .observation_layout import boat_slots
 from .obstacles import Obstacles, pack_obstacles
+from .sight import pack_lines
 
 
 class Rules(NamedTuple):
@@ -33,7 +35,8 @@ class Rules(NamedTuple):
     size: Array
     flag_home: Array
     scrimmage: Array
-    walls: Array
+    sight_lines: Array
+    slots: IntArray
     side_sign: Array
     team: IntArray
     params: Array
@@ -98,8 +101,9 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
         size=field.size,
         flag_home=field.flag_home,
         scrimmage=field.scrimmage,
-        walls=field.walls,
+        sight_lines=np.stack([pack_lines(np.concatenate([walls, [field.scrimmage]])) for walls in field.walls]),
         side_sign=field.side_sign,
+        slots=boat_slots(config),
         team=np.repeat(np.array([0, 1], dtype=np.int64), config.team_size),
         params=np.stack([platform.pack() for platform in platforms]),
         max_speed=np.array([platform.max_speed_mps for platform in platforms]),

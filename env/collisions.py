@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.platforms import layout as L
 
 from .arrays import Games, Rules
 
 
 @kernel
-def check_collisions(rules: Rules, games: Games, b: int) -> None:
-    """Count pairs that came within touch in this step."""
-    for i in range(rules.n_boats):
-        games.new_collisions[b, i] = 0
-    for i in range(rules.n_boats):
-        x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
-        for j in range(i + 1, rules.n_boats):
-            dx = games.state[b, j, L.X] - x
-            dy = games.state[b, j, L.Y] - y
-            near = math.sqrt(dx * dx + dy * dy) <= rules.agent_radius[i] + rules.agent_radius[j]
-            if near and not games.touching[b, i, j]:
-                games.new_collisions[b, i] += 1
-                games.new_collisions[b, j] += 1
-            games.touching[b, i, j] = near
-            games.touching[b, j, i] = near
-    for i in range(rules.n_boats):
-        games.collisions[b, i] += games.new_collisions[b, i]
+def _new_in_game(state: Array, radius: Array, touching: BoolArray, new: IntArray) -> None:
+    """Count each boat's entries in one game into ``new`` (n,) and update ``touching`` (n, n)."""
+    n_boats = state.shape[0]
+    for i in range(n_boats):
+        new[i] = 0
+    for i in range(n_boats):
+        x, y = state[i, L.X], state[i, L.Y]
+        for j in range(i + 1, n_boats):
+            dx, dy = state[j, L.X] - x, state[j, L.Y] - y
+            near = math.sqrt(dx * dx + dy * dy) <= radius[i] + radius[j]
+            if near and not touching[i, j]:
+                new[i] += 1
+                new[j] += 1
+            touching[i, j] = near
+            touching[j, i] = near
+
+
+@kernel
+def check_collisions(rules: Rules, games: Games, first: int, last: int) -> None:
+    """Count the pairs of the games first..last-1 that came within touch in this step."""
+    for b in range(first, last):
+        _new_in_game(games.state[b], rules.agent_radius, games.touching[b], games.new_collisions[b])
+        for i in range(rules.n_boats):
+            games.collisions[b, i] += games.new_collisions[b, i]

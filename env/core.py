@@ -9,13 +9,14 @@ import numpy as np
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 
-from .advance import advance_games, first_unusable
+from .advance import CHUNK, advance_games, first_unusable
 from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
 from .field import field_geometry
 from .initial import start_from
-from .observe import observation_bounds, observation_keys, observe_games
+from .observation_layout import observation_bounds, observation_keys
+from .observe import observe_games
 from .randomness import seed_states
 from .reward import reward_games
 from .starts import default_places, reset_games
@@ -64,7 +65,7 @@ class BatchedMctf:
         self.observation_low, self.observation_high = low, high
         self._middle = 0.5 * (low + high)
         self._scale = 2.0 / np.where(high > low, high - low, np.inf)
-        self._raw = np.zeros((self.n_boats, self.n_obs))
+        self._raw = np.zeros((min(self.n_games, CHUNK), self.n_boats, self.n_obs))
         self._places = default_places(self.config, self.field)
         self._commands = np.zeros((self.n_games, self.n_boats, 2))
         self.observations = np.zeros((self.n_games, self.n_boats, self.n_obs), dtype=np.float32)

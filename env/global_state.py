@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import layout as L
 
-from .angles import heading_to, wrap_bearing
+from .angles import wrap_bearing
 from .arrays import Games, Rules
 from .config import GameConfig
 from .field import FieldGeometry
-from .observe import Key
-from .obstacles import closest_on_segment, distance_and_heading
+from .observation_layout import Key
+from .obstacles import distance_and_heading
+from .sight import sight_of_line
 
 N_BOAT = 11
 """Numbers per boat, before obstacles."""
+
+SCRIMMAGE = 4
+"""Which of the sight lines is the dividing line."""
 
 BOAT_ENTRIES = (
     "pos",
@@ -81,12 +83,10 @@ def global_state_bounds(config: GameConfig, field: FieldGeometry, max_speed_mps:
 def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> None:
     state = games.state[b, i]
     x, y, heading = state[L.X], state[L.Y], state[L.HEADING]
-    px, py = closest_on_segment(rules.scrimmage, x, y)
     out[0] = x
     out[1] = y
     out[2] = heading
-    out[3] = wrap_bearing(heading_to(px - x, py - y) - heading)
-    out[4] = math.hypot(px - x, py - y)
+    out[3], out[4] = sight_of_line(x, y, heading, rules.sight_lines[0], SCRIMMAGE)
     out[5] = state[L.SPEED]
     out[6] = games.has_flag[b, i]
     out[7] = games.on_side[b, i]

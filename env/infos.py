@@ -10,7 +10,8 @@ from steerclear.shield.jit import Array
 from .core import BatchedMctf
 from .global_state import describe_game, entry_size, global_state_bounds, global_state_keys
 from .normalizer import VectorNormalizer
-from .observe import Key, observe_raw
+from .observation_layout import Key
+from .observe import observe_raw
 
 BOOLEAN_ENTRIES = frozenset({"has_flag", "on_side", "oob", "is_tagged", "blue_flag_pickup", "red_flag_pickup"})
 
@@ -33,13 +34,13 @@ class InfoWriter:
         self.global_state = VectorNormalizer(keys, [entry_size(key) for key in keys], low, high)
         self._observation_booleans = [k for k, key in enumerate(core.observation_keys) if _is_boolean(key)]
         self._global_booleans = [key for key in keys if _is_boolean(key)]
-        self._raw = np.zeros((core.n_boats, core.n_obs))
+        self._raw = np.zeros((1, core.n_boats, core.n_obs))
         self._global = np.zeros(len(low))
 
     def raw_observations(self) -> Array:
         """Raw observations (n, n_obs); the array is reused."""
-        observe_raw(self._core.rules, self._core.games, 0, self._raw)
-        return self._raw
+        observe_raw(self._core.rules, self._core.games, self._raw, 0, 1)
+        return self._raw[0]
 
     def global_vector(self) -> Array:
         """Raw global state (n_global,); the array is reused."""

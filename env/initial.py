@@ -139,7 +139,7 @@ def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given
         if carries[rules.team == team].sum() > 1:
             raise GameError("agent_has_flag: at most one boat of a team can carry the opponents' flag")
     for i in np.flatnonzero(carries & ~np.isnan(given[:, 0])):
-        if is_on_side(rules, rules.team[i], given[i, 0], given[i, 1]):
+        if is_on_side(rules.scrimmage, rules.side_sign[rules.team[i]], given[i, 0], given[i, 1]):
             raise GameError(f"{config.agent_ids[i]} carries a flag but is on its own side; place it on the other side")
 
 

@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array
 
-from .observe import Key
+from .observation_layout import Key
 
 
 class VectorNormalizer:

@@ -68,7 +68,7 @@ def draw_place(rules: Rules, games: Games, b: int, i: int, side: int, placed: Bo
     for _ in range(MAX_TRIES):
         x = radius + next_uniform(games.rng, b) * (rules.size[0] - 2.0 * radius)
         y = radius + next_uniform(games.rng, b) * (rules.size[1] - 2.0 * radius)
-        if side >= 0 and not is_on_side(rules, side, x, y):
+        if side >= 0 and not is_on_side(rules.scrimmage, rules.side_sign[side], x, y):
             continue
         if place_is_free(rules, games, b, i, x, y, placed):
             games.state[b, i, L.X], games.state[b, i, L.Y] = x, y
@@ -121,7 +121,9 @@ def _find_place(
         return draw_place(rules, games, b, i, 1 - team, placed)
     if random:
         return draw_place(rules, games, b, i, team if own_side else -1, placed)
-    if place_is_free(rules, games, b, i, place[0], place[1], placed) and is_on_side(rules, team, place[0], place[1]):
+    if place_is_free(rules, games, b, i, place[0], place[1], placed) and is_on_side(
+        rules.scrimmage, rules.side_sign[team], place[0], place[1]
+    ):
         games.state[b, i, L.X], games.state[b, i, L.Y] = place[0], place[1]
         return True
     return draw_place(rules, games, b, i, team, placed)
@@ -175,13 +177,13 @@ def settle(rules: Rules, games: Games, b: int) -> None:
     for i in range(rules.n_boats):
         x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
         games.previous_position[b, i, 0], games.previous_position[b, i, 1] = x, y
-        games.on_side[b, i] = is_on_side(rules, rules.team[i], x, y)
+        games.on_side[b, i] = is_on_side(rules.scrimmage, rules.side_sign[rules.team[i]], x, y)
         if games.has_flag[b, i]:
             games.flag_position[b, 1 - rules.team[i], 0] = x
             games.flag_position[b, 1 - rules.team[i], 1] = y
-    check_grabs(rules, games, b)
-    check_tags(rules, games, b)
-    check_untags(rules, games, b)
+    check_grabs(rules, games, b, b + 1)
+    check_tags(rules, games, b, b + 1)
+    check_untags(rules, games, b, b + 1)
 
 
 @kernel
