@@ -21,6 +21,8 @@ class VectorNormalizer:
         sizes: how many numbers each takes.
         low: (n,) lower bounds.
         high: (n,) upper bounds.
+
+    ``is_angle`` (n,) tells which numbers are angles in deg: there, both bounds are one direction.
     """
 
     def __init__(self, keys: Sequence[Key], sizes: Sequence[int], low: Array, high: Array) -> None:
@@ -30,6 +32,7 @@ class VectorNormalizer:
         self.high = high
         starts = np.cumsum([0, *self.sizes])
         self._spans = {key: (int(starts[k]), int(starts[k + 1])) for k, key in enumerate(self.keys)}
+        self.is_angle = np.repeat([_is_angle(key) for key in self.keys], self.sizes)
         self.normalized_space = Box(-1.0, 1.0, (len(low),), np.float32)
         self.unnormalized_space = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
@@ -78,3 +81,7 @@ class VectorNormalizer:
             key: values[start] if stop - start == 1 else np.array(raw[start:stop])
             for key, (start, stop) in self._spans.items()
         }
+
+
+def _is_angle(key: Key) -> bool:
+    return (key if isinstance(key, str) else key[1]).endswith(("bearing", "heading"))

@@ -1,0 +1,150 @@
+"""Parity: replay a recorded game of the reference simulator and measure every deviation."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from steerclear.shield.exceptions import GameError, TraceError
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
+
+from .actions import discrete_commands
+from .core import BatchedMctf
+from .infos import InfoWriter
+from .parity_report import EventMismatch, ParityReport
+from .trace import OBSERVATION_EVERY, Trace, load_trace
+
+BOAT_EVENTS = {
+    "is_tagged": "is_tagged",
+    "has_flag": "has_flag",
+    "oob": "oob",
+    "on_side": "on_side",
+    "agent_collisions": "collisions",
+}
+TEAM_EVENTS = {"flag_taken": "flag_taken", "captures": "captures", "grabs": "grabs", "tags": "tags"}
+"""Array of the trace -> array of `BatchedMctf`; compared exactly at every step."""
+
+
+@dataclass
+class _Deviations:
+    """Largest deviations so far; fields as in `ParityReport`."""
+
+    position_m: float = 0.0
+    heading_deg: float = 0.0
+    speed_mps: float = 0.0
+    cooldown_s: float = 0.0
+    flag_position_m: float = 0.0
+    observation_normalised: float = 0.0
+    observation_raw: float = 0.0
+    global_state: float = 0.0
+
+    def widen(self, name: str, difference: np.ndarray) -> None:
+        """Take the largest absolute difference into account; NaN counts as infinitely far."""
+        largest = float(np.max(np.abs(difference), initial=0.0))
+        setattr(self, name, max(getattr(self, name), np.inf if np.isnan(largest) else largest))
+
+
+def replay_trace(path: str | os.PathLike[str]) -> ParityReport:
+    """Replay a recorded game from its first state under its actions, over its whole length.
+
+    Args:
+        path: an npz file as the reference traces are.
+
+    Returns:
+        The largest deviations and every event mismatch; ``report.passed`` holds them against the tolerances.
+
+    Raises:
+        TraceError: the file cannot be read, lacks an array or starts from a state the rules do not allow.
+    """
+    return compare(load_trace(path))
+
+
+def compare(trace: Trace) -> ParityReport:
+    """`replay_trace` of a trace that is already read.
+
+    Raises:
+        TraceError: the trace starts from a state, or holds an action, that the rules do not allow.
+    """
+    core = BatchedMctf(trace.config, n_games=1, seed=0)
+    writer = InfoWriter(core)
+    _check_keys(trace, writer)
+    deviations = _Deviations()
+    mismatches: list[EventMismatch] = []
+    try:
+        core.reset_game(0, _first_state(trace))
+        for step in range(trace.steps + 1):
+            _compare_motion(trace, core, step, deviations)
+            _compare_views(trace, core, writer, step, deviations)
+            mismatches += _compare_events(trace, core, step)
+            if step < trace.steps:
+                core.step(_commands(trace, core, step)[np.newaxis])
+    except GameError as error:
+        raise TraceError(f"{trace.path}: {error}") from error
+    return ParityReport(str(trace.path), trace.steps, mismatches=tuple(mismatches), **vars(deviations))
+
+
+def _check_keys(trace: Trace, writer: InfoWriter) -> None:
+    for name, ours in (("obs_keys", writer.observation.keys), ("global_state_keys", writer.global_state.keys)):
+        if tuple(trace.meta[name]) != tuple(ours):
+            raise TraceError(f"{trace.path}: {name} in meta are not those of this game; check team_size and obstacles")
+
+
+def _first_state(trace: Trace) -> dict[str, np.ndarray]:
+    names = ("position", "speed", "heading", "has_flag", "is_tagged", "tagging_cooldown")
+    init = {f"agent_{name}": trace.arrays[name][0] for name in names}
+    init["agent_collisions"] = trace.arrays["agent_collisions"][0]
+    return init | {name: trace.arrays[name][0] for name in ("captures", "tags", "grabs")}
+
+
+def _commands(trace: Trace, core: BatchedMctf, step: int) -> Array:
+    """Commands (n, 2) of a step; discrete runs hold (action number, nan)."""
+    action = trace.arrays["action"][step]
+    if np.isnan(action[:, 1]).all():
+        return discrete_commands(action[:, 0].astype(np.int64), core.max_speed_mps)
+    return action
+
+
+def _compare_motion(trace: Trace, core: BatchedMctf, step: int, deviations: _Deviations) -> None:
+    state, arrays = core.state[0], trace.arrays
+    deviations.widen("position_m", np.hypot(*(state[:, [L.X, L.Y]] - arrays["position"][step]).T))
+    deviations.widen("heading_deg", _turn(state[:, L.HEADING], arrays["heading"][step], 360.0))
+    deviations.widen("speed_mps", state[:, L.SPEED] - arrays["speed"][step])
+    deviations.widen("cooldown_s", core.tagging_cooldown_s[0] - arrays["tagging_cooldown"][step])
+    deviations.widen("flag_position_m", core.flag_position[0] - arrays["flag_position"][step])
+
+
+def _compare_views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: int, deviations: _Deviations) -> None:
+    angles = writer.global_state.is_angle
+    ours = writer.global_vector().astype(np.float32)
+    deviations.widen("global_state", _difference(ours, trace.arrays["global_state"][step], angles, 360.0))
+    if step % OBSERVATION_EVERY:
+        return
+    row, angles = step // OBSERVATION_EVERY, writer.observation.is_angle
+    theirs = trace.arrays["obs_normalized"][row]
+    deviations.widen("observation_normalised", _difference(core.observations[0], theirs, angles, 2.0))
+    ours = writer.raw_observations().astype(np.float32)
+    deviations.widen("observation_raw", _difference(ours, trace.arrays["obs"][row], angles, 360.0))
+
+
+def _difference(ours: np.ndarray, theirs: np.ndarray, is_angle: np.ndarray, full_turn: float) -> Array:
+    """Differences (..., k); angles are compared on the circle: straight astern is +180 as well as -180."""
+    plain = ours.astype(np.float64) - theirs
+    return np.where(is_angle, _turn(ours.astype(np.float64), theirs, full_turn), plain)
+
+
+def _turn(one: Array, two: Array, full_turn: float) -> Array:
+    """Difference of two angles, brought into half a turn either way."""
+    half = 0.5 * full_turn
+    return (one - two + half) % full_turn - half
+
+
+def _compare_events(trace: Trace, core: BatchedMctf, step: int) -> list[EventMismatch]:
+    found = []
+    for events, ids in ((BOAT_EVENTS, trace.config.agent_ids), (TEAM_EVENTS, ("blue", "red"))):
+        for theirs_name, ours_name in events.items():
+            theirs, ours = trace.arrays[theirs_name][step], getattr(core, ours_name)[0]
+            for i in np.flatnonzero(theirs != ours):
+                found.append(EventMismatch(step, theirs_name, ids[i], int(theirs[i]), int(ours[i])))
+    return found

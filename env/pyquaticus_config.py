@@ -1,0 +1,110 @@
+"""Settings under Pyquaticus' names, as competitors' own configuration files have them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+from .config import GameConfig
+
+RENAMED = {
+    "env_bounds": "env_bounds_m",
+    "blue_flag_home": "blue_flag_home_m",
+    "red_flag_home": "red_flag_home_m",
+    "scrimmage_coords": "scrimmage_m",
+    "agent_radius": "agent_radius_m",
+    "flag_radius": "flag_radius_m",
+    "flag_keepout": "flag_keepout_m",
+    "catch_radius": "catch_radius_m",
+    "obstacles": "obstacles",
+    "oob_speed_frac": "oob_speed_frac",
+    "dynamics": "platforms",
+    "tau": "dt_s",
+    "default_init": "default_start",
+    "on_sides_init": "on_side_start",
+    "max_score": "max_score",
+    "max_time": "max_time_s",
+    "tagging_cooldown": "tagging_cooldown_s",
+    "tag_on_collision": "tag_on_collision",
+    "tag_on_oob": "tag_on_oob",
+}
+"""Pyquaticus' name -> ours."""
+
+ONLY = {
+    "gps_env": (False,),
+    "env_bounds_unit": ("m",),
+    "flag_homes_unit": ("m",),
+    "scrimmage_coords_unit": ("m",),
+    "sim_speedup_factor": (1,),
+    "lidar_obs": (False,),
+    "normalize_obs": (True,),
+    "short_obs_hist_length": (1,),
+    "long_obs_hist_length": (1,),
+    "short_state_hist_length": (1,),
+    "long_state_hist_length": (1,),
+}
+"""Settings of which this package has one value only; another one is refused rather than ignored."""
+
+WITHOUT_EFFECT = frozenset(
+    {
+        "topo_contour_eps",
+        "slip_radius",  # of the reference's path planner; see drive_home
+        "n_circle_segments",
+        "normalize_state",  # infos always carry the global state as a dict
+        "short_obs_hist_interval",
+        "long_obs_hist_interval",
+        "lidar_range",
+        "num_lidar_rays",
+        "short_state_hist_interval",
+        "long_state_hist_interval",
+        "render_fps",
+        "screen_frac",
+        "arena_buffer_frac",
+        "render_agent_ids",
+        "render_field_points",
+        "render_traj_mode",
+        "render_traj_freq",
+        "render_traj_cutoff",
+        "render_lidar_mode",
+        "render_saving",
+        "render_transparency_alpha",
+        "suppress_numpy_warnings",
+    }
+)
+"""Settings of drawing, lidar and histories: accepted, not needed."""
+
+DEFAULTS = {"platforms": "heron", "flag_radius_m": 1.5}
+"""Where Pyquaticus' defaults are not ours."""
+
+
+def from_pyquaticus(settings: Mapping[str, Any], team_size: int, **overrides: Any) -> GameConfig:
+    """A `GameConfig` from a Pyquaticus configuration dict.
+
+    Args:
+        settings: a configuration as Pyquaticus takes it; what is missing has Pyquaticus' default.
+        team_size: boats per team.
+        **overrides: settings of `GameConfig` that take precedence.
+
+    Raises:
+        ConfigError: a setting is unknown, or has a value this package cannot play.
+    """
+    if not isinstance(settings, Mapping):
+        raise ConfigError(f"the configuration is {type(settings).__name__}; give a dict")
+    ours: dict[str, Any] = {**DEFAULTS, "team_size": team_size, "preset_name": "pyquaticus"}
+    for name, value in settings.items():
+        if name in RENAMED:
+            if not (isinstance(value, str) and value == "auto"):
+                ours[RENAMED[name]] = value
+        elif name in ONLY:
+            if value not in ONLY[name]:
+                raise ConfigError(f"{name} = {value!r} is not supported; use {ONLY[name][0]!r}")
+        elif name not in WITHOUT_EFFECT:
+            near = difflib.get_close_matches(str(name), [*RENAMED, *ONLY, *WITHOUT_EFFECT], n=2)
+            hint = f"did you mean {', '.join(near)}?" if near else "remove it"
+            raise ConfigError(f"unknown Pyquaticus setting {name!r}; {hint}")
+    if ours.get("env_bounds_m", ()) == () and "env_bounds" in settings:
+        raise ConfigError("env_bounds = 'auto' is not supported; give the field's width and height")
+    return GameConfig.build(**{**ours, **overrides})

@@ -1,0 +1,143 @@
+"""Recorded games of the reference simulator: reading, checking and cutting the files."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import ConfigError, TraceError
+
+from .config import GameConfig
+from .pyquaticus_config import from_pyquaticus
+from .whole_file import whole_file
+
+OBSERVATION_EVERY = 5
+"""Observations are recorded at every so many steps."""
+
+PER_BOAT = (
+    "heading",
+    "speed",
+    "thrust",
+    "rudder",
+    "on_side",
+    "oob",
+    "has_flag",
+    "is_tagged",
+    "tagging_cooldown",
+    "agent_collisions",
+)
+PER_TEAM = ("flag_taken", "captures", "tags", "grabs")
+META_KEYS = ("config", "team_size", "agent_ids", "dt", "obs_keys", "global_state_keys", "agent_radius")
+
+_UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
+_REMEDY = "Record or copy it again."
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One recorded game of T steps and n boats.
+
+    Attributes:
+        path: the file.
+        meta: its settings, Pyquaticus' own names.
+        config: the same game as a `GameConfig`.
+        arrays: ``action`` (T, n, 2) and, at index t before and t+1 after that action, ``position`` (T+1, n, 2) m,
+            ``flag_position`` (T+1, 2, 2) m, `PER_BOAT` (T+1, n), `PER_TEAM` (T+1, 2), ``global_state`` (T+1, g), and
+            ``obs``, ``obs_normalized`` (T//5+1, n, k).
+    """
+
+    path: Path
+    meta: dict[str, Any]
+    config: GameConfig
+    arrays: dict[str, np.ndarray]
+
+    @property
+    def steps(self) -> int:
+        """Recorded steps T."""
+        return len(self.arrays["action"])
+
+    def cut(self, steps: int) -> Trace:
+        """The first ``steps`` steps.
+
+        Raises:
+            TraceError: fewer than one step, or more than there are.
+        """
+        if not 1 <= steps <= self.steps:
+            raise TraceError(f"cannot cut {self.path.name} to {steps} steps; give 1..{self.steps}")
+        seen = steps // OBSERVATION_EVERY + 1
+        ends = {"action": steps, "obs": seen, "obs_normalized": seen}
+        arrays = {name: values[: ends.get(name, steps + 1)] for name, values in self.arrays.items()}
+        return Trace(self.path, self.meta, self.config, arrays)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the trace; returns the path.
+
+        Raises:
+            TraceError: the file cannot be written.
+        """
+        target = Path(path)
+        with whole_file(target, TraceError) as part, part.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(self.meta)), **self.arrays)
+        return target
+
+
+def load_trace(path: str | os.PathLike[str]) -> Trace:
+    """Read a recorded game and check that it is whole.
+
+    Raises:
+        TraceError: the file is missing, cut short, not a trace, lacks an array or fits no game.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise TraceError(f"there is no trace {source}; check the path")
+    try:
+        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except _UNREADABLE as error:
+        raise TraceError(f"{source} is cut short or no npz file ({error}). {_REMEDY}") from error
+    meta = _read_meta(source, arrays)
+    try:
+        config = from_pyquaticus(meta["config"], team_size=meta["team_size"], dt_s=meta["dt"])
+    except ConfigError as error:
+        raise TraceError(f"{source}: its settings fit no game: {error}") from error
+    _check_shapes(source, arrays, config, meta)
+    return Trace(source, meta, config, arrays)
+
+
+def _read_meta(source: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    if "meta" not in arrays:
+        raise TraceError(f"{source} lacks meta. {_REMEDY}")
+    try:
+        meta = json.loads(str(arrays.pop("meta")))
+    except json.JSONDecodeError as error:
+        raise TraceError(f"{source}: meta is not JSON ({error}). {_REMEDY}") from error
+    missing = [key for key in META_KEYS if not isinstance(meta, dict) or key not in meta]
+    if missing:
+        raise TraceError(f"{source}: meta lacks {', '.join(missing)}. {_REMEDY}")
+    for name in ("obs_keys", "global_state_keys"):
+        meta[name] = [tuple(key) if isinstance(key, list) else key for key in meta[name]]
+    return meta
+
+
+def _check_shapes(source: Path, arrays: dict[str, np.ndarray], config: GameConfig, meta: dict[str, Any]) -> None:
+    names = ("action", "position", "flag_position", "global_state", "obs", "obs_normalized", *PER_BOAT, *PER_TEAM)
+    missing = [name for name in names if name not in arrays]
+    if missing:
+        raise TraceError(f"{source} lacks {', '.join(missing)}. {_REMEDY}")
+    n, steps = config.n_boats, len(arrays["action"])
+    seen = (steps // OBSERVATION_EVERY + 1, n, len(meta["obs_keys"]))
+    expected: dict[str, tuple[int, ...]] = {"action": (steps, n, 2), "obs": seen, "obs_normalized": seen}
+    expected |= {"position": (steps + 1, n, 2), "flag_position": (steps + 1, 2, 2)}
+    expected |= dict.fromkeys(PER_BOAT, (steps + 1, n)) | dict.fromkeys(PER_TEAM, (steps + 1, 2))
+    for name, shape in expected.items():
+        if arrays[name].shape != shape or steps == 0:
+            raise TraceError(f"{source}: {name} has shape {arrays[name].shape}, expected {shape}. {_REMEDY}")
+    for name in ("position", "heading", "speed"):
+        if not np.isfinite(arrays[name]).all():
+            raise TraceError(f"{source}: {name} holds NaN or infinity. {_REMEDY}")
