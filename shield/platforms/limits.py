@@ -21,7 +21,7 @@ class Limits:
     Attributes:
         top_speed_mps: top speed, m/s.
         acceleration_mps2: highest acceleration, mean over any half second, from rest or out of a hard turn, m/s^2.
-        turn_rate_dps: highest turn rate at top speed, deg/s.
+        turn_rate_dps: highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it).
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
     """
@@ -39,7 +39,7 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
     return Limits(
         top_speed_mps=platform.max_speed_mps,
         acceleration_mps2=_acceleration(platform, dt_s),
-        turn_rate_dps=platform.max_turn_rate_at(platform.max_speed_mps),
+        turn_rate_dps=_turn_rate(platform, dt_s),
         half_turn_s=_half_turn(platform, dt_s),
         stop_s=_stop(platform, dt_s),
     )
@@ -74,6 +74,17 @@ def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
     state[[L.X, L.Y]] = 0.0
     return params, state
+
+
+def _turn_rate(platform: Platform, dt_s: float) -> float:
+    """Highest turn rate, deg/s: the speed controller answers the speed lost in a turn with thrust, and so with turn."""
+    params, state = cruise(platform, dt_s)
+    fastest = 0.0
+    for _ in range(int(LONGEST_S / dt_s)):
+        before = state[L.HEADING]
+        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
+        fastest = max(fastest, float((state[L.HEADING] - before) % 360.0) / dt_s)
+    return round(fastest, 9)
 
 
 def _half_turn(platform: Platform, dt_s: float) -> float:

@@ -19,14 +19,32 @@ KINDS = {
 }
 
 
+def _check_number(who: str, name: str, value: object, low: float = 0.0) -> None:
+    """Raise unless the value is a finite number >= ``low``."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise PlatformError(f"{who}: {name} is {value!r}; give a number")
+    if not math.isfinite(value):
+        raise PlatformError(f"{who}: {name} is {value}; give a finite number")
+    if value < low:
+        raise PlatformError(f"{who}: {name} is {value}; it must be >= {low:g}")
+
+
 @dataclass(frozen=True)
 class Gains:
-    """Gains of one PID controller: output = p + i + d on the error; the integral is clamped."""
+    """Gains of one PID controller: output = p + i + d on the error; the integral is clamped.
+
+    Raises:
+        PlatformError: a gain is not a finite number >= 0.
+    """
 
     kp: float = 0.0
     ki: float = 0.0
     kd: float = 0.0
     integral_limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            _check_number("controller", entry.name, getattr(self, entry.name))
 
 
 @dataclass(frozen=True)
@@ -63,18 +81,24 @@ class Platform:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise PlatformError(f"platform {self.name!r}: unknown kind {self.kind!r}; choose one of {sorted(KINDS)}")
+        who = f"platform {self.name!r}"
         for entry in fields(self):
-            value = getattr(self, entry.name)
-            if isinstance(value, (int, float)) and not math.isfinite(value):
-                raise PlatformError(f"platform {self.name!r}: {entry.name} is {value}; give a finite number")
-        if self.max_speed_mps <= 0:
-            raise PlatformError(f"platform {self.name!r}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
-        for name in ("max_acc", "max_dec", "max_thrust", "max_rudder", "max_turn_rate_dps", "max_angular_acc_dps2"):
-            if getattr(self, name) < 0:
-                raise PlatformError(f"platform {self.name!r}: {name} is {getattr(self, name)}; it must be >= 0")
+            if entry.name not in ("name", "kind", "thrust_map", "speed_pid", "heading_pid"):
+                low = -math.inf if entry.name == "rotate_speed_dps" else 0.0
+                _check_number(who, entry.name, getattr(self, entry.name), low)
+        if self.max_speed_mps == 0:
+            raise PlatformError(f"{who}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
+        if self.turn_loss > 1:
+            raise PlatformError(f"{who}: turn_loss is {self.turn_loss}; it is the share of speed lost, 0 to 1")
+        object.__setattr__(self, "thrust_map", tuple(tuple(point) for point in self.thrust_map))
         self._check_thrust_map()
 
     def _check_thrust_map(self) -> None:
+        for point in self.thrust_map:
+            if len(point) != 2:
+                raise PlatformError(f"platform {self.name!r}: thrust_map holds {point}; give (thrust, speed) points")
+            for value in point:
+                _check_number(f"platform {self.name!r}", "thrust_map", value, -math.inf)
         thrusts = [point[0] for point in self.thrust_map]
         if not 2 <= len(thrusts) <= L.MAP_CAPACITY or any(b <= a for a, b in pairwise(thrusts)):
             raise PlatformError(

@@ -87,6 +87,6 @@ def get_platform(name: str | Platform) -> Platform:
     """
     if isinstance(name, Platform):
         return name
-    if name not in PLATFORMS:
+    if not isinstance(name, str) or name not in PLATFORMS:
         raise PlatformError(f"unknown platform {name!r}; known platforms: {', '.join(sorted(PLATFORMS))}")
     return PLATFORMS[name]

@@ -1,0 +1,101 @@
+"""What the boats can do, against measurements of the reference simulator."""
+
+import math
+
+import numpy as np
+import pytest
+from steerclear.shield.platforms import PLATFORMS, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.limits import cruise, limits_of
+
+NAMES = sorted(PLATFORMS)
+
+
+@pytest.mark.parametrize(("name", "seconds", "metres"), [("heron", 19.0, 9.8), ("surveyor", 24.0, 36.0)])
+def test_commanded_stop_takes_as_long_as_measured(name, seconds, metres):
+    params, row = cruise(get_platform(name))
+    steps = 0
+    while row[L.SPEED] > 0.02:
+        step_boat(params, row, 0.0, 0.0, 0.1)
+        steps += 1
+    assert steps * 0.1 == pytest.approx(seconds, abs=0.5)
+    assert row[L.Y] == pytest.approx(metres, rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("heron", 4.5), ("surveyor", 19.0)])
+def test_a_right_angle_by_command_takes_as_long_as_measured(name, seconds):
+    params, row = cruise(get_platform(name))
+    steps = 0
+    while abs(90.0 - row[L.HEADING]) > 5.0:
+        step_boat(params, row, params[L.MAX_SPEED], 90.0 - row[L.HEADING], 0.1)
+        steps += 1
+    assert steps * 0.1 == pytest.approx(seconds, abs=0.4)
+
+
+def test_a_surveyor_told_to_stop_and_turn_does_neither():
+    params, row = cruise(get_platform("surveyor"))
+    for _ in range(120):
+        step_boat(params, row, 0.0, 90.0 - row[L.HEADING], 0.1)
+    assert row[L.HEADING] == pytest.approx(43.0, abs=0.5)
+    assert math.hypot(row[L.X], row[L.Y]) == pytest.approx(26.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "speed", "rate"),
+    [
+        ("heron", 2.0, 120.0),
+        ("heron", 1.5, 84.0),
+        ("heron", 1.0, 48.0),
+        ("surveyor", 3.0, 20.0),
+        ("surveyor", 2.0, 12.0),
+        ("surveyor", 1.5, 8.0),
+        ("surveyor", 1.0, 4.0),
+        ("si", 5.0, 90.0),
+    ],
+)
+def test_best_turn_rates(name, speed, rate):
+    assert get_platform(name).max_turn_rate_at(speed) == pytest.approx(rate)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_limits_are_finite_and_positive(name):
+    limits = limits_of(get_platform(name))
+    values = [limits.top_speed_mps, limits.acceleration_mps2, limits.turn_rate_dps, limits.half_turn_s, limits.stop_s]
+    assert np.isfinite(values).all()
+    assert min(values) > 0.0
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor"])
+def test_limits_hardly_depend_on_the_step(name):
+    coarse, fine = limits_of(get_platform(name), 0.1), limits_of(get_platform(name), 0.05)
+    assert fine.half_turn_s == pytest.approx(coarse.half_turn_s, abs=0.2)
+    assert fine.turn_rate_dps == coarse.turn_rate_dps
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_run_of_commands_turns_faster_than_the_limits_say(name):
+    """Opponents are granted the limit: a boat that turns faster would not be covered."""
+    platform = get_platform(name)
+    params, row = cruise(platform)
+    fastest = 0.0
+    for step in range(300):
+        before = row[L.HEADING]
+        error = 179.0 if (step // 60) % 2 == 0 else -179.0
+        step_boat(params, row, params[L.MAX_SPEED], error, 0.1)
+        fastest = max(fastest, abs(math.remainder(row[L.HEADING] - before, 360.0)) / 0.1)
+    assert fastest <= limits_of(platform).turn_rate_dps * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_run_of_commands_gains_speed_faster_than_the_limits_say(name):
+    platform = get_platform(name)
+    params, row = cruise(platform)
+    random = np.random.default_rng(4)
+    speeds = []
+    for _ in range(60):
+        speed, error = random.uniform(0.0, params[L.MAX_SPEED]), random.uniform(-180.0, 180.0)
+        for _ in range(random.integers(1, 40)):
+            step_boat(params, row, speed if random.random() < 0.5 else params[L.MAX_SPEED], error, 0.1)
+            speeds.append(float(row[L.SPEED]))
+    gains = np.subtract(speeds[5:], speeds[:-5]) / 0.5
+    assert gains.max() <= limits_of(platform).acceleration_mps2 * 1.02

@@ -1,0 +1,79 @@
+"""The compiled step against the boats written down a second time."""
+
+import math
+
+import numpy as np
+import pytest
+from boat_oracle import oracle
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import wrap_degrees
+
+NAMES = sorted(PLATFORMS)
+COMMANDS = st.lists(
+    st.tuples(st.floats(-2.0, 14.0), st.one_of(st.floats(-180.0, 180.0), st.floats(-1e4, 1e4))), min_size=1, max_size=40
+)
+
+
+def apart_deg(a, b):
+    return abs(math.remainder(a - b, 360.0))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(data=st.data(), commands=COMMANDS, dt=st.sampled_from([0.05, 0.1, 0.25]))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_steps_follow_the_published_model(name, data, commands, dt):
+    top = get_platform(name).max_speed_mps
+    x, y = data.draw(st.floats(-200.0, 200.0)), data.draw(st.floats(-200.0, 200.0))
+    heading, speed = data.draw(st.floats(-180.0, 180.0)), data.draw(st.floats(0.0, top))
+    params, row = get_platform(name).pack(), fresh_state(x, y, heading, speed)
+    boat = oracle(name, x, y, heading, speed)
+    for wanted, error in commands:
+        step_boat(params, row, wanted, error, dt)
+        boat.step(wanted, error, dt)
+        assert row[[L.X, L.Y, L.SPEED]] == pytest.approx([boat.x, boat.y, boat.speed], rel=0, abs=1e-8)
+        assert apart_deg(row[L.HEADING], boat.heading) < 1e-8
+        assert -180.0 <= row[L.HEADING] <= 180.0
+
+
+def test_a_boat_without_thrust_cannot_turn_and_its_heading_controller_sleeps():
+    params, row = get_platform("heron").pack(), fresh_state(0.0, 0.0, 10.0, 1.0)
+    step_boat(params, row, 0.0, 90.0, 0.1)
+    assert row[L.HEADING] == 10.0
+    assert row[L.RUDDER] == 0.0
+    assert math.isnan(row[L.HEADING_ERROR])
+
+
+def test_a_change_of_a_few_degrees_is_full_rudder_on_a_surveyor():
+    params, row = get_platform("surveyor").pack(), fresh_state(0.0, 0.0, 0.0, 3.0)
+    row[L.THRUST], row[L.HEADING_ERROR], row[L.SPEED_ERROR] = 100.0, 0.0, 0.0
+    step_boat(params, row, 3.0, 3.3, 0.1)
+    assert row[L.RUDDER] == 100.0
+    for _ in range(3):
+        step_boat(params, row, 3.0, 3.3, 0.1)
+    assert row[L.RUDDER] < 5.0
+
+
+@given(st.floats(-720.0, 720.0))
+@settings(max_examples=300, deadline=None, derandomize=True)
+def test_wrapping_keeps_the_direction(angle):
+    wrapped = wrap_degrees(angle)
+    assert -180.0 <= wrapped <= 180.0
+    assert apart_deg(wrapped, angle) < 1e-9
+
+
+@pytest.mark.parametrize("angle", [180.0, -180.0, 0.0, -0.0, 179.99999999999997])
+def test_angles_in_range_stay_bit_for_bit(angle):
+    assert np.float64(wrap_degrees(angle)).tobytes() == np.float64(angle).tobytes()
+
+
+@pytest.mark.parametrize("angle", [1e300, -1e300, 1.7e308, 541.0, -541.0, 1e16])
+def test_huge_angles_come_back_in_range(angle):
+    assert -180.0 <= wrap_degrees(angle) <= 180.0
+
+
+@pytest.mark.parametrize("angle", [math.inf, -math.inf, math.nan])
+def test_angles_that_are_none_give_nan_and_return_at_once(angle):
+    assert math.isnan(wrap_degrees(angle))
