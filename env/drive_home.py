@@ -1,8 +1,7 @@
 """Which boats the game itself drives, and where to: what every boat will obey, decided before anything moves.
 
-A tagged boat drives straight to its own flag's home, a boat out of bounds straight off the nearest edge. Where
-the reference plans around obstacles (RRT*), a tagged boat here steers along the tangent of the obstacle in its
-way: simple, the same for every seed, and enough for obstacles that do not form traps.
+A tagged boat drives straight to its own flag's home, past obstacles as `detour` has it; a boat out of bounds drives
+straight off the nearest edge.
 """
 
 from __future__ import annotations
@@ -15,10 +14,8 @@ from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
 from .arrays import Games, Rules
+from .detour import heading_past_obstacles
 from .obstacles import touches_obstacle
-
-CLEARANCE_M = 1.0
-"""How much wider than its radius a boat driven home passes an obstacle."""
 
 
 @kernel
@@ -41,33 +38,13 @@ def heading_into_field(size: Array, x: float, y: float) -> float:
 
 
 @kernel
-def heading_around_obstacles(rules: Rules, i: int, x: float, y: float, goal_x: float, goal_y: float) -> float:
-    """Heading to a goal, or along the tangent of the first obstacle (as a circle) that the straight way would hit."""
-    way = math.hypot(goal_x - x, goal_y - y)
-    heading = heading_to(goal_x - x, goal_y - y)
-    nearest = np.inf
-    around = heading
-    for number in range(rules.obstacles.bounds.shape[0]):
-        dx = rules.obstacles.bounds[number, 0] - x
-        dy = rules.obstacles.bounds[number, 1] - y
-        radius = rules.obstacles.bounds[number, 2] + rules.agent_radius[i] + CLEARANCE_M
-        distance = math.hypot(dx, dy)
-        offset = wrap_bearing(heading - heading_to(dx, dy))
-        half_angle = 90.0 if distance <= radius else math.degrees(math.asin(radius / distance))
-        if abs(offset) < half_angle and distance - radius < way and distance < nearest:
-            nearest = distance
-            around = heading_to(dx, dy) + (half_angle if offset >= 0.0 else -half_angle)
-    return around
-
-
-@kernel
 def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
     """Command of a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
     x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
     if games.is_tagged[b, i]:
         home = rules.flag_home[rules.team[i]]
         if rules.obstacles.bounds.shape[0] > 0:
-            heading = heading_around_obstacles(rules, i, x, y, home[0], home[1])
+            heading = heading_past_obstacles(rules.obstacles, rules.agent_radius[i], x, y, home)
         else:
             heading = heading_to(home[0] - x, home[1] - y)
     else:

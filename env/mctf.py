@@ -46,6 +46,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             and after the step.
         command_filter: see ``env.command_filter``: called with ``core`` and the decided commands (1, n, 2) before
             the boats move; the shield's place.
+        seed: seed of random starts, until `reset` gives another.
 
     Raises:
         ConfigError: an unusable config, action kind or render mode.

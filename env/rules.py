@@ -122,5 +122,5 @@ def check_end(rules: Rules, games: Games, first: int, last: int) -> None:
     """End a game when a team has the top score, or when time is up (to the reference's tolerance)."""
     slack = 1e-8 + 1e-5 * rules.max_time_s
     for b in range(first, last):
-        games.terminated[b] = games.captures[b, 0] == rules.max_score or games.captures[b, 1] == rules.max_score
+        games.terminated[b] = max(games.captures[b, 0], games.captures[b, 1]) >= rules.max_score
         games.truncated[b] = not games.terminated[b] and games.time_s[b] >= rules.max_time_s - slack
