@@ -93,6 +93,7 @@ class ShieldConfig:
         return cls(**settings)
 
 
+_TEXTS = {"certificate", "coordination", "solver"}
 _POSITIVE = {"separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s"}
 _MAY_BE_NONE = {"horizon_s", "edge_m"}
 _MAY_BE_INFINITE = {"response_per_s", "max_track_age_s"}
@@ -100,7 +101,11 @@ _MAY_BE_INFINITE = {"response_per_s", "max_track_age_s"}
 
 def _check_number(name: str, value: object) -> None:
     """Numbers are finite (where not said otherwise) and >= 0, or > 0 where zero makes no sense."""
-    if isinstance(value, str) or (value is None and name in _MAY_BE_NONE):
+    if name in _TEXTS:
+        if not isinstance(value, str):
+            raise ConfigError(f"{name} is {value!r}; give a name")
+        return
+    if value is None and name in _MAY_BE_NONE:
         return
     if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
         raise ConfigError(f"{name} is {value!r}; give a number")
