@@ -8,9 +8,11 @@ import numpy as np
 
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
+from .fleet import LARGEST
 from .flow import Plan, decide_compiled, new_plan
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform
+from .platforms import layout as L
 from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
@@ -78,6 +80,10 @@ class BatchedShield:
     ) -> None:
         if config.coordination != "team" or config.delay_s > 0:
             raise ConfigError("a batch decides for whole teams at once: set coordination='team' and delay_s=0")
+        if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
+            raise ConfigError(f"games is {games!r}; give a whole number >= 1")
+        if len(platforms) != len(team) or not platforms:
+            raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
         self.config = config
         n = len(platforms)
         self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
@@ -113,14 +119,14 @@ class BatchedShield:
             FleetError: an array has the wrong shape or a state is not finite.
         """
         for name, array, shape in (
-            ("state", state, (*self.reason.shape, state.shape[-1])),
+            ("state", state, (*self.reason.shape, L.N_STATE)),
             ("wanted", wanted, self.sent.shape),
             ("ours", ours, self.reason.shape),
         ):
-            if array.shape != shape:
-                raise FleetError(f"{name} has shape {array.shape}; expected {shape}")
-        if not np.isfinite(state[:, :, :6]).all():
-            raise FleetError("a boat's position, heading, speed, thrust or rudder is not finite")
+            if np.shape(array) != shape:
+                raise FleetError(f"{name} has shape {np.shape(array)}; expected {shape}")
+        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
+            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         decide_games(
             state,
             wanted,

@@ -53,7 +53,8 @@ class Commands:
         """Values as (speed m/s, relative heading deg); absolute headings give errors in [-180, 180)."""
         if self.relative:
             return self.values
-        error = (np.degrees(self.values[:, 1]) - heading_deg + 180.0) % 360.0 - 180.0
+        with np.errstate(invalid="ignore", over="ignore"):  # an unusable heading stays NaN: the shield holds the boat
+            error = (np.degrees(self.values[:, 1]) - heading_deg + 180.0) % 360.0 - 180.0
         return np.stack([self.values[:, 0], error], axis=1)
 
     def absolute(self, i: int, heading_rad: float) -> tuple[float, float]:

@@ -30,7 +30,7 @@ class Reason(IntEnum):
     BEST_EFFORT = flow.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
     HELD = flow.HELD
-    """The wanted command was not finite; the boat is told to stop on its course."""
+    """The wanted command was not finite or absurdly large; the boat is told to stop on its course."""
     NOT_COVERED = flow.NOT_COVERED
     """The shield does not decide for this boat."""
 

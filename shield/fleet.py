@@ -9,11 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .exceptions import FleetError
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform
 from .platforms import layout as L
 
-_SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
+_SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
+
+LARGEST = 1e9
+"""Values beyond this (m, m/s, deg, percent) are faults of the source: squares of them lose the metres."""
+
+
+@kernel
+def sound(state: Array) -> bool:
+    """Whether what is seen of every boat is finite and of a sensible size, and its memory is that or NaN."""
+    for i in range(state.shape[0]):
+        for column in range(state.shape[1]):
+            if column <= L.SPEED and not abs(state[i, column]) <= LARGEST:
+                return False
+            if abs(state[i, column]) > LARGEST:
+                return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -86,7 +101,9 @@ class Fleet:
         if heading_error_rad is not None:
             state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
         state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
-        teams = _shaped("team", team, (n,)).astype(np.int64)
+        teams = _whole("team", _shaped("team", team, (n,)))
+        if platforms is None:
+            raise FleetError("platforms is None; give a platform's name, or one for each boat")
         kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
         fleet = cls(
             state=state,
@@ -107,19 +124,40 @@ class Fleet:
         """Check shapes and values.
 
         Raises:
-            FleetError: shapes do not fit together, or a position, heading or speed is not finite.
+            FleetError: shapes do not fit together, a position, heading or speed is not finite or absurd, or an error
+                bound is not a length.
         """
         n = len(self.state)
-        if self.state.ndim != 2 or self.state.shape[1] != L.N_STATE:
-            raise FleetError(f"state has shape {self.state.shape}; give (n, {L.N_STATE}), see platforms.layout")
-        for name in ("team", "platforms", "controlled", "names"):
-            if len(getattr(self, name)) != n:
-                raise FleetError(f"{name} has {len(getattr(self, name))} entries for {n} boats; give one per boat")
-        bad = np.argwhere(~np.isfinite(self.state[:, _SEEN]))
-        if len(bad):
-            i, column = bad[0]
-            what = ("position", "position", "heading", "speed")[column]
-            raise FleetError(f"{what} of boat {self.names[i]!r} is not finite; leave boats without a track out")
+        if self.state.ndim != 2 or self.state.shape[1] != L.N_STATE or self.state.dtype != np.float64:
+            raise FleetError(
+                f"state has shape {self.state.shape} of {self.state.dtype}; give (n, {L.N_STATE}) of float64, see "
+                "platforms.layout"
+            )
+        for name in ("team", "platforms", "controlled", "names", "age_s", "position_error_m"):
+            value = getattr(self, name)
+            if value is not None and len(value) != n:
+                raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
+        if self.controlled.dtype != np.bool_:
+            raise FleetError(f"controlled is of {self.controlled.dtype}; give True or False per boat")
+        if not sound(self.state):
+            self._name_fault()
+        error = self.position_error_m
+        if error is not None and not ((error >= 0.0) & (error <= LARGEST)).all():
+            raise FleetError(
+                "position_error_m holds a value that is negative or not finite; give a bound in m per boat"
+            )
+
+    def _name_fault(self) -> None:
+        """Raise for the first boat whose values cannot be used."""
+        size = np.abs(self.state)
+        bad = size > LARGEST
+        bad[:, _SEEN] |= ~np.isfinite(size[:, _SEEN])
+        i, column = np.argwhere(bad)[0]
+        what = {L.X: "position", L.Y: "position", L.HEADING: "heading", L.SPEED: "speed"}.get(column, "memory")
+        remedy = "give NaN where it is unknown" if what == "memory" else "leave boats without a track out"
+        raise FleetError(
+            f"{what} of boat {self.names[i]!r} is not finite or beyond {LARGEST:g} ({self.state[i, column]}); {remedy}"
+        )
 
     @property
     def position_m(self) -> Array:
@@ -148,3 +186,10 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array
         wanted = tuple("n" if entry is None else entry for entry in shape)
         raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
     return array
+
+
+def _whole(name: str, values: Array) -> IntArray:
+    """Values as integers; fractions and NaN are refused."""
+    if not (np.isfinite(values).all() and (values == np.round(values)).all()):
+        raise FleetError(f"{name} holds a value that is not a whole number: {values.tolist()}")
+    return values.astype(np.int64)

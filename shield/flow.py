@@ -25,6 +25,9 @@ from .scene import Boats, Fixed, Memory, Tuning, Work
 
 PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED = range(7)
 
+LARGEST_COMMAND = 1e6
+"""Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""
+
 ROUNDS = 3
 """Times the program is linearised and solved anew before the ladder takes over."""
 
@@ -113,7 +116,8 @@ def screen(
 ) -> bool:
     """Check the wanted commands as they are; True when every boat still has its escape after them.
 
-    An unusable (non-finite) command is replaced by holding course at zero speed before the check.
+    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
+    the check.
     """
     n = state.shape[0]
     look_around(state, margin_m, boats, tuning, work)
@@ -125,7 +129,7 @@ def screen(
         plan.reason[i] = PASSED if ours[i] else NOT_COVERED
         if not ours[i]:
             continue
-        if not (math.isfinite(wanted[i, 0]) and math.isfinite(wanted[i, 1])):
+        if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
         predict(i, plan.commands, state, boats, tuning, work)

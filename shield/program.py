@@ -7,15 +7,20 @@ with scaled inputs z (see `rows`). An answer counts only when it satisfies every
 
 from __future__ import annotations
 
+import logging
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import qpsolvers
+from scipy.sparse import csc_matrix, identity
 
 from .exceptions import SolverError
 from .jit import Array, kernel
+
+logger = logging.getLogger(__name__)
 
 ROW_TOLERANCE = 1e-4
 """Largest accepted violation of a unit-length row; the exact check of the command follows anyway."""
@@ -73,15 +78,35 @@ def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
     return True
 
 
+@lru_cache(maxsize=64)
+def _sparse_identity(n: int) -> Any:
+    return identity(n, format="csc")
+
+
+def _ask(program: Program, solver: str) -> Any:
+    """What the backend answers, whatever that is."""
+    options = OPTIONS.get(solver, {})
+    if solver in qpsolvers.dense_solvers:
+        identity_n = _identity(program.z0.shape[0])
+        return qpsolvers.solve_qp(identity_n, -program.z0, -program.C, -program.d, solver=solver, **options)
+    with warnings.catch_warnings():  # these also warn of programs without an answer: that is read from the answer
+        warnings.simplefilter("ignore")
+        identity_n, rows = _sparse_identity(program.z0.shape[0]), csc_matrix(-program.C)
+        return qpsolvers.solve_qp(identity_n, -program.z0, rows, -program.d, solver=solver, **options)
+
+
 def solve(program: Program, solver: str) -> Array | None:
-    """Answer of the program, shape (n,), or None when the backend finds none that passes our own check."""
-    n = program.z0.shape[0]
+    """Answer of the program, shape (n,), or None when the backend finds none that passes our own check.
+
+    Fails closed: a backend that raises, or answers anything but n numbers that satisfy every row, has no answer.
+    """
     try:
-        answer = qpsolvers.solve_qp(
-            _identity(n), -program.z0, -program.C, -program.d, solver=solver, **OPTIONS.get(solver, {})
-        )
+        answer = _ask(program, solver)
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
         return None
-    if answer is None or answer.shape != (n,):
+    except Exception as error:  # whatever goes wrong in foreign code, the ladder takes over
+        logger.warning("QP solver %s failed (%s: %s)", solver, type(error).__name__, error)
+        return None
+    if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:
         return None
     return answer if holds(program.C, program.d, answer, ROW_TOLERANCE) else None

@@ -12,6 +12,7 @@ from .certificates.paths import STRIDE
 from .config import ShieldConfig
 from .jit import Array
 from .platforms import Platform, get_platform
+from .platforms import layout as L
 from .platforms.limits import limits_of
 from .scene import Boats, Tuning
 
@@ -53,7 +54,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.dt_s) for kind in kinds]
     sample_s = STRIDE * config.dt_s
     return Boats(
-        params=np.array([kind.pack() for kind in kinds]),
+        params=np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM),
         team=np.array(team, dtype=np.int64),
         granted_turn_dps=np.array([share * limit.turn_rate_dps for limit in limits]),
         granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),

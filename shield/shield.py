@@ -13,7 +13,7 @@ from . import flow
 from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
-from .exceptions import FleetError
+from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
 from .flow import Plan
 from .jit import Array, BoolArray
@@ -61,7 +61,7 @@ class Shield:
         self, config: ShieldConfig | None = None, surroundings: Surroundings = OPEN_WATER, **settings: Any
     ) -> None:
         if config is not None and settings:
-            raise FleetError("give either a ShieldConfig or single settings, not both")
+            raise ConfigError("give either a ShieldConfig or single settings, not both")
         self.config = config if config is not None else ShieldConfig.of(**settings)
         self.surroundings = surroundings
         self._tuning = tuning_of(self.config)
@@ -92,8 +92,8 @@ class Shield:
             FleetError: shapes do not fit, a state is not finite or a track too old.
         """
         started = time.perf_counter()
-        if len(wanted) != len(fleet):
-            raise FleetError(f"{len(wanted)} commands for {len(fleet)} boats; give one row per boat")
+        if wanted.values.shape != (len(fleet), 2):
+            raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
         boats = self._scene(fleet)
         state, margin = prepare(fleet, self.config, boats.params, self._sent)
         asked = wanted.as_relative_deg(state[:, L.HEADING])
@@ -130,7 +130,7 @@ class Shield:
             n = len(fleet)
             seats = 1 if self.config.coordination == "team" else n
             rows = min(n * (n + 5) + 2, MOST_ROWS)
-            samples = int(self._boats.samples.max())
+            samples = int(self._boats.samples.max(initial=1))
             self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
             self._key, self._sent = key, None
         return self._boats

@@ -36,13 +36,12 @@ class Surroundings:
     keep_out: Sequence[tuple[float, float, float]] = ()
 
     def __post_init__(self) -> None:
-        for name, values in (("field", [self.field or ()]), ("circles", self.circles), ("keep_out", self.keep_out)):
-            for row in values:
-                if not all(math.isfinite(value) for value in row):
-                    raise ConfigError(f"{name} holds a value that is not finite: {row}")
+        if self.field is not None:
+            object.__setattr__(self, "field", _numbers("field", self.field, "(xmin, ymin, xmax, ymax)"))
         for name in ("circles", "keep_out"):
-            object.__setattr__(self, name, tuple(tuple(map(float, row)) for row in getattr(self, name)))
-        corners = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in self.polygons)
+            rows = tuple(_numbers(name, row, "(x, y, radius)") for row in getattr(self, name))
+            object.__setattr__(self, name, rows)
+        corners = tuple(tuple(_numbers("polygons", corner, "(x, y)") for corner in line) for line in self.polygons)
         object.__setattr__(self, "polygons", corners)
         if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out)):
             raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
@@ -64,6 +63,19 @@ class Surroundings:
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
             segment_m=config.hull_m,
         )
+
+
+def _numbers(name: str, row: Sequence[float], form: str) -> tuple[float, ...]:
+    """A row as a tuple of finite floats, as many as ``form`` names."""
+    try:
+        values = tuple(float(value) for value in row)
+    except (TypeError, ValueError):
+        raise ConfigError(f"{name} holds {row!r}; give {form} in m") from None
+    if len(values) != form.count(",") + 1:
+        raise ConfigError(f"{name} holds {row!r}; give {form} in m")
+    if not all(math.isfinite(value) for value in values):
+        raise ConfigError(f"{name} holds a value that is not finite: {row}")
+    return values
 
 
 OPEN_WATER = Surroundings()

@@ -73,11 +73,10 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, last_sent: Array 
         State (n, N_STATE), a copy, and margins (n,), m.
 
     Raises:
-        FleetError: a value is not finite, or a track is older than ``max_track_age_s``.
+        FleetError: shapes do not fit, a value is not finite, or a track is older than ``max_track_age_s``.
     """
+    fleet.check()
     state = fleet.state.copy()
-    if not np.isfinite(state[:, : L.SPEED + 1]).all():
-        fleet.check()
     fill_memory(state, params)
     n = len(state)
     margin = np.full(n, config.position_error_m)
