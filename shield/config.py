@@ -27,7 +27,7 @@ class ShieldConfig:
         opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
             takes opponents to hold course and speed.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
-        margin_cap_m: margins above this shrink freely, m.
+        margin_cap_m: margins above this shrink freely and are reported as infinite, m.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
@@ -51,7 +51,7 @@ class ShieldConfig:
     solver: str = "daqp"
     opponent_share: float = 1.0
     response_per_s: float = math.inf
-    margin_cap_m: float = 1.0
+    margin_cap_m: float = 2.0
     tail_s: float = 5.0
     horizon_s: float | None = None
     hysteresis_m: float = 0.3

@@ -14,7 +14,7 @@ import numpy as np
 from .active_set import OPTIMAL, project
 from .certificates.assign import assign_plans
 from .certificates.clearance import MARGIN
-from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, look_around
+from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, look_around
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
@@ -28,7 +28,7 @@ PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED = range(7)
 LARGEST_COMMAND = 1e6
 """Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""
 
-ROUNDS = 3
+ROUNDS = 2
 """Times the program is linearised and solved anew before the ladder takes over."""
 
 SAME = 1e-6
@@ -136,6 +136,20 @@ def screen(
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     plan.kept_commands[:] = plan.commands
     return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
+
+
+@kernel
+def lost(ours: BoolArray, memory: Memory, work: Work) -> bool:
+    """Whether some boat is short of its margin, as it was on its escape: then the escape goes on until all is safe.
+
+    One step of the program cannot win back what no manoeuvre could; searching for it costs time and makes the boat
+    dither.
+    """
+    found = False
+    for i in range(ours.shape[0]):
+        short = memory.escaping[i] and memory.margin_m[i] < 0.0 and work.merit[i] < STRAIGHT_SAFE
+        found = found or (ours[i] and short)
+    return found
 
 
 @kernel
@@ -397,7 +411,7 @@ def decide_compiled(
     """The whole decision for one game; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
     safe = screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
     count = 0
-    for _ in range(ROUNDS):
+    for _ in range(0 if lost(ours, memory, work) else ROUNDS):
         if safe:
             break
         count = pick_movers(ours, work, plan)

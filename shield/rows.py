@@ -23,8 +23,9 @@ from .certificates.manoeuvre import clear_of_boat, clear_of_hunter, hunts
 from .certificates.surroundings import clear_of_surroundings
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
+from .platforms.actuator import thrust_after
 from .platforms.step import step_boat
-from .platforms.usv import turn_of_rudder, update_thrust
+from .platforms.usv import turn_of_rudder
 from .scene import Boats, Fixed, Tuning, Work
 
 AIM_M = 0.02
@@ -38,12 +39,11 @@ PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
 
 
 @kernel
-def turn_range(params: Array, state: Array, speed_mps: float, row: Array, dt_s: float) -> float:
-    """Largest turn, deg, that this step can make under a speed command; ``row`` is scratch."""
+def turn_range(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
+    """Largest turn, deg, that this step can make under a speed command."""
     if params[L.KIND] == L.KIND_USV:
-        row[:] = state
-        update_thrust(params, row, speed_mps, dt_s)
-        return turn_of_rudder(params, row[L.THRUST], min(params[L.MAX_RUDDER], 100.0), dt_s)
+        thrust = thrust_after(params, state, speed_mps, dt_s)
+        return turn_of_rudder(params, thrust, min(params[L.MAX_RUDDER], 100.0), dt_s)
     return params[L.MAX_TURN_RATE] * dt_s
 
 
@@ -119,7 +119,7 @@ def inputs_of(
     root = math.sqrt(tuning.speed_weight)
     for m in range(movers.shape[0]):
         i = movers[m]
-        full = max(turn_range(boats.params[i], state[i], commands[i, 0], work.row, tuning.dt_s), 1e-6)
+        full = max(turn_range(boats.params[i], state[i], commands[i, 0], tuning.dt_s), 1e-6)
         top = boats.params[i, L.MAX_SPEED]
         gain[i, 0] = math.radians(full)
         gain[i, 1] = speed_effect(i, commands[i], state, boats, tuning, work) * top / root
@@ -149,10 +149,10 @@ def _pair_row(
     r: int,
 ) -> bool:
     """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
-    clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR)
+    clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR, FAR)
     if hunts(i, j, ours, boats) and not work.breach[i, j]:
         work.spare2[:] = work.out
-        clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR)
+        clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR, FAR)
         if work.out[MARGIN] > work.spare2[MARGIN]:
             work.out[:] = work.spare2
     k, nx, ny = int(work.out[SAMPLE]), work.out[NORMAL_X], work.out[NORMAL_Y]

@@ -150,7 +150,7 @@ class Shield:
         memory, work, plan = seat.memory, seat.work, seat.plan
         safe = flow.screen(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
         count = 0
-        for _ in range(flow.ROUNDS):
+        for _ in range(0 if flow.lost(ours, memory, work) else flow.ROUNDS):
             if safe:
                 break
             count = flow.pick_movers(ours, work, plan)

@@ -33,6 +33,18 @@ def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
 
 
 @kernel
+def candidate(
+    i: int, p: int, wanted_mps: float, heading_deg: float, boats: Boats, plans: Array, memory: Memory
+) -> tuple[float, float, float]:
+    """Manoeuvre number p of boat i: 0 is the one in memory, the rest the family; (side, turn deg, speed m/s)."""
+    if p == 0:
+        return memory.side[i], kept_turn(i, heading_deg, memory), memory.speed_mps[i]
+    row = plans[p - 1]
+    speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
+    return row[0], row[1], speed
+
+
+@kernel
 def choose_plan(
     i: int,
     wanted_mps: float,
@@ -49,31 +61,21 @@ def choose_plan(
 ) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``exhaustive`` the best of all.
 
-    The first manoeuvre of the family and the one in memory are tried before the others. The one under way
-    is left only for one that is better by the hysteresis, so that a side once taken is kept.
+    The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept.
     """
     trial = state.shape[0]
-    top = boats.params[i, L.MAX_SPEED]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
-    for p in range(-1, plans.shape[0]):
-        # order: family's first, memory (p = 0 stands for it once the first is done), the rest
-        bonus = 0.0
-        if p == 0:
-            if not memory.kept[i]:
-                continue
-            side, speed = memory.side[i], memory.speed_mps[i]
-            togo = kept_turn(i, heading, memory)
-            bonus = tuning.hysteresis_m if memory.escaping[i] else 0.0
-        else:
-            q = 0 if p == -1 else p
-            side, togo = plans[q, 0], plans[q, 1]
-            speed = wanted_mps if plans[q, 2] == COMMANDED else plans[q, 2] * top
+    for p in range(plans.shape[0] + 1):
+        if p == 0 and not memory.kept[i]:
+            continue
+        side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
+        bonus = tuning.hysteresis_m if p == 0 and memory.escaping[i] else 0.0
         lay_path(i, trial, side, togo, speed, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best - bonus, state, ours, boats, fixed, tuning, work)
-        merit_kept = merit + (bonus if merit < FIXED_LOST else 1e-3 * bonus)
-        if merit_kept > best:
-            best = merit_kept
+        kept_merit = merit + (bonus if merit < FIXED_LOST else 1e-3 * bonus)
+        if kept_merit > best:
+            best = kept_merit
             _take(i, trial, merit, work)
         if merit >= PAIR_SAFE and not exhaustive:
             return
@@ -118,22 +120,20 @@ def assign_plans(
     n = state.shape[0]
     for i in range(n):
         if who[i]:
-            if memory.kept[i]:
-                heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-                togo = kept_turn(i, heading, memory)
-                lay_path(i, i, memory.side[i], togo, memory.speed_mps[i], done, state, boats, tuning, work)
-            else:
-                lay_path(i, i, 1.0, 0.0, commands[i, 0], done, state, boats, tuning, work)
+            heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
+            first = 0 if memory.kept[i] else 1
+            side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
+            lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
+    stale = True
     for sweep in range(SWEEPS):
-        good = True
+        changed = False
         for i in range(n):
             if not who[i]:
                 continue
-            if sweep > 0:
+            if not (exhaustive and sweep == 0):
                 refresh(i, state, ours, boats, fixed, tuning, work)
                 if work.merit[i] >= PAIR_SAFE:
                     continue
-            good = False
             choose_plan(
                 i,
                 commands[i, 0],
@@ -148,11 +148,14 @@ def assign_plans(
                 memory,
                 work,
             )
-        if good:
+            changed = True
+        if not changed:
+            stale = False
             break
     good = True
     for i in range(n):
         if ours[i]:
-            refresh(i, state, ours, boats, fixed, tuning, work)
+            if stale or not who[i]:
+                refresh(i, state, ours, boats, fixed, tuning, work)
             good = good and work.merit[i] >= PAIR_SAFE
     return good

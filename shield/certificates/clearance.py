@@ -16,6 +16,9 @@ NORMAL_X = 2
 NORMAL_Y = 3
 N_CLEARANCE = 4
 
+LONGEST_STRIDE = 6
+"""Samples a hunter far away is moved on at once."""
+
 FAR = 1e6
 """Margin, m, of a pair that cannot meet."""
 
@@ -49,58 +52,80 @@ def _finish(out: Array, best: float, radius_m: float) -> None:
 
 
 @kernel
-def clear_of_path(
-    own: Array, other: Array, samples: int, tail: float, radius_m: float, floor_m: float, out: Array
-) -> None:
-    """Clearance between two sampled paths, run on straight for ``tail`` samples at the end.
-
-    Stops early once the margin is below ``floor_m``: such a manoeuvre is out of the running anyway.
-    """
-    best = FAR * FAR
-    stop = max(0.0, floor_m + radius_m)
-    stop *= stop
-    x0, y0 = own[0, 0] - other[0, 0], own[0, 1] - other[0, 1]
-    dx, dy = 0.0, 0.0
-    for k in range(1, samples + 1):
-        x1, y1 = own[k, 0] - other[k, 0], own[k, 1] - other[k, 1]
-        best = _note(out, best, x0, y0, x1, y1, k)
-        if best < stop:
-            break
-        dx, dy = x1 - x0, y1 - y0
-        x0, y0 = x1, y1
-    if best >= stop and tail > 0.0:
-        best = _note(out, best, x0, y0, x0 + tail * dx, y0 + tail * dy, samples)
-    _finish(out, best, radius_m)
+def _relative(own: Array, other: Array, x: float, y: float, sx: float, sy: float, k: int) -> tuple[float, float]:
+    """Vector from the neighbour to the boat at sample k; ``other`` is its path, or empty for a straight course."""
+    if other.shape[0] > 0:
+        return own[k, 0] - other[k, 0], own[k, 1] - other[k, 1]
+    return own[k, 0] - x - k * sx, own[k, 1] - y - k * sy
 
 
 @kernel
-def clear_of_straight(
+def clear_of_course(
     own: Array,
+    other: Array,
     x: float,
     y: float,
     sx: float,
     sy: float,
     samples: int,
     tail: float,
+    closing_m: float,
     radius_m: float,
     floor_m: float,
+    cap_m: float,
     out: Array,
 ) -> None:
-    """Clearance from a neighbour that keeps its velocity: at (x, y) m now, moving (sx, sy) m per sample."""
-    best = FAR * FAR
+    """Clearance from a neighbour whose way is known: along a sampled path, or straight on.
+
+    Samples that cannot bring the pair nearer than what is already known are skipped: in m samples the distance
+    shrinks by at most m * ``closing_m``. The search stops once the margin is below ``floor_m``, and margins above
+    ``cap_m`` are reported as ``cap_m``.
+
+    Args:
+        own: the boat's path, m.
+        other: the neighbour's path, m, or an empty array (0, 2) for a straight course.
+        x: straight course: position at sample 0, east, m.
+        y: north, m.
+        sx: movement per sample, east, m.
+        sy: north, m.
+        samples: last sample.
+        tail: samples for which both run straight on afterwards.
+        closing_m: most the distance can shrink per sample, m.
+        radius_m: radius to keep, m.
+        floor_m: margin below which the search stops, m.
+        cap_m: margin above which nothing is looked at closely, m.
+        out: the result row.
+    """
+    root = radius_m + cap_m
+    best = root * root
+    worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
     stop = max(0.0, floor_m + radius_m)
     stop *= stop
-    x0, y0 = own[0, 0] - x, own[0, 1] - y
-    dx, dy = 0.0, 0.0
-    for k in range(1, samples + 1):
-        x1, y1 = own[k, 0] - x - k * sx, own[k, 1] - y - k * sy
+    out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = samples, 0.0, 0.0
+    x0, y0 = _relative(own, other, x, y, sx, sy, 0)
+    k = 0
+    while True:
+        square = x0 * x0 + y0 * y0
+        if square > worth:
+            k += int((math.sqrt(square) - root) / closing_m)
+            if k >= samples:
+                break
+            x0, y0 = _relative(own, other, x, y, sx, sy, k)
+            continue
+        k += 1
+        if k > samples:
+            break
+        x1, y1 = _relative(own, other, x, y, sx, sy, k)
         best = _note(out, best, x0, y0, x1, y1, k)
         if best < stop:
             break
-        dx, dy = x1 - x0, y1 - y0
         x0, y0 = x1, y1
     if best >= stop and tail > 0.0:
-        best = _note(out, best, x0, y0, x0 + tail * dx, y0 + tail * dy, samples)
+        x0, y0 = _relative(own, other, x, y, sx, sy, samples)
+        reach = math.sqrt(best) + tail * closing_m
+        if x0 * x0 + y0 * y0 < reach * reach:
+            xb, yb = _relative(own, other, x, y, sx, sy, samples - 1)
+            best = _note(out, best, x0, y0, x0 + tail * (x0 - xb), y0 + tail * (y0 - yb), samples)
     _finish(out, best, radius_m)
 
 
@@ -144,8 +169,10 @@ def clear_of_pursuer(
     lead: bool,
     sample_s: float,
     samples: int,
+    closing_m: float,
     radius_m: float,
     floor_m: float,
+    cap_m: float,
     out: Array,
 ) -> None:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
@@ -162,26 +189,39 @@ def clear_of_pursuer(
         turn_rad: granted turn per sample, rad.
         lead: steer for the meeting point instead of the boat itself.
         sample_s: time between samples, s.
-        samples: samples of the path to go through.
-        radius_m: separation radius, m.
-        floor_m: margin below which the search stops early, m.
+        samples: last sample.
+        closing_m: most the distance can shrink per sample, m.
+        radius_m: radius to keep, m.
+        floor_m: margin below which the search stops, m.
+        cap_m: margin above which nothing is looked at closely, m.
         out: the result row.
     """
-    best = FAR * FAR
+    root = radius_m + cap_m
+    best = root * root
+    worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
     stop = max(0.0, floor_m + radius_m)
     stop *= stop
-    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = samples, 0.0, 0.0
+    c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
     x0, y0 = own[0, 0] - x, own[0, 1] - y
-    for k in range(1, samples + 1):
+    k = 0
+    while k < samples:
+        stride = 1
+        square = x0 * x0 + y0 * y0
+        if square > worth:
+            stride = int((math.sqrt(square) - root) / closing_m)
+            if stride >= samples - k:
+                break
+            stride = min(stride, LONGEST_STRIDE)
+        c, s = c1, s1
+        for _ in range(stride - 1):
+            c, s = c * c1 - s * s1, s * c1 + c * s1
+        k += stride
         ax, ay = own[k, 0] - x, own[k, 1] - y
         if lead:
-            ax, ay = _aim(
-                own[k - 1, 0] - x,
-                own[k - 1, 1] - y,
-                own[k, 0] - own[k - 1, 0],
-                own[k, 1] - own[k - 1, 1],
-                speed_mps * sample_s,
-            )
+            before = k - stride
+            vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
+            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s)
         along, across = ux * ax + uy * ay, ux * ay - uy * ax
         if along > 0.0 and abs(across) * c <= along * s:
             norm = math.sqrt(ax * ax + ay * ay)
@@ -191,8 +231,9 @@ def clear_of_pursuer(
             ux, uy = c * ux - s * uy, s * ux + c * uy
         else:
             ux, uy = c * ux + s * uy, c * uy - s * ux
-        new_speed = max(speed_mps, min(top_speed_mps, speed_mps + acc_mps2 * sample_s))
-        way = 0.5 * (speed_mps + new_speed) * sample_s
+        time_s = stride * sample_s
+        new_speed = max(speed_mps, min(top_speed_mps, speed_mps + acc_mps2 * time_s))
+        way = 0.5 * (speed_mps + new_speed) * time_s
         speed_mps = new_speed
         x += way * ux
         y += way * uy

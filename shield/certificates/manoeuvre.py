@@ -17,7 +17,7 @@ import math
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
-from .clearance import FAR, MARGIN, clear_of_path, clear_of_pursuer, clear_of_straight
+from .clearance import FAR, MARGIN, clear_of_course, clear_of_pursuer
 from .paths import STRIDE, trace_path
 from .surroundings import clear_of_surroundings
 
@@ -82,30 +82,41 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
 
 
 @kernel
+def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
+    """Most the distance of a pair can shrink from sample to sample, m."""
+    top_i = max(boats.params[i, L.MAX_SPEED], state[i, L.SPEED])
+    top_j = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED])
+    return (top_i + top_j) * STRIDE * tuning.dt_s
+
+
+@kernel
 def clear_of_opponent(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
 ) -> None:
     """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
     sample_s = STRIDE * tuning.dt_s
     course = work.course[j]
     way = state[j, L.SPEED] * sample_s
-    clear_of_straight(
+    clear_of_course(
         path,
+        work.path[0, :0],
         course[0],
         course[1],
         way * course[2],
         way * course[3],
         boats.samples[i],
         tuning.tail_s / sample_s,
+        closing(i, j, state, boats, tuning),
         work.radius[i, j],
         floor_m,
+        cap_m,
         work.out,
     )
 
 
 @kernel
 def clear_of_hunter(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float
+    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
@@ -130,8 +141,10 @@ def clear_of_hunter(
             lead == 1,
             sample_s,
             boats.samples[i],
+            closing(i, j, state, boats, tuning),
             work.radius[i, j],
             floor_m,
+            cap_m,
             work.spare,
         )
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -160,16 +173,41 @@ def _rank_recovery(
 
 @kernel
 def clear_of_boat(
-    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work, floor_m: float
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+    cap_m: float,
 ) -> None:
     """Clearance row of boat i on ``path`` from boat j, into ``work.out``."""
-    floor = -FAR if work.breach[i, j] else floor_m
+    floor, cap = floor_m, cap_m
+    if work.breach[i, j]:
+        floor, cap = -FAR, FAR
     if ours[j]:
         samples = min(boats.samples[i], boats.samples[j])
         tail = tuning.tail_s / (STRIDE * tuning.dt_s)
-        clear_of_path(path, work.path[j], samples, tail, work.radius[i, j], floor, work.out)
+        clear_of_course(
+            path,
+            work.path[j],
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            samples,
+            tail,
+            closing(i, j, state, boats, tuning),
+            work.radius[i, j],
+            floor,
+            cap,
+            work.out,
+        )
     else:
-        clear_of_opponent(i, j, path, state, boats, tuning, work, floor)
+        clear_of_opponent(i, j, path, state, boats, tuning, work, floor, cap)
     if work.breach[i, j]:
         _rank_recovery(i, j, path, state, ours, boats, tuning, work)
 
@@ -198,7 +236,9 @@ def worst_clearance(
     for j in range(state.shape[0]):
         if j == i or not work.near[i, j]:
             continue
-        clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, floor_m)
+        clear_of_boat(
+            i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
+        )
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j
@@ -224,7 +264,9 @@ def worst_hunter(
             continue
         if work.breach[i, j]:
             continue
-        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m)
+        clear_of_hunter(
+            i, j, work.path[slot], state, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
+        )
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j

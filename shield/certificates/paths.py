@@ -6,15 +6,18 @@ candidate command, or after the manoeuvre's own first step.
 
 from __future__ import annotations
 
+import math
+
 from ..jit import Array, kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
+from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 
 STRIDE = 2
 """Model steps between samples of a path."""
 
 STEADY_SPEED = 1e-4
-"""Change of speed per step, m/s, below which a straight run is taken as steady."""
+"""Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
 
 
 @kernel
@@ -62,21 +65,81 @@ def trace_path(
         samples: number of samples after sample 0.
         path: shape (>= samples + 1, 2), float64.
     """
+    if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
+        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, samples, path)
+        return
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
     path[0, 0], path[0, 1] = row[L.X], row[L.Y]
     k = 1
     step = 0
     while k <= samples:
-        x, y, speed = row[L.X], row[L.Y], row[L.SPEED]
-        straight = togo_deg <= 0.0
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
         if step % STRIDE == 0:
             path[k, 0], path[k, 1] = row[L.X], row[L.Y]
             k += 1
-        if straight and step > 1 and abs(row[L.SPEED] - speed) < STEADY_SPEED and row[L.TURN_RATE] == 0.0:
-            _run_on(row[L.X], row[L.Y], row[L.X] - x, row[L.Y] - y, step, k, samples, path)
+
+
+@kernel
+def _trace_usv(
+    params: Array,
+    row: Array,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    dt_s: float,
+    done: int,
+    samples: int,
+    path: Array,
+) -> None:
+    """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
+
+    The turn of a step is rudder, thrust and sign in one: full rudder until less than a full step's turn is left, then
+    the rudder that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
+    """
+    x, y, v = row[L.X], row[L.Y], row[L.SPEED]
+    thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
+    heading = math.radians(row[L.HEADING])
+    ux, uy = math.sin(heading), math.cos(heading)
+    most = min(params[L.MAX_RUDDER], 100.0)
+    top = params[L.MAX_SPEED]
+    half, c, s = 0.0, 1.0, 0.0
+    k, step = 0, done - 1
+    if done == 1:
+        path[0, 0], path[0, 1] = x, y
+        k, step = 1, 0
+    while k <= samples:
+        last = thrust
+        thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
+        turn, rudder = 0.0, 0.0
+        if togo_deg > 0.0 and thrust > 0.0:
+            full = turn_of_rudder(params, thrust, most, dt_s)
+            turn = min(full, togo_deg)
+            rudder = most * turn / full
+        new_speed = next_speed(params, v, thrust, rudder, dt_s)
+        if new_speed == 0.0:
+            turn = 0.0
+        mean = 0.5 * (new_speed + v)
+        if turn > 0.0:
+            togo_deg = togo_deg - turn if togo_deg - turn > 1e-9 else 0.0
+            if turn != half:
+                angle = math.radians(0.5 * turn) * side
+                half, c, s = turn, math.cos(angle), math.sin(angle)
+            mx, my = ux * c + uy * s, uy * c - ux * s
+            ux, uy = mx * c + my * s, my * c - mx * s
+        else:
+            mx, my = ux, uy
+        x += mx * mean * dt_s
+        y += my * mean * dt_s
+        change = abs(mean - v) + abs(thrust - last)
+        v = min(max(mean, 0.0), top)
+        step += 1
+        if step % STRIDE == 0:
+            path[k, 0], path[k, 1] = x, y
+            k += 1
+        if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and k > 0:
+            _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, samples, path)
             return
 
 

@@ -13,7 +13,7 @@ import math
 from ..jit import Array, kernel
 from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
-from .usv import actuate_usv, clamp, turn_of_rudder, update_thrust
+from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
 
 @kernel
@@ -28,6 +28,15 @@ def largest_turn(params: Array, state: Array, dt_s: float) -> float:
 
 
 @kernel
+def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
+    """Thrust, percent, that this step will have under a speed command."""
+    thrust, _, _ = next_thrust(
+        params, state[L.SPEED], state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], speed_mps, dt_s
+    )
+    return thrust
+
+
+@kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
     """Advance one step turning by ``turn_deg`` as nearly as the actuators allow; changes ``state`` in place.
 
@@ -35,10 +44,7 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
     """
     kind = params[L.KIND]
     if kind == L.KIND_USV:
-        before = state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL]
-        update_thrust(params, state, speed_mps, dt_s)
-        full = turn_of_rudder(params, state[L.THRUST], 100.0, dt_s)
-        state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = before
+        full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
         rudder = 0.0
         if full > 0.0:
             rudder = clamp(100.0 * turn_deg / full, -100.0, 100.0)
@@ -59,10 +65,7 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
     """
     if params[L.KIND] != L.KIND_USV:
         return clamp(turn_deg, -180.0, 180.0)
-    before = state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL]
-    update_thrust(params, state, speed_mps, dt_s)
-    full = turn_of_rudder(params, state[L.THRUST], 100.0, dt_s)
-    state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = before
+    full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
     if not full > 0.0:
         return 0.0
     limit = min(params[L.MAX_RUDDER], 100.0)

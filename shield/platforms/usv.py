@@ -69,29 +69,42 @@ def _controller(
 
 
 @kernel
-def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: float) -> None:
-    """Advance the speed controller in ``state`` by one step and set its thrust."""
+def next_thrust(
+    params: Array, speed_mps: float, thrust: float, error: float, integral: float, desired_mps: float, dt_s: float
+) -> tuple[float, float, float]:
+    """Thrust of this step and the speed controller's new memory (error, integral), from the old ones."""
     if params[L.SPEED_FACTOR] != 0.0:
-        thrust = desired_speed_mps * params[L.SPEED_FACTOR]
+        thrust = desired_mps * params[L.SPEED_FACTOR]
     else:
-        error = desired_speed_mps - state[L.SPEED]
+        previous, error = error, desired_mps - speed_mps
         output, integral = _controller(
             params[L.SPEED_KP],
             params[L.SPEED_KI],
             params[L.SPEED_KD],
             params[L.SPEED_LIMIT],
             error,
-            state[L.SPEED_ERROR],
-            state[L.SPEED_INTEGRAL],
+            previous,
+            integral,
             dt_s,
         )
-        output = clamp(output, -params[L.MAX_THRUST], params[L.MAX_THRUST])
-        state[L.SPEED_ERROR] = error
-        state[L.SPEED_INTEGRAL] = integral
-        thrust = state[L.THRUST] + params[L.SPEED_GAIN] * output
+        thrust += params[L.SPEED_GAIN] * clamp(output, -params[L.MAX_THRUST], params[L.MAX_THRUST])
     if thrust < 0.01:
         thrust = 0.0
-    state[L.THRUST] = clamp(thrust, -params[L.MAX_THRUST], params[L.MAX_THRUST])
+    return clamp(thrust, -params[L.MAX_THRUST], params[L.MAX_THRUST]), error, integral
+
+
+@kernel
+def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: float) -> None:
+    """Advance the speed controller in ``state`` by one step and set its thrust."""
+    state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = next_thrust(
+        params,
+        state[L.SPEED],
+        state[L.THRUST],
+        state[L.SPEED_ERROR],
+        state[L.SPEED_INTEGRAL],
+        desired_speed_mps,
+        dt_s,
+    )
 
 
 @kernel
