@@ -351,8 +351,11 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
             continue
         ladder_move = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
         start = state[i, L.HEADING] if ladder_move else work.next_state[i, L.HEADING]
+        spin = state[i, L.TURN_RATE] if ladder_move else work.next_state[i, L.TURN_RATE]
         memory.kept[i] = True
         memory.side[i] = work.plan[i, 0]
+        if work.plan[i, 1] == 0.0:  # a turn that still runs out leaves the target behind, not ahead: nothing to go
+            memory.side[i] = 1.0 if spin >= 0.0 else -1.0
         memory.target_deg[i] = wrap_degrees(start + work.plan[i, 0] * work.plan[i, 1])
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]

@@ -2,5 +2,7 @@
 
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
+from .team_batch import TeamBatch
+from .vector_gym import MctfVectorEnv
 
-__all__ = ["ShieldedCallable", "ShieldedParallelEnv", "ShieldedTeamPolicy"]
+__all__ = ["MctfVectorEnv", "ShieldedCallable", "ShieldedParallelEnv", "ShieldedTeamPolicy", "TeamBatch"]

@@ -14,9 +14,7 @@ from ..jit import Array
 from ..platforms import get_platform
 from ..platforms import layout as L
 from ..surroundings import Surroundings
-from .reading import KEEP_OUT_MARGIN_M, no_commands, obstacles_of
-
-HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
+from .reading import DISCRETE, KEEP_OUT_MARGIN_M, no_commands, obstacles_of
 
 
 class PyquaticusReader:
@@ -62,10 +60,8 @@ class PyquaticusReader:
             return float(array[0]), float(array[1])
         if array.ndim != 0 or not 0 <= int(array) <= 16:
             raise ConfigError(f"action {action!r} of {player.id} is neither 0..16 nor (speed, relative heading)")
-        number = int(array)
-        if number == 16:
-            return 0.0, 0.0
-        return top * (1.0 if number < 8 else 0.5), HEADINGS_DEG[number % 8]
+        share, heading = DISCRETE[int(array)]
+        return top * float(share), float(heading)
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge and obstacles; the own flag's circle while the flag is home."""

@@ -18,6 +18,11 @@ from ..surroundings import Surroundings
 KEEP_OUT_MARGIN_M = 0.1
 """Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""
 
+HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
+
+DISCRETE = np.array([(share, heading) for share in (1.0, 0.5) for heading in HEADINGS_DEG] + [(0.0, 0.0)])
+"""(17, 2) the game's discrete actions: share of top speed and relative heading, deg; the last one stops."""
+
 SIDES = {"blue": 0, "red": 1}
 
 

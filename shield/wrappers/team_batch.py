@@ -1,0 +1,133 @@
+"""One team's boats in many games as a flat batch of learners: what both vector environments are made of."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..batch import BatchedShield
+from ..exceptions import ConfigError, PolicyError
+from ..jit import Array, BoolArray
+from .reading import DISCRETE, team_number
+
+ACTIONS = ("discrete", "continuous")
+
+
+class Stepped(NamedTuple):
+    """Outcome of a step for the L = games * boats learners.
+
+    Attributes:
+        observations: (L, n_obs) float32, of the new game where one ended.
+        rewards: (L,).
+        terminated: (L,) the game was won.
+        truncated: (L,) its time was over.
+        final_observations: (L, n_obs) before a new game began; only rows of ended games matter.
+    """
+
+    observations: NDArray[np.float32]
+    rewards: Array
+    terminated: BoolArray
+    truncated: BoolArray
+    final_observations: NDArray[np.float32]
+
+
+class TeamBatch:
+    """Learners are the boats of one team in B games of a `BatchedMctf`; the other team is played by a batch policy.
+
+    Args:
+        core: the `BatchedMctf`.
+        opponent: batch policy (`steerclear.policies.make_batch`) of the other team; None: they hold still.
+        team: "blue" or "red", the learners' side.
+        shield: shield for the learners' team, or None.
+        actions: "discrete" (17 numbers) or "continuous" (speed m/s, relative heading deg).
+        seed: seed of games and opponent.
+
+    Raises:
+        ConfigError: unknown team or kind of actions.
+    """
+
+    def __init__(
+        self,
+        core: Any,
+        opponent: Any = None,
+        team: str | int = "blue",
+        shield: BatchedShield | None = None,
+        actions: str = "discrete",
+        seed: int = 0,
+    ) -> None:
+        if actions not in ACTIONS:
+            raise ConfigError(f"unknown actions {actions!r}; choose one of {', '.join(ACTIONS)}")
+        self.core, self.opponent, self.shield = core, opponent, shield
+        self.team = team_number(team)
+        self.actions = actions
+        self.boats = np.flatnonzero(core.team == self.team)
+        self.others = np.flatnonzero(core.team != self.team)
+        self.learners = core.n_games * len(self.boats)
+        self._filter = None if shield is None else shield.filter_for(self.team)
+        self._commands = np.zeros((core.n_games, core.n_boats, 2))
+        self._seed = seed
+
+    @property
+    def top_speed_mps(self) -> float:
+        """Highest top speed of the learners' boats, m/s."""
+        return float(np.max(self.core.max_speed_mps[self.boats]))
+
+    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
+        """Start all games; returns observations (L, n_obs)."""
+        self._seed = self._seed if seed is None else seed
+        observations = self.core.reset(seed=self._seed)
+        if self.opponent is not None:
+            self.opponent.reset(self.core, 1 - self.team, self._seed)
+        if self.shield is not None:
+            self.shield.reset()
+        return self._flat(observations)
+
+    def step(self, actions: Any) -> Stepped:
+        """Step all games; ended games start anew.
+
+        Raises:
+            PolicyError: the actions have the wrong shape, are out of range or not finite.
+        """
+        self._commands[:, self.boats] = self._decode(actions)
+        if self.opponent is not None:
+            self._commands[:, self.others] = self.opponent.act(self.core, 1 - self.team)
+        observations, rewards, terminated, truncated = self.core.step(self._commands, self._filter)
+        final = self._flat(observations)
+        ended = terminated | truncated
+        outcome = (self._spread(terminated), self._spread(truncated))
+        flat_rewards = rewards[:, self.boats].reshape(-1).copy()
+        return Stepped(self._begin_anew(ended.copy(), final), flat_rewards, *outcome, final)
+
+    def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32]) -> NDArray[np.float32]:
+        if not ended.any():
+            return final
+        observations = self.core.reset(mask=ended)
+        if self.opponent is not None:
+            self._seed += self.core.n_games
+            self.opponent.restart(ended, self._seed)
+        if self.shield is not None:
+            self.shield.reset(ended)
+        return self._flat(observations)
+
+    def _decode(self, actions: Any) -> Array:
+        """Commands (B, boats, 2) of flat actions."""
+        shape = (self.core.n_games, len(self.boats))
+        if self.actions == "discrete":
+            numbers = np.asarray(actions)
+            if numbers.shape != (self.learners,) or numbers.min() < 0 or numbers.max() >= len(DISCRETE):
+                raise PolicyError(f"give {self.learners} discrete actions in 0..{len(DISCRETE) - 1}")
+            commands = DISCRETE[numbers.astype(np.int64)].reshape(*shape, 2)
+            return commands * np.stack([self.core.max_speed_mps[self.boats], np.ones(len(self.boats))], axis=1)
+        pairs = np.asarray(actions, dtype=np.float64)
+        if pairs.shape != (self.learners, 2) or not np.isfinite(pairs).all():
+            raise PolicyError(f"give finite actions of shape ({self.learners}, 2): speed m/s, relative heading deg")
+        return pairs.reshape(*shape, 2)
+
+    def _flat(self, observations: Any) -> NDArray[np.float32]:
+        flat: NDArray[np.float32] = observations[:, self.boats].reshape(self.learners, -1).copy()
+        return flat
+
+    def _spread(self, games: BoolArray) -> BoolArray:
+        return np.repeat(games, len(self.boats))

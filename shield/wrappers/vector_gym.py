@@ -1,0 +1,51 @@
+"""`MctfVectorEnv`: a Gymnasium vector environment over thousands of games, with the shield inside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box, Discrete, Space
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from .team_batch import TeamBatch
+
+
+def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
+    """Observation and action space of one learner."""
+    observation = Box(-1.0, 1.0, (batch.core.n_obs,), np.float32)
+    if batch.actions == "discrete":
+        return observation, Discrete(17)
+    high = np.array([batch.top_speed_mps, 180.0], np.float32)
+    return observation, Box(np.array([0.0, -180.0], np.float32), high, dtype=np.float32)
+
+
+class MctfVectorEnv(VectorEnv[Any, Any, Any]):  # type: ignore[misc] # gymnasium is untyped here
+    """Every boat of one team in every game is one sub-environment; an ended game starts anew in the same step.
+
+    Args:
+        batch: the games, see `TeamBatch`.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012 (Gymnasium's own form)
+
+    def __init__(self, batch: TeamBatch) -> None:
+        self.batch = batch
+        self.num_envs = batch.learners
+        self.single_observation_space, self.single_action_space = spaces_of(batch)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start all games."""
+        return self.batch.reset(seed), {}
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Step all games; the last observations of ended games are in ``infos["final_obs"]``."""
+        out = self.batch.step(actions)
+        infos: dict[str, Any] = {}
+        ended = out.terminated | out.truncated
+        if ended.any():
+            infos = {"final_obs": out.final_observations, "_final_obs": ended}
+        return out.observations, out.rewards, out.terminated, out.truncated, infos

@@ -1,0 +1,74 @@
+"""`MctfVecEnv`: a Stable-Baselines3 vector environment over thousands of games (extra ``[train]``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from .team_batch import Stepped, TeamBatch
+from .vector_gym import spaces_of
+
+
+class MctfVecEnv(VecEnv):  # type: ignore[misc] # stable-baselines3 ships no types we check
+    """Every boat of one team in every game is one sub-environment of SB3; one policy learns to play them all.
+
+    Args:
+        batch: the games, see `TeamBatch`.
+    """
+
+    def __init__(self, batch: TeamBatch) -> None:
+        self.batch = batch
+        self._actions: Any = None
+        self.render_mode = None
+        super().__init__(batch.learners, *spaces_of(batch))
+
+    def reset(self) -> Any:
+        """Start all games; observations (L, n_obs)."""
+        seed = next((seed for seed in self._seeds if seed is not None), None)
+        self._reset_seeds()
+        return self.batch.reset(seed)
+
+    def step_async(self, actions: Any) -> None:
+        """Take the learners' actions."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
+        """Step all games; ended ones start anew, with their last observation in the info."""
+        out = self.batch.step(self._actions)
+        done = out.terminated | out.truncated
+        return out.observations, out.rewards.astype(np.float32), done, self._infos(out, done)
+
+    def _infos(self, out: Stepped, done: Any) -> list[dict[str, Any]]:
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for i in np.flatnonzero(done):
+            infos[i] = {
+                "terminal_observation": out.final_observations[i],
+                "TimeLimit.truncated": bool(out.truncated[i] and not out.terminated[i]),
+            }
+        return infos
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The attribute, once per sub-environment asked for; all of them share one object."""
+        return [getattr(self, attr_name)] * len(self._chosen(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of the shared object."""
+        setattr(self, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of the batch, with one answer per sub-environment asked for."""
+        answer = getattr(self.batch, method_name)(*args, **kwargs)
+        return [answer] * len(self._chosen(indices))
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """No sub-environment has a wrapper of its own."""
+        return [False] * len(self._chosen(indices))
+
+    def _chosen(self, indices: Any) -> Sequence[int]:
+        return list(self._get_indices(indices))
