@@ -21,7 +21,7 @@ def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
     return observation, Box(np.array([0.0, -180.0], np.float32), high, dtype=np.float32)
 
 
-class MctfVectorEnv(VectorEnv[Any, Any, Any]):  # type: ignore[misc] # gymnasium is untyped here
+class MctfVectorEnv(VectorEnv[Any, Any, Any]):
     """Every boat of one team in every game is one sub-environment; an ended game starts anew in the same step.
 
     Args:

@@ -12,7 +12,7 @@ from .team_batch import Stepped, TeamBatch
 from .vector_gym import spaces_of
 
 
-class MctfVecEnv(VecEnv):  # type: ignore[misc] # stable-baselines3 ships no types we check
+class MctfVecEnv(VecEnv):
     """Every boat of one team in every game is one sub-environment of SB3; one policy learns to play them all.
 
     Args:
