@@ -20,6 +20,7 @@ from .validation import (
     check_point,
     check_polygons,
     check_real,
+    check_segment,
     per_boat,
 )
 
@@ -117,6 +118,8 @@ class GameConfig:
         for name in ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start"):
             check_choice(name, getattr(self, name), (True, False))
         check_choice("capture_at", self.capture_at, CAPTURE_AT)
+        if not isinstance(self.preset_name, str):
+            raise ConfigError(f"preset_name is {self.preset_name!r}; give a text")
         if not isinstance(self.reward, RewardWeights):
             raise ConfigError(f"reward is {self.reward!r}; give a RewardWeights(...)")
         self._set_geometry()
@@ -146,10 +149,7 @@ class GameConfig:
         if (self.blue_flag_home_m is None) != (self.red_flag_home_m is None):
             raise ConfigError("give both blue_flag_home_m and red_flag_home_m, or neither")
         if self.scrimmage_m is not None:
-            ends = tuple(check_point("scrimmage_m", point) for point in self.scrimmage_m)
-            if len(ends) != 2 or ends[0] == ends[1]:
-                raise ConfigError(f"scrimmage_m is {self.scrimmage_m!r}; give two different points")
-            self._set("scrimmage_m", ends)
+            self._set("scrimmage_m", check_segment("scrimmage_m", self.scrimmage_m))
         self._set_obstacles()
 
     def _set_obstacles(self) -> None:

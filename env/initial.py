@@ -59,11 +59,11 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
     given = _wanted_places(config, boats)
     carries = np.nan_to_num(boats.get("agent_has_flag", np.zeros(config.n_boats))) != 0.0
     _check_carriers(config, rules, carries, given)
+    taken = np.array([carries[rules.team == 1].any(), carries[rules.team == 0].any()])
+    _check_places(config, rules, taken, given)
     clear_game(rules, games, b)
     games.has_flag[b] = carries
-    for team in (0, 1):
-        games.flag_taken[b, 1 - team] = carries[rules.team == team].any()
-    _check_places(config, rules, games, b, given)
+    games.flag_taken[b] = taken
     if not start_game(rules, games, b, places, given, not config.default_start, config.on_side_start):
         raise crowded_field_error()
     _set_counters(rules, games, b, boats, teams)
@@ -105,12 +105,22 @@ def _per_team(key: str, value: Any) -> Array:
     counts = np.zeros(2)
     if isinstance(value, Mapping):
         for team, entry in value.items():
-            counts[int(team)] = _numbers(key, entry, 1)[0]
+            counts[_team_number(key, team)] = _numbers(key, entry, 1)[0]
     else:
         counts[:] = _numbers(key, value, 2)
     if (counts < 0).any():
         raise GameError(f"{key} is {value!r}; counts are >= 0")
     return counts.astype(np.int64)
+
+
+def _team_number(key: str, team: Any) -> int:
+    try:
+        number = int(team)
+    except (TypeError, ValueError):
+        number = -1
+    if number not in (0, 1):
+        raise GameError(f"{key}: unknown team {team!r}; teams are 0 (blue) and 1 (red)")
+    return number
 
 
 def _numbers(key: str, value: Any, width: int) -> Array:
@@ -143,7 +153,7 @@ def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given
             raise GameError(f"{config.agent_ids[i]} carries a flag but is on its own side; place it on the other side")
 
 
-def _check_places(config: GameConfig, rules: Rules, games: Games, b: int, given: Array) -> None:
+def _check_places(config: GameConfig, rules: Rules, taken: np.ndarray, given: Array) -> None:
     """Given places must lie inside the field, clear of obstacles and of flags that are home, no two on one point."""
     for i in np.flatnonzero(~np.isnan(given[:, 0])):
         name, place, radius = config.agent_ids[i], given[i, :2], config.agent_radius_m[i]
@@ -152,7 +162,7 @@ def _check_places(config: GameConfig, rules: Rules, games: Games, b: int, given:
         if touches_obstacle(rules.obstacles, place[0], place[1], radius):
             raise GameError(f"{name} at {tuple(place)} touches an obstacle; move it away")
         for flag in (0, 1):
-            if not games.flag_taken[b, flag] and np.hypot(*(place - rules.flag_home[flag])) <= rules.flag_keepout:
+            if not taken[flag] and np.hypot(*(place - rules.flag_home[flag])) <= rules.flag_keepout:
                 raise GameError(f"{name} at {tuple(place)} is on a flag's home; move it {rules.flag_keepout} m away")
         for j in range(i):
             if (given[j, :2] == place).all():

@@ -47,6 +47,17 @@ def check_point(name: str, value: Any) -> tuple[float, float]:
     return check_real(f"{name} x", pair[0]), check_real(f"{name} y", pair[1])
 
 
+def check_segment(name: str, value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two different points."""
+    points = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else []
+    if len(points) != 2:
+        raise ConfigError(f"{name} is {value!r}; give two different points ((x, y), (x, y))")
+    start, end = check_point(name, points[0]), check_point(name, points[1])
+    if start == end:
+        raise ConfigError(f"{name} is {value!r}; give two different points ((x, y), (x, y))")
+    return start, end
+
+
 def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tuple[Any, ...]:
     """One value per boat: a single value is repeated, a sequence must have the right length."""
     if isinstance(value, kinds):
@@ -54,7 +65,8 @@ def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tu
     if isinstance(value, (list, tuple, np.ndarray)):
         if len(value) != n_boats:
             raise ConfigError(f"{name} has {len(value)} entries for {n_boats} boats; give one value, or one per boat")
-        return tuple(value)
+        if all(isinstance(entry, (*kinds, np.generic)) for entry in value):
+            return tuple(value)
     raise ConfigError(f"{name} is {value!r}; give one value, or one per boat ({n_boats})")
 
 

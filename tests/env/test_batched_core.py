@@ -1,0 +1,194 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.env.config import GameConfig, RewardWeights
+from steerclear.env.core import BatchedMctf
+from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.platforms import layout as L
+
+NAMES = (
+    "state",
+    "is_tagged",
+    "has_flag",
+    "oob",
+    "on_side",
+    "driven",
+    "tagging_cooldown_s",
+    "flag_position",
+    "flag_taken",
+    "captures",
+    "grabs",
+    "tags",
+    "collisions",
+    "time_s",
+    "observations",
+    "rewards",
+)
+RANDOM = GameConfig.preset(
+    "aamas2024",
+    team_size=2,
+    platforms=("heron", "surveyor", "large_usv", "di"),
+    default_start=False,
+    on_side_start=False,
+    obstacles={"circle": [(2.0, (40.0, 20.0))]},
+)
+
+
+def random_actions(seed, n_games, n_boats):
+    random = np.random.default_rng(seed)
+    hold = random.uniform(0, 1, (n_games, n_boats)) < 0.1
+    speed = np.where(hold, 0.0, random.uniform(0, 4, (n_games, n_boats)))
+    return np.stack([speed, random.uniform(-60, 60, (n_games, n_boats))], axis=-1)
+
+
+@settings(derandomize=True, deadline=None, max_examples=6)
+@given(st.integers(0, 1000))
+def test_a_batch_plays_each_game_bit_for_bit_as_a_single_game(seed):
+    batch = BatchedMctf(RANDOM, n_games=70, seed=seed)
+    single = BatchedMctf(RANDOM, n_games=1, seed=0)
+    watched = (0, 63, 64, 69)
+    starts = {b: (batch.state[b].copy(), batch.games.rng[b]) for b in watched}
+    tracks = {b: [] for b in watched}
+    for t in range(80):
+        batch.step(random_actions(1000 * seed + t, 70, 4))
+        for b in watched:
+            tracks[b].append({name: getattr(batch, name)[b].copy() for name in NAMES})
+    for b in watched:
+        single.games.rng[0] = starts[b][1]
+        place_as(single, starts[b][0])
+        for t in range(80):
+            single.step(random_actions(1000 * seed + t, 70, 4)[b : b + 1])
+            for name in NAMES:
+                np.testing.assert_array_equal(getattr(single, name)[0], tracks[b][t][name], err_msg=name)
+
+
+def place_as(core, state):
+    start = {"agent_position": state[:, :2], "agent_speed": state[:, L.SPEED], "agent_heading": state[:, L.HEADING]}
+    core.reset_game(0, start)
+
+
+def test_the_same_seed_gives_the_same_games_and_another_one_others():
+    one, two, other = (BatchedMctf(RANDOM, n_games=5, seed=s) for s in (3, 3, 4))
+    for t in range(30):
+        for core in (one, two, other):
+            core.step(random_actions(t, 5, 4))
+    for name in NAMES:
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+    assert not np.array_equal(one.state, other.state)
+
+
+def test_game_zero_of_a_batch_starts_like_a_single_game():
+    np.testing.assert_array_equal(BatchedMctf(RANDOM, 3, seed=8).state[0], BatchedMctf(RANDOM, 1, seed=8).state[0])
+
+
+def test_resetting_some_games_leaves_the_others_alone():
+    core = BatchedMctf(RANDOM, n_games=4, seed=1)
+    first = core.state.copy()
+    for t in range(10):
+        core.step(random_actions(t, 4, 4))
+    before = {name: getattr(core, name).copy() for name in NAMES if name != "observations"}
+    core.reset(np.array([False, True, False, True]))
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(core, name)[[0, 2]], values[[0, 2]], err_msg=name)
+    assert core.time_s.tolist() == pytest.approx([1.0, 0.0, 1.0, 0.0])
+    assert not np.array_equal(core.state[1], first[1]), "the random numbers go on"
+    core.reset(seed=1)
+    np.testing.assert_array_equal(core.state, first)
+
+
+def test_a_filter_stands_between_decision_and_motion(place):
+    core = place({0: (50.0, 30.0)}, is_tagged={"agent_0": True})
+    seen = []
+
+    def stop_everybody(games, commands):
+        seen.append((games is core, commands.copy(), games.driven.copy()))
+        return np.zeros_like(commands)
+
+    before = core.state[0, :, :2].copy()
+    core.step(np.full((1, 4, 2), 5.0), stop_everybody)
+    np.testing.assert_array_equal(core.state[0, :, :2], before)
+    (same, commands, driven), *_ = seen
+    assert same
+    assert driven[0].tolist() == [True, False, False, False]
+    assert commands[0, 0, 0] == 10.0
+
+
+def test_step_is_commands_then_advance():
+    one, two = BatchedMctf(RANDOM, 3, seed=2), BatchedMctf(RANDOM, 3, seed=2)
+    for t in range(20):
+        actions = random_actions(t, 3, 4)
+        one.step(actions)
+        two.advance(two.commands(actions))
+    np.testing.assert_array_equal(one.state, two.state)
+
+
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (np.zeros((1, 4, 2)), r"actions have shape \(1, 4, 2\); give \(2, 4, 2\)"),
+        (np.zeros((2, 4)), "actions have shape"),
+        (np.full((2, 4, 2), np.nan), "action of agent_0 in game 0 is not finite"),
+    ],
+)
+def test_unusable_actions_are_refused(actions, message):
+    core = BatchedMctf(RANDOM, 2, seed=0)
+    with pytest.raises(GameError, match=message):
+        core.step(actions)
+
+
+def test_the_boat_and_the_game_of_a_bad_command_are_named_and_nothing_moves():
+    core = BatchedMctf(RANDOM, 2, seed=0)
+    before = core.state.copy()
+    actions = np.zeros((2, 4, 2))
+    actions[1, 2, 1] = np.inf
+    with pytest.raises(GameError, match="action of agent_2 in game 1"):
+        core.step(actions)
+    with pytest.raises(GameError, match="command of agent_2 in game 1"):
+        core.step(np.zeros((2, 4, 2)), lambda _, commands: actions)
+    with pytest.raises(GameError, match="commands have shape"):
+        core.step(np.zeros((2, 4, 2)), lambda _, commands: commands[0])
+    np.testing.assert_array_equal(core.state, before)
+
+
+def test_bad_counts_seeds_and_masks_are_refused():
+    with pytest.raises(ConfigError, match="n_games is 0"):
+        BatchedMctf(RANDOM, 0)
+    with pytest.raises(ConfigError, match="seed is -1"):
+        BatchedMctf(RANDOM, 1, seed=-1)
+    core = BatchedMctf(RANDOM, 2, seed=0)
+    for mask in (np.ones(3, dtype=bool), np.ones(2)):
+        with pytest.raises(GameError, match=r"give bool of shape \(2,\)"):
+            core.reset(mask)
+
+
+def test_rewards_weigh_the_events_of_both_teams(place, hold):
+    weights = RewardWeights(capture=1.0, grab=0.5, tag=0.25, oob=0.125, collision=2.0)
+    positions = {0: (30.0, 20.0), 1: (75.0, 2.0), 2: (36.0, 20.0), 3: (60.0, 30.0)}
+    core = place(positions, overrides={"reward": weights}, tagging_cooldown=[9.95, 0.0, 0.0, 0.0])
+    _, rewards, _, _ = hold(core)
+    assert core.events[0].tolist() == [[0, 0, 1, 0], [0, 0, 0, 0]]
+    assert rewards[0].tolist() == [0.25, 0.25, -0.25, -0.25]
+    core.state[0, 3, :2] = (60.0, 40.0)
+    core.state[0, 1, :2] = (60.0, 39.0)
+    _, rewards, _, _ = hold(core)
+    assert rewards[0].tolist() == [0.125, 0.125 - 2.0, -0.125, -0.125 - 2.0]
+
+
+def test_views_are_frozen_copies(place, hold):
+    core = place()
+    view = core.view()
+    np.testing.assert_array_equal(view.position, core.state[0, :, :2])
+    kept = view.state.copy()
+    core.step(np.full((1, 4, 2), 3.0))
+    np.testing.assert_array_equal(view.state, kept)
+    with pytest.raises(AttributeError):
+        view.time_s = 3.0
+    assert (view.time_s, view.terminated, view.truncated) == (0.0, False, False)
+    assert view.heading_deg.shape == view.speed_mps.shape == (4,)
+
+
+def test_four_thousand_games_stay_small():
+    core = BatchedMctf("mctf2025", n_games=4096, seed=0)
+    held = sum(a.nbytes for a in core.games) + core.observations.nbytes + core.rewards.nbytes
+    assert held < 20e6
