@@ -54,12 +54,12 @@ class PairDistances:
         return float(self.distance_m.min(initial=np.inf))
 
 
-def entries(distances: PairDistances, radius_m: float) -> NDArray[np.bool_]:
+def entries(distances: PairDistances, radius_m: ArrayLike) -> NDArray[np.bool_]:
     """Mark the steps at which a pair enters the radius.
 
     Args:
         distances: T steps, p pairs.
-        radius_m: two boats at exactly this distance are inside.
+        radius_m: one radius or one per pair; two boats at exactly this distance are inside.
 
     Returns:
         (T, p), row t for step t + 1.
@@ -67,7 +67,7 @@ def entries(distances: PairDistances, radius_m: float) -> NDArray[np.bool_]:
     Raises:
         ConfigError: a radius that is not positive.
     """
-    if not radius_m > 0.0:
+    if not (np.asarray(radius_m) > 0.0).all():
         raise ConfigError(f"the separation radius must be positive, in metres; got {radius_m}")
     inside = distances.distance_m <= radius_m
     before = np.zeros_like(inside)
@@ -75,8 +75,8 @@ def entries(distances: PairDistances, radius_m: float) -> NDArray[np.bool_]:
     return inside & ~before
 
 
-def count_breaches(distances: PairDistances, radius_m: float) -> int:
-    """Count the entries of all pairs into the radius (m)."""
+def count_breaches(distances: PairDistances, radius_m: ArrayLike) -> int:
+    """Count the entries of all pairs into the radius (m, one or one per pair)."""
     return int(entries(distances, radius_m).sum())
 
 

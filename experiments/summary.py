@@ -80,12 +80,12 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
         ("grabs", "grabs"),
         ("tags", "tags"),
         ("tags_against", "times tagged"),
-        *((breach_column("teammate", r), f"hits team-mate {r:g} m") for r in radii_m),
-        *((breach_column("opponent", r), f"hits opponent {r:g} m") for r in radii_m),
+        *((breach_column("teammate", r), f"hits mates {r:g} m") for r in radii_m),
+        *((breach_column("opponent", r), f"hits opp. {r:g} m") for r in radii_m),
     ]
     return [
         *(Metric(name, label, partial(_count, name), partial(_number, name)) for name, label in counts),
-        Metric("clean_games", "games without a hit", partial(_clean_games, min(radii_m))),
+        Metric("clean_games", "games without hit", partial(_clean_games, min(radii_m))),
         Metric("closest_m", "closest, mean m", partial(_mean, "closest_m", seed), partial(_number, "closest_m")),
         Metric("closest_of_all_m", "closest of all, m", _closest_of_all),
         Metric("changed_share", "steps changed, %", partial(_changed_percent, seed), only_on=True),
@@ -93,7 +93,7 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
         *(
             Metric(name, label, partial(_mean, name, seed), partial(_number, name))
             for name, label in (
-                ("reversals_per_boat_minute", "reversals/boat min"),
+                ("reversals_per_boat_minute", "reversals/min"),
                 ("primary", "primary score"),
                 ("secondary", "secondary score"),
             )

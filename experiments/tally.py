@@ -42,9 +42,12 @@ def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: i
 
     Two team-mates that collide thus count twice.
     """
-    radius_m = 2.0 * float(meta["agent_radius_m"])
-    teammates = count_breaches(distances.of_pairs(team_pairs(meta["team"], side, "teammate")), radius_m)
-    return 2 * teammates + count_breaches(distances.of_pairs(team_pairs(meta["team"], side, "opponent")), radius_m)
+    own_radius_m = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(meta["team"]))
+    total = 0
+    for kind, boats_in_it in (("teammate", 2), ("opponent", 1)):
+        pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
+        total += boats_in_it * count_breaches(pairs, own_radius_m[pairs.pairs].sum(axis=1))
+    return total
 
 
 def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[str, Any]:

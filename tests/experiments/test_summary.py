@@ -95,9 +95,9 @@ def printed(table, width):
 @pytest.mark.parametrize("width", [80, 100])
 def test_tables_fit_the_terminal_without_wrapping_or_cutting(width):
     rng = np.random.default_rng(0)
-    names = ("captures", "primary", "breaches_opponent_4.0m")
+    names = ("primary", "secondary", "closest_m")
     games = [
-        row(game, shielded, **{name: int(rng.integers(0, 300)) for name in names})
+        row(game, shielded, **{name: int(rng.integers(-300, 300)) / 100 for name in names})
         for game in range(20)
         for shielded in (False, True)
     ]

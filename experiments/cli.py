@@ -1,0 +1,48 @@
+"""The command ``steerclear``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .commands.ablate import ablate
+from .commands.docs import docs
+from .commands.evaluate import evaluate
+from .commands.play import play
+from .commands.render import render
+from .provenance import package_version
+
+app = typer.Typer(
+    name="steerclear",
+    help="A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for function in (play, evaluate, ablate, render, docs):
+    app.command()(function)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"steerclear {package_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.
+
+    Exit status of every command: 0 done, 1 a bar is not met, 2 bad input, 130 interrupted.
+    """
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="steerclear")

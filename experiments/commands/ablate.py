@@ -1,0 +1,71 @@
+"""``steerclear ablate``: every pairing without and with the shield, from the same seeds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ..ablation import AblationSettings
+from ..ablation import quick as small_version
+from ..score import DEFAULT_PENALTY
+from ..store import write_json
+from . import options as o
+from .console import command, finish
+from .games import check_complete, run_games
+
+QUICK_GAMES = 4
+QUICK_TIME_S = 240.0
+
+
+@command
+def ablate(
+    preset: o.Preset = "aamas2024",
+    own: o.Own = "medium",
+    opponents: o.Opponents = "easy,medium,hidden",
+    games: o.Games = None,
+    seed: o.Seed = 0,
+    out: o.Out = None,
+    quick: o.Quick = False,
+    jobs: o.Jobs = None,
+    resume: o.Resume = False,
+    separation: o.Separation = None,
+    certificate: o.Certificate = None,
+    solver: o.Solver = None,
+    shield_set: o.ShieldSet = None,
+    no_shield_autopilot: o.NoAutopilot = False,
+    penalty: o.Penalty = DEFAULT_PENALTY,
+    max_time: o.MaxTime = None,
+    platform: o.Platform = None,
+    rules: o.RuleSet = None,
+    fixed_start: o.FixedStart = False,
+    check: o.Check = False,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play every pairing off and on from the same seeds; write table, report and replay.
+
+    Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input, 130 interrupted.
+    """
+    settings = AblationSettings(
+        preset=preset,
+        own=own,
+        opponents=o.split_names(opponents, "--opponents"),
+        seed=seed,
+        shield=o.shield_settings(separation, certificate, solver, shield_set),
+        shield_autopilot=not no_shield_autopilot,
+        rules=o.game_settings(max_time, platform, rules),
+        fixed_start=fixed_start,
+        penalty=penalty,
+    )
+    if quick:
+        settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)
+    settings = settings if games is None else replace(settings, games=games)
+    results = run_games("ablate", settings, out, jobs, resume, quick)
+    end_run(results, check, json_file)
+
+
+def end_run(results: dict[str, Any], check: bool, json_file: o.JsonFile) -> None:
+    """Write the JSON a user asked for and choose the exit status."""
+    if json_file is not None:
+        write_json(json_file, results)
+    check_complete(results)
+    finish(not check or all(bar["met"] is not False for bar in results["bars"]))

@@ -1,0 +1,38 @@
+"""``steerclear docs``: documentation pages from results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear.shield.exceptions import ConfigError
+
+from ..docs_pages import write_pages
+from ..results import NAMES
+from .console import command, out
+
+Sources = Annotated[list[Path] | None, typer.Argument(help="Results folders or JSON files of ablate, evaluate, bench.")]
+Folder = Annotated[Path, typer.Option("--out", help="Folder for the pages.")]
+
+
+@command
+def docs(sources: Sources = None, folder: Folder = Path("docs")) -> None:
+    """Write documentation pages, tables and plots, from results.
+
+    Exit status: 0 done, 2 bad input.
+    """
+    for path in write_pages([_read(source) for source in sources or []], folder):
+        out().print(f"{path}", soft_wrap=True)
+
+
+def _read(source: Path) -> dict[str, Any]:
+    path = source / NAMES["results"] if source.is_dir() else source
+    try:
+        content = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot read results from {path} ({error}); give a results folder or a JSON file") from error
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of ablate or bench")
+    return content

@@ -1,0 +1,65 @@
+"""``steerclear evaluate``: a policy or submission against opponents, with the shield or without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from ..ablation import AblationSettings
+from ..ablation import quick as small_version
+from ..score import DEFAULT_PENALTY
+from . import options as o
+from .ablate import QUICK_GAMES, QUICK_TIME_S, end_run
+from .console import command
+from .games import run_games
+
+Policy = Annotated[str, typer.Argument(help="A registered policy, or the folder or zip of a submission.")]
+Shield = Annotated[bool, typer.Option("--shield/--no-shield", help="Whether the policy's boats are shielded.")]
+
+
+@command
+def evaluate(
+    policy: Policy,
+    opponents: o.Opponents = "easy,medium,hidden",
+    shield: Shield = False,
+    preset: o.Preset = "aamas2024",
+    games: o.Games = None,
+    seed: o.Seed = 0,
+    out: o.Out = None,
+    quick: o.Quick = False,
+    jobs: o.Jobs = None,
+    resume: o.Resume = False,
+    separation: o.Separation = None,
+    certificate: o.Certificate = None,
+    solver: o.Solver = None,
+    shield_set: o.ShieldSet = None,
+    no_shield_autopilot: o.NoAutopilot = False,
+    penalty: o.Penalty = DEFAULT_PENALTY,
+    max_time: o.MaxTime = None,
+    platform: o.Platform = None,
+    rules: o.RuleSet = None,
+    fixed_start: o.FixedStart = False,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play a policy or submission against opponents and report how it did.
+
+    Exit status: 0 done, 2 bad input, 130 interrupted.
+    """
+    settings = AblationSettings(
+        preset=preset,
+        own=policy,
+        opponents=o.split_names(opponents, "--opponents"),
+        seed=seed,
+        shield=o.shield_settings(separation, certificate, solver, shield_set),
+        states=(shield,),
+        shield_autopilot=not no_shield_autopilot,
+        rules=o.game_settings(max_time, platform, rules),
+        fixed_start=fixed_start,
+        penalty=penalty,
+    )
+    if quick:
+        settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)
+    settings = settings if games is None else replace(settings, games=games)
+    end_run(run_games("evaluate", settings, out, jobs, resume, quick), False, json_file)

@@ -1,0 +1,164 @@
+"""What the commands that play many games share: checking names, playing with a progress bar, showing tables."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from steerclear import policies
+from steerclear.shield.exceptions import ConfigError
+
+from ..ablation import AblationSettings
+from ..campaign import Campaign, Played
+from ..match import warm_up
+from ..pool import check_jobs
+from ..results import replay_of, results_of, write_results
+from ..score import check_penalty
+from ..shielding import check_shield
+from ..store import LINES_FILE, ResultStore
+from ..tables import bars_table, pairing_table
+from .console import Interrupted, err, out, progress
+
+
+def check_settings(settings: AblationSettings) -> None:
+    """Find every bad name or number before the first game is played.
+
+    Raises:
+        SteerclearError: a policy, preset, platform, game or shield setting is unusable.
+    """
+    if settings.games < 1:
+        raise ConfigError(f"--games must be at least 1; got {settings.games}")
+    check_penalty(settings.penalty)
+    check_shield(settings.shield)
+    settings.specs()[0].config()
+    for name in dict.fromkeys([settings.own, *settings.opponents]):
+        policies.make(name)
+
+
+def default_folder(command: str) -> Path:
+    """Name a new results folder after the command and the time."""
+    return Path("results") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+
+
+def run_games(
+    command: str,
+    settings: AblationSettings,
+    folder: Path | None,
+    jobs: int | None = None,
+    resume: bool = False,
+    quick: bool = False,
+) -> dict[str, Any]:
+    """Play all games of the settings, write everything, show the tables.
+
+    Returns:
+        The content of results.json.
+
+    Raises:
+        SteerclearError: bad input; what was played before stays on disk.
+        Interrupted: by Ctrl-C; what is finished has been written.
+    """
+    processes = check_jobs(jobs)
+    check_settings(settings)
+    if resume and folder is None:
+        raise ConfigError("--resume needs the --out folder of the run to go on with")
+    folder = folder or default_folder(command)
+    campaign = Campaign(settings.specs(), ResultStore(folder, resume), processes)
+    started = time.perf_counter()
+    try:
+        played = _play(campaign, processes)
+        replay = replay_of(played.rows, campaign.specs, settings.separation_m, processes)
+    except KeyboardInterrupt:
+        _write(command, settings, folder, campaign.so_far(), time.perf_counter() - started, quick)
+        raise Interrupted(_how_to_go_on(folder, campaign)) from None
+    results = _write(command, settings, folder, played, time.perf_counter() - started, quick, replay)
+    show(out(), results, folder)
+    return results
+
+
+def show(console: Console, results: dict[str, Any], folder: Path) -> None:
+    """Print the tables of a run and where its files are."""
+    for summary in results["pairings"]:
+        console.print(pairing_table(summary))
+        if summary["policy_failures"]:
+            console.print(f"The policy failed {summary['policy_failures']} times; its boats held for those steps.")
+        console.print()
+    if results["bars"]:
+        console.print(bars_table(results["bars"]))
+        console.print()
+    for failed in results["failed"]:
+        state = "on" if failed["shielded"] else "off"
+        console.print(f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}")
+    for name in results["files"].values():
+        console.print(f"{folder / name}", soft_wrap=True)
+    if results["quick"]:
+        console.print(_small_version(results["settings"]))
+
+
+def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
+    """End with an error when games are missing.
+
+    Raises:
+        ConfigError: some games could not be played.
+    """
+    if results["failed"]:
+        missing = len(results["failed"])
+        raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+
+
+def _play(campaign: Campaign, processes: int) -> Played:
+    total = len(campaign.specs)
+    with progress("compiling (first run only)", total) as notice:
+        notice(0)
+        if processes > 1:
+            _warm(campaign.specs)
+    with progress("games", total) as notice:
+        return campaign.run(notice)
+
+
+def _warm(specs: Sequence[Any]) -> None:
+    states = {spec.shield is not None: spec for spec in specs}
+    for spec in states.values():
+        warm_up(spec)
+
+
+def _write(
+    command: str,
+    settings: AblationSettings,
+    folder: Path,
+    played: Played,
+    wall_s: float,
+    quick: bool,
+    replay: tuple[dict[str, Any], list[Any]] | None = None,
+) -> dict[str, Any]:
+    results = results_of(command, settings, played, wall_s, quick)
+    if played.rows:
+        entry, records = replay or (None, [])
+        if entry is not None:
+            results["replay"] = entry
+        write_results(folder, results, played.rows, records)
+    return results
+
+
+def _how_to_go_on(folder: Path, campaign: Campaign) -> str:
+    kept = len(campaign.so_far().rows)
+    return (
+        f"interrupted: {kept} of {len(campaign.specs)} games kept in {folder / LINES_FILE}; "
+        f"the same command with --out {folder} --resume goes on from there"
+    )
+
+
+def _small_version(settings: dict[str, Any]) -> str:
+    length_s = settings["rules"]["max_time_s"]
+    return (
+        f"This was the small version: {settings['games']} games of {length_s:g} s per pairing. "
+        "Its intervals are wide; leave out --quick for 20 games of full length."
+    )
+
+
+def warn(text: str) -> None:
+    """Say something on stderr."""
+    err().print(text, markup=False, soft_wrap=True)

@@ -1,0 +1,79 @@
+"""Options that several commands share, and what they become."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear.shield.exceptions import ConfigError
+
+Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024 or mctf2025.")]
+Own = Annotated[str, typer.Option(metavar="NAME", help="Policy of the shielded team: a name or a submission's path.")]
+Opponents = Annotated[str, typer.Option(metavar="A,B", help="Policies it meets, separated by commas.")]
+Games = Annotated[int | None, typer.Option(metavar="N", help="Games per pairing and shield state.", show_default="20")]
+Seed = Annotated[int, typer.Option(metavar="N", help="Game g is played from seed + g.")]
+Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for results.", show_default="results/...")]
+Jobs = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with what an interrupted run left in --out.")]
+Quick = Annotated[bool, typer.Option("--quick", help="The small version: fewer and shorter games.")]
+Separation = Annotated[float | None, typer.Option(metavar="M", help="Radius the shield keeps, m.", show_default="2.5")]
+Certificate = Annotated[str | None, typer.Option(metavar="NAME", help="Certificate of the shield.")]
+Solver = Annotated[str | None, typer.Option(metavar="NAME", help="QP solver of the shield.")]
+ShieldSet = Annotated[list[str] | None, typer.Option("--shield-set", metavar="KEY=VALUE", help="Any shield setting.")]
+NoAutopilot = Annotated[
+    bool,
+    typer.Option("--no-shield-autopilot", help="Leave boats the game drives (tagged, out of bounds) unshielded."),
+]
+Penalty = Annotated[float, typer.Option(metavar="W", help="Weight of a collision in the primary score.")]
+MaxTime = Annotated[float | None, typer.Option(metavar="S", help="Length of a game, s.", show_default="600")]
+Platform = Annotated[str | None, typer.Option(metavar="NAME", help="Platform of all boats, else the preset's.")]
+RuleSet = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any setting of the game.")]
+FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
+Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
+JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]
+
+
+def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
+    """Read ``KEY=VALUE`` options; a value is JSON where it can be read as such, else text.
+
+    Raises:
+        ConfigError: an entry without ``=``.
+    """
+    settings = {}
+    for pair in pairs or []:
+        name, equals, text = pair.partition("=")
+        if not equals or not name:
+            raise ConfigError(f"{option} takes KEY=VALUE; got {pair!r}")
+        try:
+            settings[name.strip()] = json.loads(text)
+        except json.JSONDecodeError:
+            settings[name.strip()] = text
+    return settings
+
+
+def shield_settings(
+    separation: float | None, certificate: str | None, solver: str | None, pairs: list[str] | None
+) -> dict[str, Any]:
+    """Collect the settings of the shield that were given."""
+    named = {"separation_m": separation, "certificate": certificate, "solver": solver}
+    return {name: value for name, value in named.items() if value is not None} | key_values(pairs, "--shield-set")
+
+
+def game_settings(max_time_s: float | None, platform: str | None, pairs: list[str] | None) -> dict[str, Any]:
+    """Collect the settings of the game that were given."""
+    named = {"max_time_s": max_time_s, "platforms": platform}
+    return {name: value for name, value in named.items() if value is not None} | key_values(pairs, "--set")
+
+
+def split_names(text: str, option: str) -> tuple[str, ...]:
+    """Split a list of names at commas, in order, each once.
+
+    Raises:
+        ConfigError: no name at all.
+    """
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise ConfigError(f"{option} names no policy; give names separated by commas, e.g. easy,medium")
+    return names

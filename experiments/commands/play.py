@@ -1,0 +1,136 @@
+"""``steerclear play``: one game, in a window or not, saved if wanted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+
+from ..match import MatchResult, Watcher, play_match
+from ..provenance import machine, versions
+from ..score import DEFAULT_PENALTY, check_penalty
+from ..shielding import check_shield
+from ..spec import MatchSpec
+from ..store import write_json
+from ..tables import game_table
+from . import options as o
+from .console import command, out, progress
+from .saving import check_endings, save_record
+
+Opponent = Annotated[str, typer.Option(help="Policy of the other team.")]
+Side = Annotated[str, typer.Option(help="Colour of the own team: blue or red.")]
+Shield = Annotated[bool, typer.Option("--shield/--no-shield", help="Whether the own team is shielded.")]
+Window = Annotated[bool, typer.Option("--window/--headless", help="Show the game in a window.")]
+Keyboard = Annotated[
+    bool, typer.Option("--keyboard", help="Steer the first own boat with the arrow keys (a window opens).")
+]
+Save = Annotated[list[Path] | None, typer.Option(help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")]
+Speed = Annotated[float, typer.Option(help="Times faster than the game, in a window.")]
+
+
+@command
+def play(
+    own: o.Own = "medium",
+    opponent: Opponent = "easy",
+    preset: o.Preset = "aamas2024",
+    side: Side = "blue",
+    shield: Shield = True,
+    seed: o.Seed = 0,
+    window: Window = False,
+    keyboard: Keyboard = False,
+    speed: Speed = 4.0,
+    save: Save = None,
+    separation: o.Separation = None,
+    certificate: o.Certificate = None,
+    solver: o.Solver = None,
+    shield_set: o.ShieldSet = None,
+    no_shield_autopilot: o.NoAutopilot = False,
+    penalty: o.Penalty = DEFAULT_PENALTY,
+    max_time: o.MaxTime = None,
+    platform: o.Platform = None,
+    rules: o.RuleSet = None,
+    fixed_start: o.FixedStart = False,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play one game and show what happened.
+
+    Exit status: 0 done, 2 bad input, 130 interrupted.
+    """
+    spec = MatchSpec(
+        preset=preset,
+        own="keyboard" if keyboard else own,
+        opponent=opponent,
+        seed=seed,
+        side=side,
+        shield=o.shield_settings(separation, certificate, solver, shield_set) if shield else None,
+        shield_autopilot=not no_shield_autopilot,
+        rules=o.game_settings(max_time, platform, rules),
+        fixed_start=fixed_start,
+        penalty=check_penalty(penalty),
+    )
+    started = time.perf_counter()
+    result = _play(spec, save or [], window or keyboard, speed)
+    out().print(game_table(result.row, result.spec.radii_m))
+    files = [save_record(result.record, path) for path in save or []]
+    for path in files:
+        out().print(f"{path}", soft_wrap=True)
+    if json_file is not None:
+        write_json(json_file, _content(result, files, time.perf_counter() - started))
+
+
+def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> MatchResult:
+    check_endings(save)
+    if spec.shield is not None:
+        check_shield(spec.shield)
+    for name in (spec.own, spec.opponent):
+        policies.make(name)
+    if window:
+        return play_match(spec, Pace(speed), "human")
+    total = round(spec.config().max_time_s / spec.config().dt_s)
+    with progress("playing", total) as notice:
+        return play_match(spec, _reporter(notice))
+
+
+class Pace:
+    """Keeps a shown game at a multiple of real time, and ends it when the window is closed."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = speed
+        self._due_s = time.perf_counter()
+
+    def __call__(self, env: MctfEnv) -> bool:
+        """Wait for the step's time."""
+        self._due_s += env.config.dt_s / self.speed
+        time.sleep(max(0.0, self._due_s - time.perf_counter()))
+        return not env.window_closed
+
+
+def _reporter(notice: Any) -> Watcher:
+    steps = 0
+
+    def watch(env: MctfEnv) -> bool:
+        nonlocal steps
+        steps += 1
+        if steps % 50 == 0:
+            notice(steps)
+        return True
+
+    return watch
+
+
+def _content(result: MatchResult, files: Sequence[Path], wall_s: float) -> dict[str, Any]:
+    settings = {name: getattr(result.spec, name) for name in result.spec.__dataclass_fields__}
+    return {
+        "command": "play",
+        "settings": settings,
+        "versions": versions(),
+        "machine": machine(),
+        "wall_s": wall_s,
+        "game": result.row,
+        "files": [str(path) for path in files],
+    }

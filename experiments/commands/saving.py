@@ -1,0 +1,83 @@
+"""Saving a game in the form that a file's name asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from steerclear.env.record import Record, save
+from steerclear.shield.exceptions import ConfigError
+
+from ..replay_html import write_replay
+from .console import progress
+
+ENDINGS = (".npz", ".html", ".mp4", ".gif", ".png")
+
+
+def check_endings(paths: Sequence[Path]) -> None:
+    """Refuse names whose ending says no known form.
+
+    Raises:
+        ConfigError: another ending.
+    """
+    for path in paths:
+        if path.suffix.lower() not in ENDINGS:
+            raise ConfigError(f"cannot save {path.name!r}; end the name in one of {', '.join(ENDINGS)}")
+
+
+def save_record(record: Record, path: Path, at_s: float | None = None, speedup: float = 4.0) -> Path:
+    """Write a record as data, replay, film or picture, by the ending of the name.
+
+    Args:
+        record: the game.
+        path: where to.
+        at_s: moment that a picture shows, s; None takes the closest approach.
+        speedup: times faster than the game, for films.
+
+    Raises:
+        ConfigError: the name's ending is not known, or the place cannot be written to.
+    """
+    check_endings([path])
+    ending = path.suffix.lower()
+    if ending == ".npz":
+        return save(record, path)
+    if ending == ".html":
+        return write_replay(record, path)
+    return _picture(record, path, at_s) if ending == ".png" else _film(record, path, speedup)
+
+
+def _film(record: Record, path: Path, speedup: float) -> Path:
+    from steerclear.env.render import save_animation  # draws with pygame: only where a picture is wanted
+
+    with progress(path.suffix[1:], len(record["wanted"])) as notice:
+        return save_animation(record, path, speedup=speedup, progress=lambda done, of: notice(done))
+
+
+def _picture(record: Record, path: Path, at_s: float | None) -> Path:
+    from steerclear.env.render import save_frame
+
+    step = closest_step(record) if at_s is None else round(at_s / dt_of(record))
+    return save_frame(record, step, path)
+
+
+def dt_of(record: Record) -> float:
+    """Return the length of a step, s."""
+    from steerclear.env.record import read_meta
+
+    return float(read_meta(record)["dt_s"])
+
+
+def closest_step(record: Record) -> int:
+    """Find the step at which a shielded boat (any boat, without a shield) is closest to another."""
+    import numpy as np
+
+    from ..breaches import PairDistances
+
+    covered: Any = record["intervened"].any(axis=0)
+    distances = PairDistances.of(record["position"])
+    if covered.any():
+        distances = distances.of_pairs(covered[distances.pairs].any(axis=1))
+    if distances.distance_m.size == 0:
+        return 0
+    return int(np.argmin(distances.distance_m.min(axis=1))) + 1

@@ -1,0 +1,146 @@
+"""Documentation pages made of results: Markdown tables and plots, nothing typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+from .docs_plots import plot_off_on
+from .keys import KEYS
+from .tables import interval_text, number_text
+from .tally import RADII_M, breach_column
+
+MADE = "<!-- made by `steerclear docs`; do not edit -->"
+_COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
+
+
+def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
+    """Write the pages that results give, and the page of JSON keys.
+
+    Args:
+        results: contents of JSON files that ``ablate``, ``evaluate`` or ``bench`` wrote.
+        folder: where to.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ConfigError: results of another command, or the folder cannot be written to.
+    """
+    pages = {"json_keys.md": keys_page()}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        pictures = []
+        for content in results:
+            name, text, picture = _page_of(content, folder)
+            pages[name] = text
+            pictures += picture
+        for name, text in pages.items():
+            (folder / name).write_text(text)
+    except OSError as error:
+        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
+    return [*(folder / name for name in pages), *pictures]
+
+
+def _page_of(content: Mapping[str, Any], folder: Path) -> tuple[str, str, list[Path]]:
+    command = content.get("command")
+    if command == "bench":
+        return "bench.md", bench_page(content), []
+    if command not in ("ablate", "evaluate"):
+        raise ConfigError(f"no page can be made of results of {command!r}; give results of ablate, evaluate or bench")
+    stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
+    plots = _plots(content, folder, stem) if command == "ablate" and content["pairings"] else []
+    return f"{stem}.md", runs_page(content, plots), plots
+
+
+def _plots(content: Mapping[str, Any], folder: Path, stem: str) -> list[Path]:
+    radius_m = float((content["settings"].get("shield") or {}).get("separation_m", RADII_M[0]))
+    figures = [
+        (breach_column("opponent", radius_m), f"hits with opponents per game, {radius_m:g} m"),
+        (breach_column("teammate", radius_m), f"hits with team-mates per game, {radius_m:g} m"),
+        ("captures", "captures per game"),
+    ]
+    return [plot_off_on(content["pairings"], figures, folder / f"{stem}.png")]
+
+
+def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
+    """Write the page of an ablation or evaluation."""
+    settings = content["settings"]
+    lines = [f"# {settings['own']} on {settings['preset']}", "", MADE, "", _what_was_played(content), ""]
+    lines += [f"![off and on]({path.name})\n" for path in plots]
+    for summary in content["pairings"]:
+        lines += [f"## {summary['pairing']}", "", *_metrics_table(summary), ""]
+        if summary["reasons"]:
+            lines += [_reasons_line(summary["reasons"]), ""]
+    if content["bars"]:
+        lines += ["## Bars", "", *_bars_table(content["bars"]), ""]
+    return "\n".join(lines)
+
+
+def bench_page(content: Mapping[str, Any]) -> str:
+    """Write the page of a benchmark."""
+    lines = ["# Speed and memory", "", MADE, "", _machine_line(content), ""]
+    for section in content["tables"]:
+        heads = section["columns"]
+        lines += [f"## {section['title']}", "", *_markdown(heads, section["rows"]), ""]
+    return "\n".join([*lines, "## Bars", "", *_bars_table(content["bars"]), ""])
+
+
+def keys_page() -> str:
+    """Write the page of JSON keys."""
+    lines = ["# JSON keys", "", MADE, "", "`*` stands for a name that depends on the run, `[]` for every entry.", ""]
+    for command, keys in KEYS.items():
+        rows = [(f"`{name}`", words) for name, words in keys.items()]
+        lines += [f"## `steerclear {command} --json`", "", *_markdown(["key", "meaning"], rows), ""]
+    return "\n".join(lines)
+
+
+def _what_was_played(content: Mapping[str, Any]) -> str:
+    settings = content["settings"]
+    length = settings["rules"].get("max_time_s")
+    size = "the small version, " if content["quick"] else ""
+    return (
+        f"{size}{settings['games']} games per pairing and shield state"
+        + (f" of {length:g} s" if length else "")
+        + f", seeds {content['seeds'][0]} to {content['seeds'][-1]}, steerclear {content['versions']['steerclear']}. "
+        "Means per game with 95 % intervals (Poisson for counts, Wilson for shares, bootstrap for means)."
+    )
+
+
+def _machine_line(content: Mapping[str, Any]) -> str:
+    machine, versions = content["machine"], content["versions"]
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items() if version)
+    hardware = f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gib']} GiB, {machine['system']}"
+    return f"{hardware}. {packages}."
+
+
+def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
+    present = [(key, head) for key, head in _COLUMNS if any(key in figures for figures in summary["metrics"].values())]
+    rows = [
+        [figures["label"], *(interval_text(figures.get(key)) for key, _ in present)]
+        for figures in summary["metrics"].values()
+    ]
+    return _markdown(["", *(head for _, head in present)], rows)
+
+
+def _bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:
+    verdict = {True: "met", False: "**not met**", None: "no data"}
+    rows = [
+        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
+        for bar in bars
+    ]
+    return _markdown(["", "measured", "bar", ""], rows)
+
+
+def _reasons_line(reasons: Mapping[str, int]) -> str:
+    total = sum(reasons.values()) or 1
+    parts = [f"{name} {100 * count / total:.2f} %" for name, count in reasons.items() if count]
+    return f"Decisions: {', '.join(parts)} of {total:,} boat-steps."
+
+
+def _markdown(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
+    ruler = ["---", *("---:" for _ in heads[1:])]
+    return [f"| {' | '.join(str(cell) for cell in row)} |" for row in (heads, ruler, *rows)]

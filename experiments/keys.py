@@ -1,0 +1,149 @@
+"""Every key of the JSON and tables that the commands write, with its meaning and unit.
+
+The documentation is generated from these; a test walks real results and fails on a key that is not here.
+``*`` stands for a name that depends on the run; ``[]`` for every entry of a list.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+GAME_COLUMNS = {
+    "pairing": "own policy vs opponent policy",
+    "game": "number within the pairing; the same number off and on starts from the same seed",
+    "shielded": "whether the own team had a shield",
+    "preset": "rules of the game",
+    "own": "policy whose results are counted",
+    "opponent": "policy of the other team",
+    "side": "colour of the own team",
+    "seed": "of start places and policies",
+    "penalty": "weight of a collision in the primary score",
+    "steps": "steps played",
+    "duration_s": "game time played, s",
+    "captures": "flags captured; captures_against by the other team",
+    "captures_against": "flags captured by the other team",
+    "grabs": "flags grabbed",
+    "grabs_against": "flags grabbed by the other team",
+    "tags": "tags made",
+    "tags_against": "tags made by the other team: times tagged",
+    "breaches_teammate_*": "entries of two own boats into that radius, per pair",
+    "breaches_opponent_*": "entries of an own boat and an opponent into that radius, per pair",
+    "closest_teammate_m": "closest distance of two own boats, m",
+    "closest_opponent_m": "closest distance of an own boat to an opponent, m",
+    "closest_m": "the smaller of the two, m",
+    "collisions": "as the score counts them: entries into the sum of the agent radii, for each own boat in it",
+    "covered_steps": "boat-steps a shield decided on",
+    "changed_steps": "boat-steps in which the sent command differs from the wanted one",
+    "changed_share": "changed_steps / covered_steps",
+    "mean_heading_change_deg": "mean |sent - wanted| heading over changed steps, deg",
+    "mean_speed_change_mps": "mean |sent - wanted| speed over changed steps, m/s",
+    "reversals_per_boat_minute": "changes of the commanded side of turn (beyond 5 deg) per boat and minute",
+    "decision_p50_us": "median time of a team's decision, us",
+    "decision_p99_us": "99th percentile of it, us",
+    "decision_max_us": "longest, us",
+    "reason_*": "boat-steps decided for that reason",
+    "policy_failures": "times the own policy raised or answered nonsense; its boats held",
+    "opponent_policy_failures": "the same of the other team",
+    "first_failure": "text of the first of them",
+    "primary": "captures - captures_against - penalty * collisions",
+    "secondary": "grabs + tags - grabs_against - tags_against",
+    "wall_s": "time it took to play, s",
+}
+
+_FIGURE = {"value": "figure", "low": "lower 95 % limit", "high": "upper 95 % limit"}
+_BAR = {
+    "name": "what is judged",
+    "value": "measured",
+    "low": "lower 95 % limit",
+    "high": "upper 95 % limit",
+    "sense": "<= or >=",
+    "limit": "what is asked",
+    "met": "whether it is met; null without data",
+}
+_PROVENANCE = {
+    "command": "which command wrote this",
+    "settings.*": "settings as given on the command line",
+    "versions.*": "versions of Python and packages",
+    "machine.*": "processor, cores, memory, system",
+    "wall_s": "how long it took, s",
+}
+
+RESULTS = {
+    **_PROVENANCE,
+    "complete": "false when interrupted or a game could not be played",
+    "quick": "whether this is the small version",
+    "seeds[]": "seed of each game number",
+    "games_played": "games in the results",
+    "games_resumed": "of those, how many an earlier run had played",
+    "failed[].pairing": "pairing of a game that could not be played",
+    "failed[].game": "its number",
+    "failed[].shielded": "whether with a shield",
+    "failed[].error": "why",
+    "pairings[].pairing": "own policy vs opponent policy",
+    "pairings[].games_off": "games without shield",
+    "pairings[].games_on": "games with shield",
+    "pairings[].policy_failures": "failures of the own policy in all games",
+    "pairings[].reasons.*": "boat-steps per reason, all shielded games",
+    "pairings[].metrics.*.label": "words of the tables",
+    **{f"pairings[].metrics.*.off.{k}": f"{v}, shield off, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.on.{k}": f"{v}, shield on, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.difference.{k}": f"{v}, mean of on - off, paired" for k, v in _FIGURE.items()},
+    **{f"bars[].{k}": v for k, v in _BAR.items()},
+    "replay.pairing": "pairing of the game in replay.html: the one with the most breaches without shield",
+    "replay.game": "its number",
+    "replay.breaches_off": "its breaches without shield",
+    "replay.breaches_on": "its breaches with shield",
+    "replay.same_as_played": "whether playing it again gave the same counts",
+    "files.*": "what was written, relative to the folder",
+}
+
+PLAY = {
+    **_PROVENANCE,
+    **{f"game.{k}": v for k, v in GAME_COLUMNS.items()},
+    "files[]": "what was written",
+}
+
+PARITY = {
+    **_PROVENANCE,
+    "passed": "whether every trace is within the limits",
+    "limits.*": "largest deviation allowed; events must be exact",
+    "traces[].*": "a trace's name, steps, largest deviations and event mismatches",
+    "traces[].*[]": "first mismatches",
+}
+
+RENDER = {**_PROVENANCE, "files[]": "what was written"}
+
+KEYS = {
+    "ablate": RESULTS,
+    "evaluate": RESULTS,
+    "play": PLAY,
+    "parity": PARITY,
+    "render": RENDER,
+}
+
+
+def undocumented(content: Mapping[str, Any], documented: Mapping[str, str]) -> list[str]:
+    """Return the key paths of ``content`` that ``documented`` does not describe."""
+    patterns = [re.compile(_pattern(name)) for name in documented]
+    return sorted({path for path in paths_of(content) if not any(p.fullmatch(path) for p in patterns)})
+
+
+def paths_of(content: Any, path: str = "") -> Iterator[str]:
+    """Yield the path of every value: ``a.b[].c``."""
+    if isinstance(content, Mapping) and content:
+        for name, value in content.items():
+            yield from paths_of(value, f"{path}.{name}" if path else str(name))
+    elif isinstance(content, list | tuple) and content:
+        for value in content:
+            yield from paths_of(value, f"{path}[]")
+    elif not isinstance(content, Mapping | list | tuple):
+        yield path
+
+
+def _pattern(name: str) -> str:
+    # settings may nest; elsewhere a star is one name (which may hold a dot, as in breaches_opponent_2.5m)
+    if name.endswith("settings.*"):
+        return re.escape(name[:-1]) + ".+"
+    return re.escape(name).replace(r"\*", r"[^\[\]]+?")

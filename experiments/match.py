@@ -1,0 +1,213 @@
+"""Playing one game and counting what happened in it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches
+from steerclear.env.record_meta import meta_of
+from steerclear.shield.exceptions import GameError, SteerclearError
+from steerclear.shield.jit import Array
+
+from .openings import opening
+from .score import scores
+from .seat import Failures, Seat
+from .shielding import Shielding, shield_game
+from .spec import SIDES, MatchSpec
+from .tally import RADII_M, reason_counts, tally
+
+Watcher = Callable[[MctfEnv], bool]
+"""Called after every step with the env; False ends the game early (a closed window)."""
+
+
+@dataclass(frozen=True)
+class MatchResult:
+    """One game.
+
+    Attributes:
+        spec: what was to be played.
+        row: flat columns, as `keys.GAME_COLUMNS` describes them.
+        record: everything that happened, see `steerclear.env.record`.
+    """
+
+    spec: MatchSpec
+    row: dict[str, Any]
+    record: Record
+
+
+class Match:
+    """A game being played.
+
+    Args:
+        spec: what to play.
+        render_mode: of the env; None draws nothing.
+
+    Raises:
+        SteerclearError: a setting or policy of the spec is unusable.
+    """
+
+    def __init__(self, spec: MatchSpec, render_mode: str | None = None) -> None:
+        self.spec = spec
+        self.env = MctfEnv(spec.config(), render_mode=render_mode)
+        self.shielding: Shielding = shield_game(self.env, spec)
+        ids = self.env.possible_agents
+        size = self.env.config.team_size
+        names = [spec.own, spec.opponent] if spec.side == "blue" else [spec.opponent, spec.own]
+        self.names = dict(zip(SIDES, names, strict=True))
+        self.teams = [
+            Seat(policies.make(name, game=spec.game), self.env, ids[k * size : (k + 1) * size])
+            for k, name in enumerate(names)
+        ]
+        self._recorder = GameRecorder()
+        self._decision_us: list[float] = []
+        self._moment: tuple[Array, Array] | None = None
+
+    def play(self, watcher: Watcher | None = None) -> MatchResult:
+        """Play to the end.
+
+        Args:
+            watcher: called after every step.
+        """
+        started = time.perf_counter()
+        observations, infos = self._start()
+        while self.env.agents:
+            actions = self.teams[0].act(observations, infos) | self.teams[1].act(observations, infos)
+            observations, _, _, _, infos = self._step(actions)
+            self._record_step(infos)
+            if watcher is not None and not watcher(self.env):
+                break
+        return self._result(time.perf_counter() - started)
+
+    def close(self) -> None:
+        """Close the window and let the policies give back what they hold."""
+        for team in self.teams:
+            team.close()
+        self.env.close()
+
+    def _start(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        spec = self.spec
+        options = None if spec.fixed_start else {"init_dict": opening(self.env.config, spec.seed)}
+        answer = self.shielding.env.reset(seed=spec.seed, options=options)
+        self.shielding.listen(self._note_commands)
+        for number, team in enumerate(self.teams):
+            team.reset(self.shielding.env, 2 * spec.seed + number)
+        self._recorder.start(self.env.view(), self._meta())
+        return answer
+
+    def _step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
+        try:
+            return self.shielding.env.step(actions)
+        except GameError:  # an answer the game refuses; nothing has moved yet
+            mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
+            return self.shielding.env.step(mended)
+
+    def _meta(self) -> dict[str, Any]:
+        return meta_of(
+            self.env.config,
+            separation_m=self.shielding.separation_m,
+            policies=self.names,
+            shielded=self.shielding.agent_ids,
+            seed=self.spec.seed,
+            reason_names=self.shielding.reason_names,
+        )
+
+    def _note_commands(self, wanted: Array, sent: Array) -> None:
+        heading_deg = self.env.core.state[0, :, 2]
+        self._moment = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
+
+    def _record_step(self, infos: Mapping[str, Any]) -> None:
+        if self._moment is None:
+            raise SteerclearError("the game moved without asking for commands; build the Match anew")
+        wanted, sent = self._moment
+        seen = self.shielding.read(infos)
+        self._recorder.step(self.env.view(), wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        if seen.solve_time_s is not None:
+            self._decision_us.append(1e6 * seen.solve_time_s)
+
+    def _result(self, wall_s: float) -> MatchResult:
+        record = self._recorder.finish()
+        record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
+        return MatchResult(self.spec, self._row(record, wall_s), record)
+
+    def _row(self, record: Record, wall_s: float) -> dict[str, Any]:
+        spec = self.spec
+        counts = {**self._events(), **tally(record, spec.own_team, spec.radii_m)}
+        own, opponent = (self.teams[k].failures() for k in (spec.own_team, 1 - spec.own_team))
+        return {
+            **self._header(record),
+            **counts,
+            **scores(counts, spec.penalty),
+            **self._decision_columns(),
+            **{f"reason_{name}": count for name, count in reason_counts(record, spec.own_team).items()},
+            **_failure_columns(own, opponent),
+            "wall_s": wall_s,
+        }
+
+    def _header(self, record: Record) -> dict[str, Any]:
+        spec, steps = self.spec, len(record["wanted"])
+        return {
+            "pairing": spec.pairing,
+            "game": spec.game,
+            "shielded": spec.shield is not None,
+            **{name: getattr(spec, name) for name in ("preset", "own", "opponent", "side", "seed", "penalty")},
+            "steps": steps,
+            "duration_s": steps * self.env.config.dt_s,
+        }
+
+    def _events(self) -> dict[str, int]:
+        core, own = self.env.core, self.spec.own_team
+        return {
+            name + suffix: int(getattr(core, name)[0, team])
+            for name in ("captures", "grabs", "tags")
+            for suffix, team in (("", own), ("_against", 1 - own))
+        }
+
+    def _decision_columns(self) -> dict[str, float | None]:
+        timed = self._decision_us[1:]  # the first one loads compiled code
+        if not timed:
+            return {"decision_p50_us": None, "decision_p99_us": None, "decision_max_us": None}
+        p50, p99, most = np.quantile(timed, [0.5, 0.99, 1.0])
+        return {"decision_p50_us": float(p50), "decision_p99_us": float(p99), "decision_max_us": float(most)}
+
+
+def play_match(spec: MatchSpec, watcher: Watcher | None = None, render_mode: str | None = None) -> MatchResult:
+    """Play one game.
+
+    Args:
+        spec: what to play.
+        watcher: called after every step with the env; False ends the game.
+        render_mode: "human" shows a window.
+
+    Raises:
+        SteerclearError: a setting or policy of the spec is unusable. A policy that fails later does not end the game.
+    """
+    match = Match(spec, render_mode)
+    try:
+        return match.play(watcher)
+    finally:
+        match.close()
+
+
+def play_row(spec: MatchSpec) -> dict[str, Any]:
+    """Play one game and return its row alone, small enough to travel between processes by the thousand."""
+    return play_match(spec).row
+
+
+def warm_up(spec: MatchSpec) -> None:
+    """Play two seconds of a game, so that everything compiled is on disk before several processes want it."""
+    play_match(replace(spec, rules={**spec.rules, "max_time_s": 2.0}, radii_m=RADII_M))
+
+
+def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:
+    texts = [f"own: {text}" for text in own.texts] + [f"opponent: {text}" for text in opponent.texts]
+    return {
+        "policy_failures": own.count,
+        "opponent_policy_failures": opponent.count,
+        "first_failure": texts[0] if texts else None,
+    }

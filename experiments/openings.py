@@ -1,0 +1,87 @@
+"""Start places of experiments: random, at rest, far enough apart that no breach is decided at the start.
+
+Most policies are deterministic, so games differ by their start places alone; the preset's own random starts
+give boats speeds and places from which a breach cannot be avoided, which would say nothing about a shield.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.config import GameConfig
+from steerclear.env.field import field_geometry
+from steerclear.shield.exceptions import ConfigError
+
+GAP_M = 8.0
+"""Boats start at least this far apart, from each other and from flags."""
+SPREAD_DEG = 45.0
+"""Boats head for the opponents' flag, this much to either side."""
+TRIES = 2000
+
+
+def opening(config: GameConfig, seed: int) -> dict[str, Any]:
+    """Draw start places and headings.
+
+    Every boat lies at rest on its own side, `GAP_M` or more from every other boat, flag home and field edge
+    (less where the field is small), heading for the opponents' flag give or take `SPREAD_DEG`.
+
+    Args:
+        config: the game.
+        seed: the same seed gives the same places.
+
+    Returns:
+        ``init_dict`` for ``env.reset(options={"init_dict": ...})``.
+
+    Raises:
+        ConfigError: obstacles or the number of boats leave no room.
+    """
+    field = field_geometry(config)
+    rng = np.random.default_rng([seed, 0x5EA])
+    gap_m = min(GAP_M, float(field.size.min()) / (2.0 * config.team_size))
+    places: list[NDArray[np.float64]] = []
+    headings: list[float] = []
+    for boat in range(config.n_boats):
+        team = boat // config.team_size
+        place = _draw(config, field.flag_home, field.size, team, places, gap_m, rng)
+        east, north = field.flag_home[1 - team] - place
+        places.append(place)
+        headings.append(float(np.degrees(np.arctan2(east, north)) + rng.uniform(-SPREAD_DEG, SPREAD_DEG)))
+    return {
+        "agent_position": [place.tolist() for place in places],
+        "agent_heading": [(heading + 180.0) % 360.0 - 180.0 for heading in headings],
+        "agent_speed": [0.0] * config.n_boats,
+    }
+
+
+def _draw(
+    config: GameConfig,
+    homes: NDArray[np.float64],
+    size: NDArray[np.float64],
+    team: int,
+    taken: list[NDArray[np.float64]],
+    gap_m: float,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    keep_off = [*taken, *homes]
+    for _ in range(TRIES):
+        place = rng.uniform(gap_m, size - gap_m)
+        own, other = np.linalg.norm(homes - place, axis=1)[[team, 1 - team]]
+        # a boat's width clear of the dividing line, so that it starts on its own side
+        clear = min(np.linalg.norm(place - thing) for thing in keep_off) >= gap_m and other - own > gap_m
+        if clear and not _on_obstacle(config, place, gap_m):
+            return np.asarray(place)
+    raise ConfigError("no start places found; use fewer boats or obstacles, a larger field, or --fixed-start")
+
+
+def _on_obstacle(config: GameConfig, place: NDArray[np.float64], gap_m: float) -> bool:
+    circles = config.obstacles["circle"] if config.obstacles else ()
+    polygons = config.obstacles["polygon"] if config.obstacles else ()
+    near_circle = any(np.linalg.norm(place - centre) < radius + gap_m for radius, centre in circles)
+    return near_circle or any(_near_polygon(place, np.array(corners), gap_m) for corners in polygons)
+
+
+def _near_polygon(place: NDArray[np.float64], corners: NDArray[np.float64], gap_m: float) -> bool:
+    low, high = corners.min(axis=0) - gap_m, corners.max(axis=0) + gap_m  # its bounding box will do
+    return bool(((place > low) & (place < high)).all())

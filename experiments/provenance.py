@@ -1,0 +1,52 @@
+"""Where and with what results were made: versions, machine."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from .pool import available_cores
+
+PACKAGES = ("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch")
+
+
+def package_version(name: str = "steerclear") -> str | None:
+    """Return the installed version of a distribution, None where it is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def versions() -> dict[str, str | None]:
+    """Return the versions that results depend on, Python's first."""
+    return {"python": platform.python_version(), **{name: package_version(name) for name in PACKAGES}}
+
+
+def machine() -> dict[str, Any]:
+    """Describe the machine: processor, cores this process may use, memory in GiB, system."""
+    return {
+        "processor": _processor(),
+        "cores": available_cores(),
+        "memory_gib": _memory_gib(),
+        "system": f"{platform.system()} {platform.release()}",
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _memory_gib() -> float | None:
+    try:
+        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
+    except (AttributeError, ValueError, OSError):
+        return None

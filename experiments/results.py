@@ -1,0 +1,116 @@
+"""Putting together and writing what a run of games gave: results.json, the table of games, report and replay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .ablation import AblationSettings, ablation_bars, most_instructive, spec_of, summaries
+from .campaign import Played
+from .match import play_match
+from .pool import run_all
+from .provenance import machine, versions
+from .replay_html import write_replay
+from .report_html import write_report
+from .spec import MatchSpec
+from .store import write_json, write_table
+from .summary import Row
+from .tally import breach_column
+
+NAMES = {"games": "games", "replay": "replay.html", "report": "report.html", "results": "results.json"}
+
+
+def results_of(
+    command: str, settings: AblationSettings, played: Played, wall_s: float, quick: bool = False
+) -> dict[str, Any]:
+    """Put together the content of results.json; `keys.RESULTS` describes it.
+
+    Args:
+        command: which command this is.
+        settings: of the run.
+        played: its games; fewer than the settings ask for when it was interrupted.
+        wall_s: how long it took, s.
+        quick: whether it is the small version.
+    """
+    expected = settings.games * len(settings.opponents) * len(settings.states)
+    return {
+        "command": command,
+        "complete": len(played.rows) == expected,
+        "quick": quick,
+        "settings": asdict(settings),
+        "seeds": [settings.seed + game for game in range(settings.games)],
+        "versions": versions(),
+        "machine": machine(),
+        "wall_s": wall_s,
+        "games_played": len(played.rows),
+        "games_resumed": played.resumed,
+        "failed": played.failed,
+        "pairings": summaries(played.rows, settings),
+        "bars": ablation_bars(played.rows, settings.separation_m),
+    }
+
+
+def write_results(folder: Path, results: dict[str, Any], rows: Sequence[Row], records: Sequence[Any] = ()) -> Path:
+    """Write everything into the folder and note the names under ``files``.
+
+    Args:
+        folder: where to.
+        results: from `results_of`; gains ``files``.
+        rows: the games.
+        records: games for the replay, unshielded first; none, no replay.
+
+    Returns:
+        The path of results.json.
+    """
+    files = {"results": NAMES["results"], "games": write_table(folder, rows, NAMES["games"]).name}
+    results["files"] = files
+    links = []
+    if records:
+        files["replay"] = write_replay(records, folder / NAMES["replay"]).name
+        links = [{"label": _replay_label(results["replay"]), "path": files["replay"]}]
+    files["report"] = write_report({**results, "games": rows, "replays": links}, folder / NAMES["report"]).name
+    path = folder / NAMES["results"]
+    write_json(path, results)
+    return path
+
+
+def replay_of(
+    rows: Sequence[Row], specs: Sequence[MatchSpec], separation_m: float, processes: int
+) -> tuple[dict[str, Any], list[Any]] | None:
+    """Play the most instructive pair of games again, for its records.
+
+    Returns:
+        The ``replay`` entry of results.json and the records off and on; None without a pair of games.
+    """
+    pair = most_instructive(rows, separation_m)
+    if pair is None:
+        return None
+    chosen = [spec_of(row, specs) for row in pair]
+    outcomes = {outcome.job.key: outcome.answer for outcome in run_all(play_match, chosen, processes)}
+    again = [outcomes[spec.key] for spec in chosen]
+    if any(result is None for result in again):
+        return None
+    entry = {
+        "pairing": pair[0]["pairing"],
+        "game": pair[0]["game"],
+        "breaches_off": _breaches(pair[0], separation_m),
+        "breaches_on": _breaches(pair[1], separation_m),
+        "same_as_played": all(same_game(row, result.row) for row, result in zip(pair, again, strict=True) if result),
+    }
+    return entry, [result.record for result in again if result is not None]
+
+
+def same_game(first: Row, second: Row) -> bool:
+    """Tell whether two rows are the same game; times of computing may differ."""
+    timed = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
+    return all(first.get(name) == value for name, value in second.items() if name not in timed)
+
+
+def _replay_label(replay: Mapping[str, Any]) -> str:
+    return f"{replay['pairing']}, game {replay['game']}: without the shield and with it"
+
+
+def _breaches(row: Mapping[str, Any], separation_m: float) -> int:
+    return sum(int(row[breach_column(kind, separation_m)]) for kind in ("teammate", "opponent"))

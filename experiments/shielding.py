@@ -1,0 +1,121 @@
+"""Putting shields on a game and reading off what they did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.core import BatchedMctf
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import NOT_COVERED
+from steerclear.shield import Reason, Shield, ShieldConfig
+from steerclear.shield.jit import Array
+from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
+
+from .spec import SIDES, MatchSpec
+from .tally import RADII_M
+
+Listener = Callable[[Array, Array], None]
+"""Called before the boats move with the commands (1, n, 2) wanted and those sent."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the shields did in a step, for all n boats; `solve_time_s` is None where there is no shield."""
+
+    reason: NDArray[np.uint8]
+    intervened: NDArray[np.bool_]
+    certificate_m: NDArray[np.float32]
+    solve_time_s: float | None
+
+
+@dataclass
+class Shielding:
+    """A game's env with its shields.
+
+    Attributes:
+        inner: the game itself.
+        env: what to step: the game or the outermost wrapper.
+        agent_ids: boats that a shield decides for.
+        separation_m: radius the own shield keeps (the default's without one), m.
+        reason_names: names of the reason codes, by code.
+    """
+
+    inner: MctfEnv
+    env: Any
+    agent_ids: list[str] = field(default_factory=list)
+    separation_m: float = RADII_M[0]
+    reason_names: list[str] = field(default_factory=list)
+
+    def listen(self, listener: Listener) -> None:
+        """Hear of every step's commands, before and after the shields; call once per game, after reset."""
+        shields = self.inner.command_filter
+
+        def through(core: BatchedMctf, commands: Array) -> Array:
+            wanted = commands.copy()
+            sent = commands if shields is None else shields(core, commands)
+            listener(wanted, sent)
+            return sent
+
+        self.inner.command_filter = through
+
+    def read(self, infos: Mapping[str, Any]) -> Seen:
+        """Collect the decisions that the shields left in the infos of a step."""
+        n = len(self.inner.possible_agents)
+        seen = Seen(np.full(n, NOT_COVERED, np.uint8), np.zeros(n, bool), np.full(n, np.nan, np.float32), None)
+        times = []
+        for boat, agent_id in enumerate(self.inner.possible_agents):
+            decision = infos[agent_id].get("shield")
+            if decision is not None:
+                seen.reason[boat] = decision.reason
+                seen.intervened[boat] = decision.intervened
+                margin_m = decision.certificate_m
+                seen.certificate_m[boat] = margin_m if np.isfinite(margin_m) else np.nan  # nobody near: no margin
+                times.append(decision.solve_time_s)
+        return Seen(seen.reason, seen.intervened, seen.certificate_m, max(times, default=None))
+
+
+def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
+    """Put the shields of a spec on a game.
+
+    Raises:
+        ConfigError: a setting of a shield is unknown or out of range.
+    """
+    shielding = Shielding(env, env)
+    for side, settings in _settings_by_side(spec).items():
+        if settings is not None:
+            _add(shielding, side, settings, spec.shield_autopilot)
+    if spec.shield is not None:
+        shielding.separation_m = float(spec.shield.get("separation_m", RADII_M[0]))
+    return shielding
+
+
+def _settings_by_side(spec: MatchSpec) -> dict[str, Mapping[str, Any] | None]:
+    other = SIDES[1 - spec.own_team]
+    return {spec.side: spec.shield, other: spec.opponent_shield}
+
+
+def check_shield(settings: Mapping[str, Any]) -> None:
+    """Check settings without a game.
+
+    Raises:
+        ConfigError: a setting is unknown or out of range.
+    """
+    ShieldConfig.of(**settings)
+
+
+def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
+    config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, **settings})
+    wrapped = ShieldedParallelEnv(shielding.env, Shield(config), team=side, shield_autopilot=shield_autopilot)
+    shielding.env = wrapped
+    shielding.reason_names = [reason.name for reason in Reason]
+    shielding.agent_ids += _boats_of(shielding.inner, side)
+
+
+def _boats_of(env: MctfEnv, side: str) -> Sequence[str]:
+    size = env.config.team_size
+    first = size * SIDES.index(side)
+    return env.possible_agents[first : first + size]

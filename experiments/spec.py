@@ -1,0 +1,96 @@
+"""What a game is to be, complete enough to be played again to the bit: a `MatchSpec`."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from steerclear.env.config import GameConfig
+from steerclear.shield.exceptions import ConfigError
+
+from .score import DEFAULT_PENALTY
+from .store import key_of
+from .tally import RADII_M
+
+SIDES = ("blue", "red")
+
+
+@dataclass(frozen=True)
+class MatchSpec:
+    """One game between two policies, described by plain values that travel to other processes and into JSON.
+
+    Attributes:
+        preset: rules of the game.
+        own: policy of the team whose results are counted: a registered name or a submission's path.
+        opponent: policy of the other team.
+        game: number of the game within its pairing; the same number is played with and without the shield.
+        seed: of the start places and of both policies.
+        side: colour of the own team.
+        shield: settings of the own team's shield (`ShieldConfig`), None for no shield.
+        opponent_shield: likewise for the other team.
+        shield_autopilot: the shield also covers boats that the game itself drives (tagged, out of bounds).
+        rules: settings of the game that replace the preset's.
+        fixed_start: start on the preset's fixed places instead of random ones.
+        penalty: weight of a collision in the primary score.
+        radii_m: radii at which breaches are counted.
+    """
+
+    preset: str
+    own: str
+    opponent: str
+    game: int = 0
+    seed: int = 0
+    side: str = "blue"
+    shield: Mapping[str, Any] | None = None
+    opponent_shield: Mapping[str, Any] | None = None
+    shield_autopilot: bool = True
+    rules: Mapping[str, Any] = field(default_factory=dict)
+    fixed_start: bool = False
+    penalty: float = DEFAULT_PENALTY
+    radii_m: tuple[float, ...] = RADII_M
+
+    def __post_init__(self) -> None:
+        check_side(self.side)
+
+    @property
+    def pairing(self) -> str:
+        """Name of the pairing."""
+        return f"{self.own} vs {self.opponent}"
+
+    @property
+    def own_team(self) -> int:
+        """0 when the own team is blue, 1 when it is red."""
+        return SIDES.index(self.side)
+
+    @property
+    def key(self) -> str:
+        """Short name that two specs share exactly when they describe the same game."""
+        return key_of(asdict(self))
+
+    def config(self) -> GameConfig:
+        """Build the game's settings.
+
+        Raises:
+            ConfigError: the preset or a setting is unknown or out of range.
+        """
+        return GameConfig.preset(self.preset, **self.rules)
+
+
+def check_side(side: str) -> str:
+    """Return the side.
+
+    Raises:
+        ConfigError: neither blue nor red.
+    """
+    if side not in SIDES:
+        raise ConfigError(f"unknown side {side!r}; {near(side, SIDES)}")
+    return side
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """Say which known names are like ``name``, or all of them when none is."""
+    names = list(known)
+    matches = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    return f"did you mean {', '.join(matches)}?" if matches else f"choose one of {', '.join(names)}"
