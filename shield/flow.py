@@ -298,6 +298,16 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
 
 
 @kernel
+def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
+    """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
+    for m in range(count):
+        i = plan.movers[m]
+        if plan.reason[i] == PASSED or not unchanged(i, plan):
+            plan.reason[i] = QP_RELAXED
+        plan.slack_m[i] = max(0.0, -min(work.clear[i, MARGIN], work.fixed[i, MARGIN]))
+
+
+@kernel
 def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
     """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
     turn = work.plan[i, 0] * work.plan[i, 1]
@@ -332,7 +342,7 @@ def ladder(
     after = worst_merit(ours, work)
     if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
         check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        mark_answer(count, QP_RELAXED, plan)
+        mark_relaxed(count, work, plan)
         return
     for m in range(count):
         i = plan.movers[m]
@@ -351,12 +361,11 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
             continue
         ladder_move = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
         start = state[i, L.HEADING] if ladder_move else work.next_state[i, L.HEADING]
-        spin = state[i, L.TURN_RATE] if ladder_move else work.next_state[i, L.TURN_RATE]
         memory.kept[i] = True
         memory.side[i] = work.plan[i, 0]
-        if work.plan[i, 1] == 0.0:  # a turn that still runs out leaves the target behind, not ahead: nothing to go
-            memory.side[i] = 1.0 if spin >= 0.0 else -1.0
-        memory.target_deg[i] = wrap_degrees(start + work.plan[i, 0] * work.plan[i, 1])
+        memory.target_deg[i] = np.nan
+        if work.plan[i, 1] > 0.0:
+            memory.target_deg[i] = wrap_degrees(start + work.plan[i, 0] * work.plan[i, 1])
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
         memory.escaping[i] = ladder_move

@@ -81,7 +81,7 @@ class Memory(NamedTuple):
     Attributes:
         kept: whether the boat has one.
         side: 1 clockwise, -1 the other way.
-        target_deg: heading it ends on, deg clockwise from north.
+        target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
         escaping: whether the boat was carrying it out at the last decision.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
@@ -12,6 +14,12 @@ COMMANDED = -1.0
 """Speed entry of a manoeuvre that keeps the commanded speed."""
 
 SWEEPS = 3
+
+DONE_DEG = 270.0
+"""A turn to go beyond this is one that has been overshot: it is done."""
+
+FURTHEST_DEG = 200.0
+"""Largest turn to go with which a manoeuvre is committed to again."""
 
 
 @kernel
@@ -28,8 +36,20 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
 @kernel
 def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
     """Turn still to make of the manoeuvre in memory, deg; past its target it is done."""
+    if math.isnan(memory.target_deg[i]):
+        return 0.0
     togo = angle_to_go(heading_deg, memory.target_deg[i], memory.side[i])
-    return 0.0 if togo > 270.0 else togo
+    return 0.0 if togo > DONE_DEG else togo
+
+
+@kernel
+def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
+    """Whether the manoeuvre in memory can be offered.
+
+    A boat told to turn away from it for long is offered another in good time: once committed to, a manoeuvre must not
+    run over the angle at which it would be taken for done, not even by the way a boat still spins.
+    """
+    return memory.kept[i] and (done == 0 or kept_turn(i, heading_deg, memory) <= FURTHEST_DEG)
 
 
 @kernel
@@ -67,7 +87,7 @@ def choose_plan(
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
     for p in range(plans.shape[0] + 1):
-        if p == 0 and not memory.kept[i]:
+        if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
         bonus = tuning.hysteresis_m if p == 0 and memory.escaping[i] else 0.0
@@ -121,7 +141,7 @@ def assign_plans(
     for i in range(n):
         if who[i]:
             heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-            first = 0 if memory.kept[i] else 1
+            first = 0 if remembered(i, done, heading, memory) else 1
             side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
             lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
     stale = True

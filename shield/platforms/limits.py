@@ -20,7 +20,7 @@ class Limits:
 
     Attributes:
         top_speed_mps: top speed, m/s.
-        acceleration_mps2: highest acceleration, mean over any half second, from rest or out of a hard turn, m/s^2.
+        acceleration_mps2: highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2.
         turn_rate_dps: highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it).
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
@@ -55,10 +55,10 @@ def _acceleration(platform: Platform, dt_s: float) -> float:
 
 
 def _gain(platform: Platform, state: Array, dt_s: float) -> float:
-    """Highest mean acceleration over any half second of a straight run at full speed command, m/s^2."""
+    """Highest mean acceleration over any 0.2 s of a straight run at full speed command, m/s^2."""
     params = platform.pack()
     speeds = [float(state[L.SPEED])]
-    window = max(1, round(0.5 / dt_s))
+    window = max(1, round(0.2 / dt_s))
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
         speeds.append(float(state[L.SPEED]))
