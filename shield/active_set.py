@@ -18,6 +18,8 @@ OPTIMAL = 0
 INFEASIBLE = 1
 STALLED = 2
 
+NOT_A_NUMBER = -2
+
 TOLERANCE = 1e-10
 
 
@@ -59,10 +61,12 @@ def _solve_gram(C: Array, active: IntArray, count: int, rhs: Array, gram: Array,
 
 @kernel
 def _most_violated(C: Array, d: Array, z: Array) -> tuple[int, float]:
-    """Row with the largest violation relative to its norm; -1 when all hold."""
+    """Row with the largest violation relative to its norm; -1 when all hold, `NOT_A_NUMBER` when one cannot be told."""
     worst, index = TOLERANCE, -1
     for r in range(C.shape[0]):
         lack = d[r] - _dot(C[r], z)
+        if math.isnan(lack):
+            return NOT_A_NUMBER, lack
         if lack > worst:
             worst, index = lack, r
     return index, worst
@@ -137,7 +141,8 @@ def project(C: Array, d: Array, z0: Array, z: Array) -> int:
         z: shape (n,), the answer.
 
     Returns:
-        `OPTIMAL`, `INFEASIBLE`, or `STALLED` when the iteration limit was met (numerical trouble: do not use).
+        `OPTIMAL`, `INFEASIBLE`, or `STALLED` when the iteration limit was met or a row is not made of numbers
+        (numerical trouble: do not use).
     """
     rows, n = C.shape
     z[:] = z0
@@ -145,6 +150,8 @@ def project(C: Array, d: Array, z0: Array, z: Array) -> int:
     count = 0
     for _ in range(10 * (rows + n) + 10):
         entering, _lack = _most_violated(C, d, z)
+        if entering == NOT_A_NUMBER:
+            return STALLED
         if entering < 0:
             return OPTIMAL
         status, count = _make_active(C, d, z, entering, active, dual, count, gram)

@@ -43,12 +43,12 @@ def test_negative_values_are_refused_by_name(name):
 
 
 def test_a_boat_that_cannot_move_is_refused():
-    with pytest.raises(PlatformError, match="max_speed_mps is 0.0; it must be > 0"):
+    with pytest.raises(PlatformError, match=r"max_speed_mps is 0\.0; it must be > 0"):
         boat(max_speed_mps=0.0)
 
 
 def test_a_turn_cannot_cost_more_than_all_speed():
-    with pytest.raises(PlatformError, match="turn_loss is 1.5"):
+    with pytest.raises(PlatformError, match=r"turn_loss is 1\.5"):
         boat(turn_loss=1.5)
 
 
