@@ -47,7 +47,7 @@ NONSENSE = [
 ]
 
 
-@pytest.mark.parametrize(("action", "kind"), NONSENSE, ids=lambda value: repr(value)[:24])
+@pytest.mark.parametrize(("action", "kind"), NONSENSE, ids=lambda value: repr(value).split(" at 0x")[0][:24])
 def test_nonsense_is_named(game, action, kind):
     reader = policies.ActionReader(game[0])
     found = reader.problem("agent_1", action)
