@@ -8,6 +8,7 @@ with scaled inputs z (see `rows`). An answer counts only when it satisfies every
 from __future__ import annotations
 
 import logging
+import math
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -27,7 +28,7 @@ ROW_TOLERANCE = 1e-4
 
 OPTIONS: dict[str, dict[str, Any]] = {
     "osqp": {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 4000},
-    "proxqp": {"eps_abs": 1e-8},
+    "proxqp": {"eps_abs": 1e-8, "check_duality_gap": True, "eps_duality_gap_abs": 1e-8, "max_iter": 1000},
     "scs": {"eps_abs": 1e-7, "eps_rel": 1e-7},
 }
 """Settings under which a backend meets `ROW_TOLERANCE`; the others do at their defaults."""
@@ -95,11 +96,28 @@ def _ask(program: Program, solver: str) -> Any:
         return qpsolvers.solve_qp(identity_n, -program.z0, rows, -program.d, solver=solver, **options)
 
 
+@kernel
+def made_of_numbers(C: Array, d: Array, z0: Array) -> bool:
+    """Whether every number of a program is finite: some backends take half a minute over one that is not."""
+    for r in range(C.shape[0]):
+        if not math.isfinite(d[r]):
+            return False
+        for c in range(C.shape[1]):
+            if not math.isfinite(C[r, c]):
+                return False
+    for c in range(z0.shape[0]):
+        if not math.isfinite(z0[c]):
+            return False
+    return True
+
+
 def solve(program: Program, solver: str) -> Array | None:
     """Answer of the program, shape (n,), or None when the backend finds none that passes our own check.
 
     Fails closed: a backend that raises, or answers anything but n numbers that satisfy every row, has no answer.
     """
+    if not made_of_numbers(program.C, program.d, program.z0):
+        return None
     try:
         answer = _ask(program, solver)
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
