@@ -99,16 +99,14 @@ def _ask(program: Program, solver: str) -> Any:
 @kernel
 def made_of_numbers(C: Array, d: Array, z0: Array) -> bool:
     """Whether every number of a program is finite: some backends take half a minute over one that is not."""
+    good = True
     for r in range(C.shape[0]):
-        if not math.isfinite(d[r]):
-            return False
+        good = good and math.isfinite(d[r])
         for c in range(C.shape[1]):
-            if not math.isfinite(C[r, c]):
-                return False
+            good = good and math.isfinite(C[r, c])
     for c in range(z0.shape[0]):
-        if not math.isfinite(z0[c]):
-            return False
-    return True
+        good = good and math.isfinite(z0[c])
+    return good
 
 
 def solve(program: Program, solver: str) -> Array | None:
