@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from .commands.ablate import ablate
+from .commands.bench import bench
 from .commands.docs import docs
 from .commands.evaluate import evaluate
+from .commands.parity import parity
 from .commands.play import play
 from .commands.render import render
 from .provenance import package_version
@@ -21,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, render, docs):
+for function in (play, evaluate, ablate, parity, bench, render, docs):
     app.command()(function)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
+from .bench.report import bench_tables
 from .docs_plots import plot_off_on
 from .keys import KEYS
 from .tables import interval_text, number_text
@@ -83,9 +84,8 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
 def bench_page(content: Mapping[str, Any]) -> str:
     """Write the page of a benchmark."""
     lines = ["# Speed and memory", "", MADE, "", _machine_line(content), ""]
-    for section in content["tables"]:
-        heads = section["columns"]
-        lines += [f"## {section['title']}", "", *_markdown(heads, section["rows"]), ""]
+    for table in bench_tables(content):
+        lines += [f"## {table.title}", "", *_markdown(table.heads, table.rows), ""]
     return "\n".join([*lines, "## Bars", "", *_bars_table(content["bars"]), ""])
 
 

@@ -62,6 +62,7 @@ _BAR = {
     "limit": "what is asked",
     "met": "whether it is met; null without data",
 }
+_DECIDED = {"all": "all decisions", "passes": "no command changed", "intervenes": "a command changed"}
 _PROVENANCE = {
     "command": "which command wrote this",
     "settings.*": "settings as given on the command line",
@@ -109,8 +110,42 @@ PARITY = {
     **_PROVENANCE,
     "passed": "whether every trace is within the limits",
     "limits.*": "largest deviation allowed; events must be exact",
-    "traces[].*": "a trace's name, steps, largest deviations and event mismatches",
-    "traces[].*[]": "first mismatches",
+    "traces[].path": "the file",
+    "traces[].steps": "steps replayed",
+    "traces[].passed": "whether it is within the limits",
+    "traces[].*_*": "largest deviations, unit in the name",
+    "traces[].observation_normalised": "largest deviation of normalised observations",
+    "traces[].mismatches": "number of events that came out differently",
+    "traces[].first_mismatches[].*": "the first of them: step, event, who, expected, got",
+}
+
+_TIMES = {"p50_us": "median, us", "p99_us": "99th percentile, us", "p99_9_us": "99.9th percentile, us"}
+
+BENCH = {
+    **_PROVENANCE,
+    "decide.decisions": "states of real games, 3 boats and 3 opponents",
+    "decide.share_intervening": "share of them in which the shield changes a command",
+    **{f"decide.{k}.{n}": f"{w}: {v}" for k, w in _DECIDED.items() for n, v in _TIMES.items()},
+    "solvers[].solver": "name in qpsolvers, or the compiled projection of the batch",
+    **{f"solvers[].{name}": words for name, words in _TIMES.items()},
+    "solvers[].ratio": "median against the default solver's",
+    "solvers[].solved": "share of programs with an answer that passes the shield's check",
+    "solvers[].differs": "largest difference from the default's answers, scaled inputs",
+    "batch[].policy": "batch policy of both teams; its own time is left out",
+    "batch[].shielded": "whether the blue team is shielded",
+    "batch[].games": "games at once",
+    "batch[].median": "game-steps per second, one core, median of the repeats",
+    "batch[].low": "slowest repeat",
+    "batch[].high": "fastest repeat",
+    "memory.games": "games whose memory was measured",
+    "memory.games_mib": "held by the games, observations and rewards included, MiB",
+    "memory.shield_mib": "held by one team's shield for them, MiB",
+    "scaling[].boats": "boats in the scene",
+    "scaling[].ours": "of those, boats decided for",
+    "scaling[].scenes": "random scenes",
+    **{f"scaling[].{name}": words for name, words in _TIMES.items()},
+    "scaling[].us_per_own_boat": "median / ours, us",
+    **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
@@ -120,6 +155,7 @@ KEYS = {
     "evaluate": RESULTS,
     "play": PLAY,
     "parity": PARITY,
+    "bench": BENCH,
     "render": RENDER,
 }
 

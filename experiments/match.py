@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from .score import scores
 from .seat import Failures, Seat
 from .shielding import Shielding, shield_game
 from .spec import SIDES, MatchSpec
-from .tally import RADII_M, reason_counts, tally
+from .tally import reason_counts, tally
 
 Watcher = Callable[[MctfEnv], bool]
 """Called after every step with the env; False ends the game early (a closed window)."""
@@ -197,11 +197,6 @@ def play_match(spec: MatchSpec, watcher: Watcher | None = None, render_mode: str
 def play_row(spec: MatchSpec) -> dict[str, Any]:
     """Play one game and return its row alone, small enough to travel between processes by the thousand."""
     return play_match(spec).row
-
-
-def warm_up(spec: MatchSpec) -> None:
-    """Play two seconds of a game, so that everything compiled is on disk before several processes want it."""
-    play_match(replace(spec, rules={**spec.rules, "max_time_s": 2.0}, radii_m=RADII_M))
 
 
 def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:

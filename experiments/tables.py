@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich import box
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -16,7 +17,7 @@ _KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
 _VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}
 
 
-def pairing_table(summary: Mapping[str, Any]) -> Table:
+def pairing_table(summary: Mapping[str, Any]) -> Group:
     """Build the table of a pairing: each figure without and with the shield, and the paired difference.
 
     Args:
@@ -31,38 +32,39 @@ def pairing_table(summary: Mapping[str, Any]) -> Table:
         ("difference", "on - off, paired", both),
     ]
     shown = [(key, head) for key, head, present in columns if present]
-    table = new_table(title, ["", *(head for _, head in shown)])
-    for figures in summary["metrics"].values():
-        table.add_row(figures["label"], *(interval_text(figures.get(key), short_limit) for key, _ in shown))
-    return table
+    rows = [
+        [figures["label"], *(interval_text(figures.get(key), short_limit) for key, _ in shown)]
+        for figures in summary["metrics"].values()
+    ]
+    return titled(title, ["", *(head for _, head in shown)], rows)
 
 
-def new_table(title: str, heads: Sequence[str]) -> Table:
-    """Start a table whose first column is words and whose others are numbers."""
-    table = _bare_table(title)
-    table.add_column(heads[0], no_wrap=True)
-    for head in heads[1:]:
-        table.add_column(head, justify="right", no_wrap=True)
-    return table
+def titled(title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]], width: int | None = None) -> Group:
+    """Lay out a table under its title: the first column words, the others numbers.
 
-
-def _bare_table(title: str) -> Table:
+    Args:
+        title: in bold above.
+        heads: of the columns.
+        rows: cells.
+        width: of a column of numbers, at least, characters.
+    """
     # the dividers alone part the columns: four columns of intervals fit 80 characters
-    look = {"box": box.SIMPLE_HEAD, "show_edge": False, "padding": 0, "pad_edge": False}
-    return Table(title=title, title_justify="left", title_style="bold", **look)
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=0, pad_edge=False, show_header=any(heads))
+    table.add_column(heads[0], no_wrap=len(heads) > 1)
+    for head in heads[1:]:
+        table.add_column(head, justify="right", no_wrap=True, min_width=width)
+    for row in rows:
+        table.add_row(*row)
+    return Group(Text(title, style="bold"), table)
 
 
-def bars_table(bars: Sequence[Mapping[str, Any]]) -> Table:
+def bars_table(bars: Sequence[Mapping[str, Any]]) -> Group:
     """Build the table of bars: what is asked, what was measured, whether it is met."""
-    table = _bare_table("Bars")
-    table.add_column("")
-    table.add_column("measured", justify="right", no_wrap=True)
-    table.add_column("bar", justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    for bar in bars:
-        verdict = _VERDICTS[bar["met"]]
-        table.add_row(bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict)
-    return table
+    rows = [
+        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", _VERDICTS[bar["met"]]]
+        for bar in bars
+    ]
+    return titled("Bars", ["", "measured", "bar", ""], rows)
 
 
 def interval_text(figure: Figure | None, limit_text: Callable[[float], str] | None = None) -> str:
@@ -92,13 +94,11 @@ def number_text(value: float | None) -> str:
     """Write a number with about three digits."""
     if value is None or value != value:
         return "-"
-    if float(value).is_integer() and abs(value) >= 1000:
-        return f"{value:,.0f}"
     size = abs(round(value, 2))
-    return f"{value:.0f}" if size >= 100 else f"{value:.1f}" if size >= 10 else f"{value:.2f}"
+    return f"{value:,.0f}" if size >= 100 else f"{value:.1f}" if size >= 10 else f"{value:.2f}"
 
 
-def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Table:
+def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Group:
     """Build the table of a single game.
 
     Args:
@@ -106,15 +106,9 @@ def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Table:
         radii_m: radii at which breaches were counted.
     """
     state = "shielded" if row["shielded"] else "not shielded"
-    table = _bare_table(f"{row['pairing']}, {row['side']} {state}, {row['duration_s']:g} s")
-    table.add_column("", no_wrap=True)
-    table.add_column("", justify="right", no_wrap=True)
-    for name, words in _game_lines(radii_m):
-        if row.get(name) is not None:
-            table.add_row(words, number_text(row[name]))
-    if row["first_failure"]:
-        table.add_row("first policy failure", Text(str(row["first_failure"]), overflow="fold"))
-    return table
+    title = f"{row['pairing']}, {row['side']} {state}, {row['duration_s']:g} s"
+    lines = [(words, row.get(name)) for name, words in _game_lines(radii_m)]
+    return titled(title, ["", ""], [[words, number_text(value)] for words, value in lines if value is not None])
 
 
 def _game_lines(radii_m: Sequence[float]) -> list[tuple[str, str]]:

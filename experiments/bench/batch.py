@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from steerclear.env.actions import STOP, discrete_commands
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf, CommandFilter
-from steerclear.shield.jit import Array
+from steerclear.policies import make_batch
+from steerclear.shield import ShieldConfig, Surroundings
+from steerclear.shield.batch import BatchedShield
 
-from .timing import memory_mib, rate_per_s
+from .timing import memory_mib
 
-HOLD_STEPS = 20
-"""Steps between new actions: boats spread over the field instead of turning on the spot."""
+SPREAD_STEPS = 100
+"""Steps played before timing: boats leave their start places and get in each other's way."""
 
 
 @dataclass(frozen=True)
@@ -22,46 +24,64 @@ class BatchSize:
     """How much to run: games at once, steps per repeat, repeats."""
 
     games: int = 512
-    steps: int = 200
+    steps: int = 100
     repeats: int = 5
 
 
-def random_actions(core: BatchedMctf, count: int, seed: int) -> Array:
-    """Draw actions (count, B, n, 2), speed m/s and relative heading deg, from the discrete ones."""
-    indices = np.random.default_rng(seed).integers(0, STOP + 1, size=(count, core.n_games, core.n_boats))
-    return discrete_commands(indices, core.max_speed_mps)
+def batched_shield(core: BatchedMctf, config: ShieldConfig) -> BatchedShield:
+    """Build the shield for a batch of games: boats and field edge."""
+    width, height = core.field.size
+    around = Surroundings(field=(0.0, 0.0, float(width), float(height)))
+    return BatchedShield(config, core.n_games, core.config.platforms, tuple(core.team.tolist()), around)
 
 
 def steps_per_s(
-    preset: str, size: BatchSize, seed: int = 0, command_filter: CommandFilter | None = None
-) -> dict[str, float]:
-    """Game-steps per second with observations and rewards, every boat acting at random.
+    preset: str, size: BatchSize, policy: str, seed: int = 0, shield: ShieldConfig | None = None
+) -> dict[str, Any]:
+    """Game-steps per second with observations and rewards; the policies' own time is left out.
 
     Args:
         preset: rules of the game.
         size: how much to run.
-        seed: of starts and actions.
-        command_filter: a shield; None for none.
+        policy: batch policy of both teams.
+        seed: of starts and policies.
+        shield: shield of the blue team; None for none.
+
+    Returns:
+        `policy`, `shielded`, `games`, `median`, `low` and `high` over the repeats, per second.
     """
-    config = GameConfig.preset(preset, default_start=False, max_time_s=1e6)
-    core = BatchedMctf(config, size.games, seed)
-    actions = random_actions(core, 1 + size.steps // HOLD_STEPS, seed)
-
-    def run() -> None:
-        for step in range(size.steps):
-            core.step(actions[step // HOLD_STEPS], command_filter)
-
-    core.step(actions[0], command_filter)  # compiles
-    run()  # spreads the boats
-    return rate_per_s(run, size.games * size.steps, size.repeats)
-
-
-def games_memory_mib(preset: str, games: int = 4096) -> float:
-    """Memory that the arrays of that many games hold, MiB, observations and rewards included."""
-    BatchedMctf(preset, 1, 0)  # compiles
-    return memory_mib(lambda: BatchedMctf(preset, games, 0))
+    core = BatchedMctf(GameConfig.preset(preset, default_start=False, max_time_s=1e6), size.games, seed)
+    teams = [make_batch(policy), make_batch(policy)]
+    for number, team in enumerate(teams):
+        team.reset(core, number, seed + number)
+    command_filter = None if shield is None else batched_shield(core, shield).filter_for(0)
+    _time_steps(core, teams, SPREAD_STEPS, command_filter)  # compiles, too
+    rates = [
+        size.games * size.steps / _time_steps(core, teams, size.steps, command_filter) for _ in range(size.repeats)
+    ]
+    spread = {"median": float(np.median(rates)), "low": min(rates), "high": max(rates)}
+    return {"policy": policy, "shielded": shield is not None, "games": size.games, **spread}
 
 
-def core_summary(preset: str, size: BatchSize, seed: int = 0) -> dict[str, Any]:
-    """Figures without a shield."""
-    return {"preset": preset, "games": size.games, "steps_per_s": steps_per_s(preset, size, seed)}
+def _time_steps(core: BatchedMctf, teams: list[Any], steps: int, command_filter: CommandFilter | None) -> float:
+    actions = np.zeros((core.n_games, core.n_boats, 2))
+    spent_s = 0.0
+    for _ in range(steps):
+        for number, team in enumerate(teams):
+            actions[:, core.team == number] = team.act(core, number)
+        begin = time.perf_counter()
+        core.step(actions, command_filter)
+        spent_s += time.perf_counter() - begin
+    return spent_s
+
+
+def batch_memory(preset: str, games: int, shield: ShieldConfig) -> dict[str, Any]:
+    """Memory of that many games with observations and rewards, and of one team's shield for them, MiB."""
+    small = BatchedMctf(preset, 1, 0)  # compiles: that memory belongs to no game
+    batched_shield(small, shield)
+    core = BatchedMctf(preset, games, 0)
+    return {
+        "games": games,
+        "games_mib": memory_mib(lambda: BatchedMctf(preset, games, 0)),
+        "shield_mib": memory_mib(lambda: batched_shield(core, shield)),
+    }

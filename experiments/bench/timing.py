@@ -32,16 +32,6 @@ def quantiles_us(repeats: Sequence[NDArray[np.float64]]) -> dict[str, float | No
     }
 
 
-def rate_per_s(run: Callable[[], Any], amount: int, repeats: int) -> dict[str, float]:
-    """Rate of a run that does ``amount`` of something: median, lowest and highest over the repeats, per second."""
-    rates = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        run()
-        rates.append(amount / (time.perf_counter() - begin))
-    return {"median": float(np.median(rates)), "low": min(rates), "high": max(rates)}
-
-
 def memory_mib(make: Callable[[], Any]) -> float:
     """Memory that the object ``make()`` builds holds, MiB; numpy reports its arrays to tracemalloc."""
     tracemalloc.start()

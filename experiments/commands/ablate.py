@@ -13,8 +13,8 @@ from . import options as o
 from .console import command, finish
 from .games import check_complete, run_games
 
-QUICK_GAMES = 4
-QUICK_TIME_S = 240.0
+QUICK_GAMES = 6
+QUICK_TIME_S = 300.0
 
 
 @command

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,13 +13,13 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
-from ..match import warm_up
 from ..pool import check_jobs
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table
+from ..warming import warm_up
 from .console import Interrupted, err, out, progress
 
 
@@ -110,19 +109,11 @@ def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
 
 
 def _play(campaign: Campaign, processes: int) -> Played:
-    total = len(campaign.specs)
-    with progress("compiling (first run only)", total) as notice:
-        notice(0)
-        if processes > 1:
-            _warm(campaign.specs)
-    with progress("games", total) as notice:
+    if processes > 1 and len(campaign.specs) > 1:
+        with err().status("compiling, about half a minute the first time"):
+            warm_up(campaign.specs, processes)
+    with progress("games", len(campaign.specs)) as notice:
         return campaign.run(notice)
-
-
-def _warm(specs: Sequence[Any]) -> None:
-    states = {spec.shield is not None: spec for spec in specs}
-    for spec in states.values():
-        warm_up(spec)
 
 
 def _write(

@@ -76,6 +76,8 @@ def play(
     started = time.perf_counter()
     result = _play(spec, save or [], window or keyboard, speed)
     out().print(game_table(result.row, result.spec.radii_m))
+    if result.row["first_failure"]:
+        out().print(f"first policy failure: {result.row['first_failure']}", markup=False, soft_wrap=True)
     files = [save_record(result.record, path) for path in save or []]
     for path in files:
         out().print(f"{path}", soft_wrap=True)

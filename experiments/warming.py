@@ -1,0 +1,63 @@
+"""Compiling before many processes start: each part once, at the same time, into the cache on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
+
+from .match import play_match
+from .pool import run_all
+from .spec import MatchSpec
+
+SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """One part to compile: a shield with these settings, or what a short game needs."""
+
+    shield: dict[str, Any] | None
+    game: MatchSpec | None
+
+
+def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
+    """Compile what the games need: the game and its policies in one process, the shield in another.
+
+    What goes wrong here is left to the games themselves to report.
+    """
+    unshielded = {spec.opponent: replace(spec, shield=None, opponent_shield=None) for spec in specs}
+    parts = [WarmUp(None, _short(spec)) for spec in list(unshielded.values())[:1]]
+    shields = [spec.shield for spec in specs if spec.shield is not None]
+    parts += [WarmUp(dict(settings), None) for settings in shields[:1]]
+    for _ in run_all(compile_part, parts, processes):
+        pass
+
+
+def compile_part(part: WarmUp) -> None:
+    """Compile one part."""
+    if part.shield is not None:
+        compile_shield(part.shield)
+    if part.game is not None:
+        play_match(part.game)
+
+
+def compile_shield(settings: dict[str, Any]) -> None:
+    """Let a shield decide in a tight spot, so that every stage runs once."""
+    shield = Shield(ShieldConfig.of(**settings))
+    fleet = Fleet.of(
+        position_m=[[0.0, 0.0], [0.0, 6.0], [3.0, 3.0]],
+        heading_rad=[0.0, np.pi, -np.pi / 2],
+        speed_mps=[1.5, 1.5, 1.5],
+        team=[0, 0, 1],
+        platforms="heron",
+    )
+    around = Surroundings(field=(-5.0, -5.0, 5.0, 8.0), keep_out=((0.0, -4.0, 1.0),))
+    shield.decide(fleet, Commands.relative_deg(np.array([[2.0, 0.0]] * 3)), around)
+
+
+def _short(spec: MatchSpec) -> MatchSpec:
+    return replace(spec, rules={**spec.rules, "max_time_s": SECONDS})
