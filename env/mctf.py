@@ -87,7 +87,8 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             a: action_space(kinds[a], self.max_speeds[i], len(points)) for i, a in enumerate(self.possible_agents)
         }
         self.state_space = self.global_state_normalizer.unnormalized_space
-        self._renderer: Any = None
+        self.renderer: Any = None
+        """The `Renderer` behind `render`, made at the first picture."""
 
     def observation_space(self, agent: str) -> Space[Any]:
         """Space of an agent's observations: the same object at every call."""
@@ -182,18 +183,18 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         if self.render_mode is None:
             logger.warning("render() does nothing without a render_mode; build the env with one of %s", RENDER_MODES)
             return None
-        if self._renderer is None:
+        if self.renderer is None:
             from .render import Renderer
 
-            self._renderer = Renderer(self.config, self.render_mode)
-        picture = self._renderer.draw(self.view(), overlay)
+            self.renderer = Renderer(self.config, self.render_mode)
+        picture = self.renderer.draw(self.view(), overlay)
         return picture if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Close the window, if any."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self.renderer is not None:
+            self.renderer.close()
+            self.renderer = None
 
     def _observations(self) -> dict[str, np.ndarray]:
         rows = self.core.observations[0].copy()

@@ -14,11 +14,12 @@ from steerclear.env.record import GameRecorder, Record, absolute_commands, find_
 from steerclear.env.record_meta import meta_of
 from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
 
 from .openings import opening
 from .score import scores
 from .seat import Failures, Seat
-from .shielding import Shielding, shield_game
+from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
 from .tally import reason_counts, tally
 
@@ -47,13 +48,15 @@ class Match:
     Args:
         spec: what to play.
         render_mode: of the env; None draws nothing.
+        speedup: times faster than the game that a window goes at most.
 
     Raises:
         SteerclearError: a setting or policy of the spec is unusable.
     """
 
-    def __init__(self, spec: MatchSpec, render_mode: str | None = None) -> None:
+    def __init__(self, spec: MatchSpec, render_mode: str | None = None, speedup: float = 1.0) -> None:
         self.spec = spec
+        self.speedup = speedup
         self.env = MctfEnv(spec.config(), render_mode=render_mode)
         self.shielding: Shielding = shield_game(self.env, spec)
         ids = self.env.possible_agents
@@ -66,7 +69,7 @@ class Match:
         ]
         self._recorder = GameRecorder()
         self._decision_us: list[float] = []
-        self._moment: tuple[Array, Array] | None = None
+        self._moment: tuple[Array, Array, Seen] | None = None
 
     def play(self, watcher: Watcher | None = None) -> MatchResult:
         """Play to the end.
@@ -79,7 +82,7 @@ class Match:
         while self.env.agents:
             actions = self.teams[0].act(observations, infos) | self.teams[1].act(observations, infos)
             observations, _, _, _, infos = self._step(actions)
-            self._record_step(infos)
+            self._record_step()
             if watcher is not None and not watcher(self.env):
                 break
         return self._result(time.perf_counter() - started)
@@ -97,7 +100,11 @@ class Match:
         self.shielding.listen(self._note_commands)
         for number, team in enumerate(self.teams):
             team.reset(self.shielding.env, 2 * spec.seed + number)
-        self._recorder.start(self.env.view(), self._meta())
+        meta = self._meta()
+        self._recorder.start(self.env.view(), meta)
+        if self.env.renderer is not None:
+            self.env.renderer.describe(meta)
+            self.env.renderer.speedup = self.speedup
         return answer
 
     def _step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
@@ -118,14 +125,19 @@ class Match:
         )
 
     def _note_commands(self, wanted: Array, sent: Array) -> None:
-        heading_deg = self.env.core.state[0, :, 2]
-        self._moment = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
+        heading_deg = self.env.core.state[0, :, L.HEADING]
+        commands = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
+        seen = self.shielding.read()
+        self._moment = (*commands, seen)
+        if self.env.renderer is not None:
+            from steerclear.env.render import Overlay  # draws with pygame: only where there is a window
 
-    def _record_step(self, infos: Mapping[str, Any]) -> None:
+            self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.certificate_m)
+
+    def _record_step(self) -> None:
         if self._moment is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
-        wanted, sent = self._moment
-        seen = self.shielding.read(infos)
+        wanted, sent, seen = self._moment
         self._recorder.step(self.env.view(), wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
         if seen.solve_time_s is not None:
             self._decision_us.append(1e6 * seen.solve_time_s)
@@ -176,18 +188,21 @@ class Match:
         return {"decision_p50_us": float(p50), "decision_p99_us": float(p99), "decision_max_us": float(most)}
 
 
-def play_match(spec: MatchSpec, watcher: Watcher | None = None, render_mode: str | None = None) -> MatchResult:
+def play_match(
+    spec: MatchSpec, watcher: Watcher | None = None, render_mode: str | None = None, speedup: float = 1.0
+) -> MatchResult:
     """Play one game.
 
     Args:
         spec: what to play.
         watcher: called after every step with the env; False ends the game.
         render_mode: "human" shows a window.
+        speedup: times faster than the game that a window goes at most.
 
     Raises:
         SteerclearError: a setting or policy of the spec is unusable. A policy that fails later does not end the game.
     """
-    match = Match(spec, render_mode)
+    match = Match(spec, render_mode, speedup)
     try:
         return match.play(watcher)
     finally:

@@ -18,6 +18,8 @@ from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 from .spec import SIDES, MatchSpec
 from .tally import RADII_M
 
+NOBODY_NEAR_M = 1e5
+"""Margins beyond this say that nobody is near; there is no certificate to show."""
 Listener = Callable[[Array, Array], None]
 """Called before the boats move with the commands (1, n, 2) wanted and those sent."""
 
@@ -39,6 +41,7 @@ class Shielding:
     Attributes:
         inner: the game itself.
         env: what to step: the game or the outermost wrapper.
+        wrappers: one per shielded team.
         agent_ids: boats that a shield decides for.
         separation_m: radius the own shield keeps (the default's without one), m.
         reason_names: names of the reason codes, by code.
@@ -46,6 +49,7 @@ class Shielding:
 
     inner: MctfEnv
     env: Any
+    wrappers: list[ShieldedParallelEnv] = field(default_factory=list)
     agent_ids: list[str] = field(default_factory=list)
     separation_m: float = RADII_M[0]
     reason_names: list[str] = field(default_factory=list)
@@ -62,20 +66,22 @@ class Shielding:
 
         self.inner.command_filter = through
 
-    def read(self, infos: Mapping[str, Any]) -> Seen:
-        """Collect the decisions that the shields left in the infos of a step."""
+    def read(self) -> Seen:
+        """Collect what the shields decided last."""
         n = len(self.inner.possible_agents)
         seen = Seen(np.full(n, NOT_COVERED, np.uint8), np.zeros(n, bool), np.full(n, np.nan, np.float32), None)
-        times = []
-        for boat, agent_id in enumerate(self.inner.possible_agents):
-            decision = infos[agent_id].get("shield")
-            if decision is not None:
-                seen.reason[boat] = decision.reason
-                seen.intervened[boat] = decision.intervened
-                margin_m = decision.certificate_m
-                seen.certificate_m[boat] = margin_m if np.isfinite(margin_m) else np.nan  # nobody near: no margin
-                times.append(decision.solve_time_s)
-        return Seen(seen.reason, seen.intervened, seen.certificate_m, max(times, default=None))
+        times_s = []
+        for wrapper in self.wrappers:
+            decisions = wrapper.decisions
+            if decisions is None:
+                continue
+            own = decisions.reason != NOT_COVERED
+            seen.reason[own] = decisions.reason[own]
+            seen.intervened[own] = decisions.intervened[own]
+            margin_m = decisions.certificate_m[own]
+            seen.certificate_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
+            times_s.append(decisions.solve_time_s)
+        return Seen(seen.reason, seen.intervened, seen.certificate_m, max(times_s, default=None))
 
 
 def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
@@ -111,6 +117,7 @@ def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_au
     config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, **settings})
     wrapped = ShieldedParallelEnv(shielding.env, Shield(config), team=side, shield_autopilot=shield_autopilot)
     shielding.env = wrapped
+    shielding.wrappers.append(wrapped)
     shielding.reason_names = [reason.name for reason in Reason]
     shielding.agent_ids += _boats_of(shielding.inner, side)
 

@@ -92,24 +92,14 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
     for name in (spec.own, spec.opponent):
         policies.make(name)
     if window:
-        return play_match(spec, Pace(speed), "human")
+        return play_match(spec, _until_closed, "human", speed)
     total = round(spec.config().max_time_s / spec.config().dt_s)
     with progress("playing", total) as notice:
         return play_match(spec, _reporter(notice))
 
 
-class Pace:
-    """Keeps a shown game at a multiple of real time, and ends it when the window is closed."""
-
-    def __init__(self, speed: float) -> None:
-        self.speed = speed
-        self._due_s = time.perf_counter()
-
-    def __call__(self, env: MctfEnv) -> bool:
-        """Wait for the step's time."""
-        self._due_s += env.config.dt_s / self.speed
-        time.sleep(max(0.0, self._due_s - time.perf_counter()))
-        return not env.window_closed
+def _until_closed(env: MctfEnv) -> bool:
+    return env.renderer is None or not env.renderer.window_closed
 
 
 def _reporter(notice: Any) -> Watcher:
