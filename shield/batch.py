@@ -50,7 +50,7 @@ def decide_games(
         for i in range(n):
             sent[b, i, 0], sent[b, i, 1] = plan.commands[i, 0], plan.commands[i, 1]
             reason[b, i] = plan.reason[i]
-            clearance_m[b, i] = work.clear[i, 0]
+            clearance_m[b, i] = work.clear[i, 0] if ours[b, i] else np.inf
 
 
 class BatchedShield:

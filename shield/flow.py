@@ -37,6 +37,9 @@ SAME = 1e-6
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
 
+LEAST_TURN_DEG = 1e-3
+"""Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
+
 SLACK_COST = np.array([1e4, 1e2])
 """Weight of the squared slack of boat rows and of fixed-thing rows when they cannot all hold."""
 
@@ -364,7 +367,7 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
         memory.kept[i] = True
         memory.side[i] = work.plan[i, 0]
         memory.target_deg[i] = np.nan
-        if work.plan[i, 1] > 0.0:
+        if work.plan[i, 1] > LEAST_TURN_DEG:
             memory.target_deg[i] = wrap_degrees(start + work.plan[i, 0] * work.plan[i, 1])
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]

@@ -264,9 +264,8 @@ def worst_hunter(
             continue
         if work.breach[i, j]:
             continue
-        clear_of_hunter(
-            i, j, work.path[slot], state, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
-        )
+        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j

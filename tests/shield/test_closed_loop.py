@@ -1,0 +1,142 @@
+"""Boats under the shield, sailed on: the distance is kept wherever the certificate says it can be."""
+
+import numpy as np
+import pytest
+import qpsolvers
+from shield_loops import sail, sail_games
+from shield_scenes import distances, fleet_of, head_on
+from steerclear.shield import Shield, ShieldConfig, Surroundings
+from steerclear.shield.platforms import fresh_state, get_platform
+from steerclear.shield.platforms import layout as L
+
+GAMES = 24
+STEPS_S = 20.0
+
+
+def starts(platform, n, spread_m, seed):
+    """Random states, (GAMES, n, N_STATE), no two boats nearer than 8 m."""
+    rng = np.random.default_rng(seed)
+    top = get_platform(platform).max_speed_mps
+    games = []
+    while len(games) < GAMES:
+        place = rng.uniform(-spread_m, spread_m, (n, 2))
+        gap = np.linalg.norm(place[:, None] - place[None], axis=2) + 99 * np.eye(n)
+        if gap.min() > 8:
+            games.append([fresh_state(x, y, rng.uniform(-180, 180), rng.uniform(0, top)) for x, y in place])
+    return np.array(games)
+
+
+def wander(platform, n, seed):
+    """Random commands, new every second or so."""
+    rng = np.random.default_rng(seed)
+    top = get_platform(platform).max_speed_mps
+    held = np.zeros((GAMES, n, 2))
+
+    def wanted(step, state):
+        if step % 10 == 0:
+            held[..., 0] = rng.uniform(0.3 * top, top, (GAMES, n))
+            held[..., 1] = rng.uniform(-120, 120, (GAMES, n))
+        return held.copy()
+
+    return wanted
+
+
+@pytest.mark.parametrize("dt_s", [0.1, 0.05])
+@pytest.mark.parametrize(("platform", "spread_m"), [("heron", 15), ("surveyor", 30)])
+@pytest.mark.parametrize("certificate", ["turning_circle", "braking"])
+def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
+    config = ShieldConfig(dt_s=dt_s, certificate=certificate)
+    state = starts(platform, 3, spread_m, 3)
+    run = sail_games(config, state, [platform] * 3, [0, 0, 0], wander(platform, 3, 4), int(STEPS_S / dt_s))
+    certified = (run.certificate_m[0] >= 0).all(axis=-1)
+    assert certified.sum() >= GAMES // 3
+    assert run.closest(np.ones(3, bool))[certified].min() >= config.separation_m
+
+
+@pytest.mark.parametrize("dt_s", [0.1, 0.05])
+@pytest.mark.parametrize(("platform", "spread_m"), [("heron", 12), ("surveyor", 30), ("si", 60)])
+def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
+    config = ShieldConfig(dt_s=dt_s, opponent_share=0.0)
+    state = starts(platform, 3, spread_m, 5)
+    top = get_platform(platform).max_speed_mps
+    state[:, :, L.SPEED] = top
+    thrust = np.interp(top, *np.array(get_platform(platform).thrust_map).T[::-1])
+    state[:, :, L.THRUST] = thrust
+    random = wander(platform, 3, 6)
+
+    def wanted(step, now):
+        commands = random(step, now)
+        commands[:, 1:] = top, 0.0
+        return commands
+
+    run = sail_games(config, state, [platform] * 3, [0, 1, 1], wanted, int(STEPS_S / dt_s))
+    certified = run.certificate_m[0][:, 0] >= 0
+    assert certified.sum() >= GAMES // 3
+    assert run.closest(np.array([True, False, False]))[certified].min() >= config.separation_m
+
+
+def test_standing_boats_are_avoided_by_braking():
+    config = ShieldConfig(certificate="braking")
+    state = starts("heron", 3, 15, 7)
+    state[:, 1:, L.SPEED] = 0.0
+    random = wander("heron", 3, 8)
+
+    def wanted(step, now):
+        commands = random(step, now)
+        commands[:, 1:] = 0.0
+        return commands
+
+    run = sail_games(config, state, ["heron"] * 3, [0, 1, 1], wanted, 200)
+    certified = run.certificate_m[0][:, 0] >= 0
+    assert run.closest(np.array([True, False, False]))[certified].min() >= config.separation_m
+
+
+def test_a_side_once_taken_is_kept():
+    run = sail(Shield(), head_on(12.0, aside_m=0.05), lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 60)
+    east = run.position[:, 0, 0]
+    assert distances(run.position)[:, 0, 1].min() >= 2.5
+    assert (np.diff(east) >= -1e-6).all() or (np.diff(east) <= 1e-6).all() or np.ptp(np.sign(np.round(east, 2))) <= 1
+
+
+def test_one_boat_alone_stays_in_the_field_and_off_the_obstacle():
+    around = Surroundings(field=(0, 0, 40, 40), circles=[(20, 30, 2)])
+    fleet = fleet_of([(20, 10, 0, 2)], [0])
+    run = sail(Shield(surroundings=around), fleet, lambda step, state: np.array([[2.0, 0.0]]), 400)
+    place = run.position[:, 0]
+    assert place.min() > 0
+    assert place.max() < 40
+    assert np.linalg.norm(place - [20, 30], axis=1).min() >= 2.0
+
+
+def answers_nonsense(*arguments, **settings):
+    return np.full(4, np.nan)
+
+
+def gives_up(*arguments, **settings):
+    return None
+
+
+def breaks(*arguments, **settings):
+    raise RuntimeError("solver broke")
+
+
+@pytest.mark.parametrize("solver", [answers_nonsense, gives_up, breaks])
+def test_boats_keep_apart_when_the_solver_fails(solver, monkeypatch):
+    monkeypatch.setattr(qpsolvers, "solve_qp", solver)
+    fleet = fleet_of([(0, 0, 0, 2), (0, 14, 180, 2)], [0, 0])
+    run = sail(Shield(), fleet, lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 100)
+    assert distances(run.position)[:, 0, 1].min() >= 2.5
+    assert np.isfinite(run.sent).all()
+
+
+def test_the_batch_decides_as_the_single_shield():
+    state = starts("heron", 4, 12, 9)
+    random = wander("heron", 4, 10)
+    commands = [random(step, state) for step in range(80)]
+    team = [0, 0, 1, 1]
+    batch = sail_games(ShieldConfig(), state.copy(), ["heron"] * 4, team, lambda step, now: commands[step], 80)
+    for game in range(4):
+        fleet = fleet_of(state[game][:, [L.X, L.Y, L.HEADING, L.SPEED]], team, thrust=state[game][:, L.THRUST])
+        one = sail(Shield(), fleet, lambda step, now, game=game: commands[step][game], 80)
+        np.testing.assert_allclose(one.position, batch.position[:, game], atol=1e-6)
+        assert (one.reason == batch.reason[:, game]).mean() > 0.99
