@@ -48,3 +48,7 @@ def options(
 def main() -> None:
     """Run the command line."""
     app(prog_name="steerclear")
+
+
+if __name__ == "__main__":
+    main()

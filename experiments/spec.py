@@ -92,5 +92,5 @@ def check_side(side: str) -> str:
 def near(name: str, known: Iterable[str]) -> str:
     """Say which known names are like ``name``, or all of them when none is."""
     names = list(known)
-    matches = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    matches = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
     return f"did you mean {', '.join(matches)}?" if matches else f"choose one of {', '.join(names)}"

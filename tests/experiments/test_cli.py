@@ -1,0 +1,214 @@
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.env.record import load
+from steerclear.experiments import campaign, cli, keys
+from steerclear.experiments.commands import games as games_command
+from steerclear.experiments.commands.console import ExitCode
+from typer.testing import CliRunner
+
+TRACES = sorted((Path(__file__).parents[1] / "data" / "traces").glob("*.npz"))
+TINY = ["--games", "2", "--max-time", "2", "--jobs", "1"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Commands run in an empty folder, on a terminal of 80 columns."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def test_a_tiny_ablation_from_end_to_end(tmp_path):
+    done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out", "--json", "copy.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("copy.json").read_text())
+    assert keys.undocumented(content, keys.RESULTS) == []
+    assert (content["games_played"], content["complete"], len(content["pairings"])) == (8, True, 2)
+    assert json.loads(Path("out/results.json").read_text()) == content
+    for name in ("games.jsonl", "report.html", "replay.html", content["files"]["games"]):
+        assert (tmp_path / "out" / name).stat().st_size > 0
+    assert "medium vs easy: 2 games" in done.stdout
+    assert "hits with opponents at 2.5 m, on / off" in done.stdout
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    assert "…" not in done.stdout
+
+
+def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
+    arguments = ["ablate", "--opponents", "hold", *TINY, "--out", "out"]
+    whole = campaign.play_row
+    played = []
+
+    def stop_at_the_third(spec):
+        if len(played) == 2:
+            raise KeyboardInterrupt
+        played.append(spec.key)
+        return whole(spec)
+
+    make = games_command.Campaign
+    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=stop_at_the_third))
+    stopped = run(*arguments)
+    assert stopped.exit_code == ExitCode.INTERRUPTED
+    assert "2 of 4 games kept" in stopped.stderr
+    assert "--out out --resume" in stopped.stderr
+    assert json.loads(Path("out/results.json").read_text())["complete"] is False
+    monkeypatch.setattr(games_command, "Campaign", make)
+    refused = run(*arguments)
+    assert refused.exit_code == ExitCode.BAD_INPUT
+    assert "add --resume" in refused.stderr
+    resumed = run(*arguments, "--resume")
+    assert resumed.exit_code == ExitCode.OK, resumed.output
+    content = json.loads(Path("out/results.json").read_text())
+    assert (content["games_resumed"], content["games_played"], content["complete"]) == (2, 4, True)
+    assert len(Path("out/games.jsonl").read_text().splitlines()) == 4
+
+
+def test_a_game_that_cannot_be_played_is_bad_input_and_the_rest_is_kept(monkeypatch):
+    whole = campaign.play_row
+
+    def broken(spec):
+        if spec.opponent == "hold":
+            raise RuntimeError("sunk")
+        return whole(spec)
+
+    make = games_command.Campaign
+    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
+    done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "not played: medium vs hold, game 0, shield off: RuntimeError: sunk" in done.stdout.replace("\n", " ")
+    assert "4 games could not be played" in done.stderr
+    assert json.loads(Path("out/results.json").read_text())["games_played"] == 4
+
+
+def test_bars_decide_the_exit_status_only_when_asked(monkeypatch):
+    bar = {"name": "hits", "value": 1.0, "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": False}
+    monkeypatch.setattr("steerclear.experiments.results.ablation_bars", lambda rows, separation_m: [bar])
+    arguments = ["ablate", "--opponents", "hold", "--games", "1", "--max-time", "1", "--jobs", "1"]
+    assert run(*arguments, "--out", "a").exit_code == ExitCode.OK
+    assert run(*arguments, "--out", "b", "--check").exit_code == ExitCode.BAR_FAILED
+
+
+def test_evaluate_plays_with_or_without_the_shield():
+    off = run("evaluate", "medium", "--opponents", "hold", *TINY, "--out", "off", "--json", "off.json")
+    on = run("evaluate", "medium", "--opponents", "hold", *TINY, "--out", "on", "--json", "on.json", "--shield")
+    assert (off.exit_code, on.exit_code) == (ExitCode.OK, ExitCode.OK), off.output + on.output
+    contents = [json.loads(Path(name).read_text()) for name in ("off.json", "on.json")]
+    assert [(c["pairings"][0]["games_off"], c["pairings"][0]["games_on"]) for c in contents] == [(2, 0), (0, 2)]
+    assert all(keys.undocumented(content, keys.RESULTS) == [] for content in contents)
+    assert "shield on" not in off.stdout
+    assert "shield off" not in on.stdout
+
+
+def test_play_saves_what_it_is_asked_to_and_render_goes_on_from_there():
+    saves = [part for name in ("a.npz", "a.html", "a.png") for part in ("--save", name)]
+    done = run("play", "--max-time", "2", "--opponent", "hold", *saves, "--json", "a.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("a.json").read_text())
+    assert keys.undocumented(content, keys.PLAY) == []
+    assert content["game"]["steps"] == 20
+    assert len(load("a.npz")["wanted"]) == 20
+    films = run("render", "a.npz", "--to", "b.gif", "--json", "b.json")
+    assert films.exit_code == ExitCode.OK, films.output
+    assert keys.undocumented(json.loads(Path("b.json").read_text()), keys.RENDER) == []
+    assert Path("b.gif").read_bytes()[:3] == b"GIF"
+    assert run("render", "a.npz", "a.npz", "--to", "two.html").exit_code == ExitCode.OK
+    assert "only a replay" in run("render", "a.npz", "a.npz", "--to", "two.gif").stderr
+
+
+def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
+    trace = min(TRACES, key=lambda path: path.stat().st_size)
+    done = run("parity", trace, "--json", "p.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("p.json").read_text())
+    assert keys.undocumented(content, keys.PARITY) == []
+    assert content["passed"] is True
+    with np.load(trace) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    arrays["position"][-1, 0, 0] += 1e-3
+    arrays["captures"][-1, 0] += 1
+    np.savez(tmp_path / "moved.npz", **arrays)
+    failed = run("parity", trace, "moved.npz", "--json", "p.json")
+    assert failed.exit_code == ExitCode.BAR_FAILED
+    assert "position_m 0.001 is over 1e-06" in failed.stdout
+    assert "captures of blue" in failed.stdout
+    content = json.loads(Path("p.json").read_text())
+    assert keys.undocumented(content, keys.PARITY) == []
+    assert [row["passed"] for row in content["traces"]] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("ablat", "Did you mean 'ablate'"),
+        ("ablate --gams 3", "--games"),
+        ("ablate --preset aamas", "aamas2024"),
+        ("ablate --own medum", "did you mean medium"),
+        ("ablate --opponents easy,hiden", "did you mean hidden"),
+        ("ablate --opponents ,", "separated by commas"),
+        ("ablate --own some/folder", "no submission at"),
+        ("ablate --platform hern", "heron"),
+        ("ablate --certificate turn", "turning_circle"),
+        ("ablate --solver nosuch", "installed: "),
+        ("ablate --separation -1", "separation_m is -1.0"),
+        ("ablate --separation nan", "give a number"),
+        ("ablate --max-time 0", "max_time_s is 0.0"),
+        ("ablate --penalty -1", "--penalty must be"),
+        ("ablate --games 0", "--games must be at least 1"),
+        ("ablate --jobs 0", "--jobs must be at least 1"),
+        ("ablate --set max_tme_s=3", "did you mean max_time_s"),
+        ("ablate --set nothing", "KEY=VALUE"),
+        ("ablate --shield-set seperation_m=3", "did you mean 'separation_m'"),
+        ("ablate --resume", "--out"),
+        ("evaluate", "policy"),
+        ("evaluate medium --opponents esy", "did you mean easy"),
+        ("play --side bleu", "did you mean blue"),
+        ("play --save game.avi", ".mp4"),
+        ("parity missing.npz", "missing.npz"),
+        ("render missing.npz --to a.html", "missing.npz"),
+        ("render missing.npz --to a.avi", ".html"),
+        ("bench --preset nosuch", "known presets"),
+        ("docs missing", "results folder"),
+    ],
+)
+def test_bad_input_is_refused_in_one_clear_line(arguments, words):
+    done = run(*arguments.split())
+    assert done.exit_code == ExitCode.BAD_INPUT
+    plain = " ".join(re.sub(r"[│╭╮╰╯─\n]+", " ", done.stderr).split())
+    assert words in plain
+    assert "Traceback" not in done.output
+    assert os.listdir() in ([], ["results"])  # nothing was played
+
+
+def test_version_and_help():
+    assert re.fullmatch(r"steerclear \d+\.\d+\.\d+\n", run("--version").stdout)
+    for name in ("ablate", "evaluate", "play", "parity", "bench", "render", "docs"):
+        assert "Exit status" in run(name, "--help").stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a POSIX signal")
+def test_ctrl_c_ends_a_real_run_with_status_130_and_keeps_its_games(tmp_path):
+    command = [sys.executable, "-m", "steerclear.experiments.cli", "ablate", "--opponents", "hold", "--games", "400"]
+    with subprocess.Popen(
+        [*command, "--max-time", "20", "--jobs", "2", "--out", "out"], stderr=subprocess.PIPE, text=True
+    ) as process:
+        deadline = time.monotonic() + 240.0
+        lines = tmp_path / "out" / "games.jsonl"
+        while time.monotonic() < deadline and not (lines.exists() and lines.read_text().count("\n") >= 2):
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60.0)
+    assert process.returncode == ExitCode.INTERRUPTED, errors
+    assert "--resume" in errors
+    assert len(lines.read_text().splitlines()) >= 2
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["complete"] is False
