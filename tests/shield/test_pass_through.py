@@ -1,0 +1,95 @@
+"""A command that is safe is sent bit for bit, in the frame it was given in."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from shield_scenes import bits, finite_commands, fleet_of, fleets, head_on, quick, relative
+from steerclear.shield import Commands, Reason, Shield
+
+ODD = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1.0 + 2**-52, 179.99999999999997, -180.0, 180.0, 359.0]
+
+
+def far_apart():
+    return fleet_of([(0, 0, 10.0, 1.0), (500, 0, -170.0, 2.0), (0, 500, 90.0, 0.0)], [0, 0, 1])
+
+
+@pytest.mark.parametrize("speed", [*ODD[:6], 2.0, 1e3])
+@pytest.mark.parametrize("heading", ODD)
+def test_odd_numbers_pass_bit_for_bit(speed, heading):
+    for make in (Commands.relative_deg, Commands.absolute_rad):
+        wanted = make([[speed, heading], [1.0, 0.3], [speed, heading]])
+        decisions = Shield().decide(far_apart(), wanted)
+        assert bits(decisions.sent.values) == bits(wanted.values)
+        assert decisions.sent.relative == wanted.relative
+        assert not decisions.intervened.any()
+        assert decisions.reason.tolist() == [Reason.PASSED, Reason.PASSED, Reason.NOT_COVERED]
+
+
+@quick
+@given(st.data())
+def test_what_is_marked_passed_is_what_was_wanted_bit_for_bit(data):
+    fleet = data.draw(fleets())
+    values = data.draw(finite_commands(len(fleet)))
+    wanted = data.draw(st.sampled_from([Commands.relative_deg, Commands.absolute_rad]))(values)
+    before = bits(wanted.values)
+    decisions = Shield().decide(fleet, wanted)
+    same = np.isin(decisions.reason, [Reason.PASSED, Reason.NOT_COVERED])
+    assert bits(wanted.values) == before, "the wanted commands were written to"
+    assert bits(decisions.sent.values[same]) == bits(wanted.values[same])
+    assert not decisions.intervened[same].any()
+    unchanged = ~decisions.intervened
+    assert bits(decisions.sent.values[unchanged]) == bits(wanted.values[unchanged])
+
+
+@quick
+@given(st.data())
+def test_a_boat_that_passes_is_certified(data):
+    """PASSED says that an escape is left: with nothing but boats around, its margin is not negative."""
+    fleet = data.draw(fleets(most=4))
+    decisions = Shield().decide(fleet, Commands.relative_deg(data.draw(finite_commands(len(fleet)))))
+    passed = decisions.reason == Reason.PASSED
+    assume(passed.any())
+    assert (decisions.certificate_m[passed] >= 0.0).all()
+
+
+@quick
+@given(st.data())
+def test_boats_not_controlled_get_what_they_were_given(data):
+    fleet = data.draw(fleets())
+    values = np.array(data.draw(finite_commands(len(fleet))), dtype=float).reshape(-1, 2)
+    values[~fleet.controlled] = [np.nan, np.inf]
+    decisions = Shield().decide(fleet, Commands.relative_deg(values))
+    others = ~fleet.controlled
+    assert bits(decisions.sent.values[others]) == bits(values[others])
+    assert (decisions.reason[others] == Reason.NOT_COVERED).all()
+    assert np.isinf(decisions.certificate_m[others]).all()
+
+
+def test_only_the_boat_in_danger_is_changed():
+    """A head-on far from a third boat of ours, whose odd command must pass while the first one's is changed."""
+    fleet = fleet_of([(0, 0, 0, 2.0), (0, 5.2, 180, 2.0), (300, 0, 0, 1.0)], [0, 1, 0])
+    wanted = relative((2.0, 0.0), (2.0, 0.0), (-0.0, 5e-324))
+    decisions = Shield(opponent_share=0.0).decide(fleet, wanted)
+    assert decisions.intervened.tolist() == [True, False, False]
+    assert bits(decisions.sent.values[1:]) == bits(wanted.values[1:])
+    assert np.isfinite(decisions.sent.values).all()
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_a_change_is_made_in_the_frame_of_the_wanted_command(coordination):
+    fleet = head_on(5.2)
+    shield = Shield(opponent_share=0.0, coordination=coordination)
+    turned = shield.decide(fleet, relative((2.0, 0.0), (2.0, 0.0)))
+    shield.reset()
+    absolute = shield.decide(fleet, Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]]))
+    assert turned.intervened[0]
+    assert absolute.intervened[0]
+    for field in ("sent_speed_mps", "sent_heading_rad", "certificate_m"):
+        assert getattr(turned[0], field) == pytest.approx(getattr(absolute[0], field), abs=1e-9)
+
+
+def test_a_step_of_the_class_k_rate_is_no_excuse_to_touch_a_far_boat():
+    """A finite response rate asks margins to shrink slowly; margins above the cap are left alone."""
+    decisions = Shield(response_per_s=0.5).decide(far_apart(), relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0)))
+    assert not decisions.intervened.any()
