@@ -100,7 +100,8 @@ class Fleet:
         state[:, L.HEADING_ERROR] = np.nan
         if heading_error_rad is not None:
             state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
-        state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+        with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
+            state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
         teams = _whole("team", _shaped("team", team, (n,)))
         if platforms is None:
             raise FleetError("platforms is None; give a platform's name, or one for each boat")

@@ -1,0 +1,124 @@
+"""Settings are checked when they are given, in words that help."""
+
+import math
+from dataclasses import FrozenInstanceError, fields
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.certificates import CERTIFICATES
+from steerclear.shield.config import COORDINATION
+from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
+
+TEXTS = ("certificate", "coordination", "solver")
+NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
+NOT_ZERO = ["separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s"]
+MAY_BE_NONE = ["horizon_s", "edge_m"]
+MAY_BE_INFINITE = ["response_per_s", "max_track_age_s"]
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("value", [math.nan, "2.5", True, [1.0], {}, 1 + 1j])
+def test_values_that_are_no_numbers_are_refused_by_name(name, value):
+    with pytest.raises(ConfigError, match=f"^{name} is .*give a number"):
+        ShieldConfig(**{name: value})
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_negative_numbers_are_refused_by_name(name):
+    with pytest.raises(ConfigError, match=f"^{name} is -0.25"):
+        ShieldConfig(**{name: -0.25})
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_zero_is_refused_where_it_makes_no_sense(name):
+    if name in NOT_ZERO:
+        with pytest.raises(ConfigError, match=f"^{name} is 0.*must be > 0"):
+            ShieldConfig(**{name: 0.0})
+    else:
+        assert getattr(ShieldConfig(**{name: 0.0}), name) == 0.0
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_infinity_is_refused_where_it_makes_no_sense(name):
+    if name in MAY_BE_INFINITE:
+        assert getattr(ShieldConfig(**{name: math.inf}), name) == math.inf
+    else:
+        with pytest.raises(ConfigError, match=name):
+            ShieldConfig(**{name: math.inf})
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_none_means_off_only_where_it_says_so(name):
+    if name in MAY_BE_NONE:
+        assert getattr(ShieldConfig(**{name: None}), name) is None
+    else:
+        with pytest.raises(ConfigError, match=name):
+            ShieldConfig(**{name: None})
+
+
+@pytest.mark.parametrize("share", [1.0000001, 2, 50])
+def test_a_share_is_between_none_and_all(share):
+    with pytest.raises(ConfigError, match="opponent_share .* between 0 and 1"):
+        ShieldConfig(opponent_share=share)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("value", [None, 3, ["daqp"], True])
+def test_names_must_be_texts(name, value):
+    with pytest.raises(ConfigError, match=f"{name} is .*give a name"):
+        ShieldConfig(**{name: value})
+
+
+@pytest.mark.parametrize(("name", "known"), [("certificate", CERTIFICATES), ("coordination", COORDINATION)])
+def test_unknown_names_are_told_the_known_ones(name, known):
+    with pytest.raises(ConfigError, match=rf"unknown {name} 'magic'.*{'.*'.join(known)}"):
+        ShieldConfig(**{name: "magic"})
+
+
+def test_a_backend_that_is_not_installed_is_told_with_the_remedy():
+    with pytest.raises(SolverError, match=r"'gurobi' is not installed; installed: .*daqp.*pip install gurobi"):
+        Shield(solver="gurobi")
+
+
+@pytest.mark.parametrize("entry", fields(ShieldConfig), ids=lambda entry: entry.name)
+def test_a_misspelt_key_is_told_the_nearest_known_one(entry):
+    misspelt = entry.name[:2] + entry.name[3:]
+    with pytest.raises(ConfigError, match=f"unknown shield setting '{misspelt}'; did you mean '{entry.name}'"):
+        ShieldConfig.of(**{misspelt: 1.0})
+
+
+def test_a_key_like_no_other_is_told_all():
+    with pytest.raises(ConfigError, match=r"known settings: separation_m, .*hull_m"):
+        Shield(zzz=1)
+
+
+@pytest.mark.parametrize("key", ["separation", "radius_m", "separation_km", "dt", "DT_S"])
+def test_keys_without_their_unit_are_unknown(key):
+    with pytest.raises(ConfigError, match="unknown shield setting"):
+        ShieldConfig.of(**{key: 1.0})
+
+
+def test_settings_and_config_together_are_refused():
+    with pytest.raises(ConfigError, match="not both"):
+        Shield(ShieldConfig(), separation_m=3.0)
+
+
+def test_a_config_cannot_be_changed_behind_the_shields_back():
+    config = ShieldConfig()
+    with pytest.raises(FrozenInstanceError):
+        config.separation_m = 0.1
+
+
+def test_all_errors_are_of_one_tree():
+    for error in (ConfigError, SolverError):
+        assert issubclass(error, SteerclearError)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(separation=st.floats(0.01, 50.0), share=st.floats(0.0, 1.0), certificate=st.sampled_from(list(CERTIFICATES)))
+def test_sensible_settings_are_taken_as_given(separation, share, certificate):
+    config = ShieldConfig.of(separation_m=separation, opponent_share=share, certificate=certificate)
+    assert (config.separation_m, config.opponent_share, config.certificate) == (separation, share, certificate)
+    assert Shield(config).config is config
