@@ -119,7 +119,11 @@ PARITY = {
     "traces[].first_mismatches[].*": "the first of them: step, event, who, expected, got",
 }
 
-_TIMES = {"p50_us": "median, us", "p99_us": "99th percentile, us", "p99_9_us": "99.9th percentile, us"}
+_TIMES = {
+    "p50_us": "median over calls, each with the median of its repeats, us",
+    "p99_us": "99th percentile of them, us",
+    "p99_9_us": "99.9th percentile of them, us",
+}
 
 BENCH = {
     **_PROVENANCE,

@@ -20,7 +20,7 @@ def decide_times(games: Sequence[Sequence[Question]], config: ShieldConfig, repe
 
     Returns:
         Quantiles in us for ``all`` decisions, those in which every command ``passes`` and those in which the shield
-        ``intervenes``: per repeat, then the median over repeats. ``decisions`` and ``share_intervening`` count.
+        ``intervenes``, each with the median of its repeats; ``decisions`` and ``share_intervening`` count them.
     """
     shield = Shield(config)
     changed = np.array([bool(answer.intervened.any()) for answer in answer_all(shield, games)])  # warms up, too

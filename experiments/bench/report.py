@@ -28,7 +28,8 @@ def _decide(content: Mapping[str, Any]) -> BenchTable:
     share = decide["share_intervening"]
     names = {"all": "all", "passes": f"passes ({1 - share:.1%})", "intervenes": f"intervenes ({share:.1%})"}
     rows = [[words, *_quantiles(decide[name])] for name, words in names.items()]
-    title = f"One decision, 3 boats and 3 opponents, us ({decide['decisions']:,} states of real games)"
+    times = f"each timed {content['settings']['repeats']} times"
+    title = f"One decision, 3 boats and 3 opponents, us ({decide['decisions']:,} of real games, {times})"
     return BenchTable(title, ("", "p50", "p99", "p99.9"), rows)
 
 

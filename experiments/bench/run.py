@@ -23,7 +23,7 @@ class BenchSettings:
     Attributes:
         preset: rules of the games.
         seed: of everything drawn.
-        repeats: times each decision and program is timed.
+        repeats: times each decision and program is timed; its median counts.
         game_s: length of the games that states are taken from, s.
         programs: programs for the solvers, at most.
         batch: size of the batched runs.
@@ -34,7 +34,7 @@ class BenchSettings:
 
     preset: str = "aamas2024"
     seed: int = 0
-    repeats: int = 3
+    repeats: int = 5
     game_s: float = 300.0
     programs: int = 400
     batch: BatchSize = field(default_factory=BatchSize)

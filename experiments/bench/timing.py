@@ -1,4 +1,4 @@
-"""Timing helpers: quantiles of single calls, medians over repeats."""
+"""Timing helpers: quantiles over calls, memory."""
 
 from __future__ import annotations
 
@@ -24,12 +24,15 @@ def time_calls(call: Callable[[int], Any], times: int) -> NDArray[np.float64]:
 
 
 def quantiles_us(repeats: Sequence[NDArray[np.float64]]) -> dict[str, float | None]:
-    """Quantiles of each repeat's calls, then the median over the repeats; None without calls."""
+    """Quantiles over calls, each call counting with the median of its repeats; None without calls.
+
+    The calls compute the same thing in every repeat, so that the median leaves out what other processes of the
+    machine did to single ones.
+    """
     if not repeats or not len(repeats[0]):
         return dict.fromkeys(QUANTILES)
-    return {
-        name: float(np.median([np.quantile(times, share) for times in repeats])) for name, share in QUANTILES.items()
-    }
+    times = np.median(np.stack(repeats), axis=0)
+    return {name: float(np.quantile(times, share)) for name, share in QUANTILES.items()}
 
 
 def memory_mib(make: Callable[[], Any]) -> float:
