@@ -215,13 +215,15 @@ def build_rows(
     ``kind[r]`` is the class of a row, ``label[r]`` = (boat, neighbour), neighbour -1 for fixed things and limits.
     """
     n = state.shape[0]
+    if 5 * movers.shape[0] > C.shape[0]:  # one row of fixed things and four of limits for each
+        return -1
     r = 0
     for m in range(movers.shape[0]):
         i = movers[m]
         for j in range(n):
             if j == i or not work.near[i, j] or (place[j] >= 0 and j < i):
                 continue
-            if r + 1 + 4 * movers.shape[0] + 1 > C.shape[0]:
+            if r + 1 + 5 * movers.shape[0] > C.shape[0]:
                 return -1
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j

@@ -21,6 +21,7 @@ class Boats(NamedTuple):
     Attributes:
         params: platform rows, (n, N_PARAM).
         team: team of each boat, (n,).
+        fastest_mps: speed no boat of the kind exceeds over ground, (n,); the stored speed may lag behind it.
         granted_turn_dps: turn rate granted to each boat as an opponent at its top speed, (n,).
         granted_acc_mps2: acceleration granted to each boat as an opponent, (n,).
         samples: path samples of each boat's horizon, (n,).
@@ -29,6 +30,7 @@ class Boats(NamedTuple):
 
     params: Array
     team: IntArray
+    fastest_mps: Array
     granted_turn_dps: Array
     granted_acc_mps2: Array
     samples: IntArray

@@ -56,6 +56,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     return Boats(
         params=np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM),
         team=np.array(team, dtype=np.int64),
+        fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
         granted_turn_dps=np.array([share * limit.turn_rate_dps for limit in limits]),
         granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),
         samples=np.array([max(2, math.ceil(value / sample_s)) for value in horizon_s], dtype=np.int64),

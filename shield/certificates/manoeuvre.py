@@ -47,8 +47,8 @@ SLOWEST = 0.3
 def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
-    A pair is left out when its distance exceeds R_ij + (top speed i + top speed j) * (longer horizon + tail). No boat
-    outruns its top speed, so on every path the certificate looks at the pair stays apart by more than R_ij: its
+    A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + tail). No boat ever
+    exceeds its fastest speed, so on every path the certificate looks at the pair stays apart by more than R_ij: its
     margin is positive for every manoeuvre and every command, its row can never be the binding one, and leaving it
     out changes no decision.
 
@@ -62,9 +62,9 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
         way = state[i, L.SPEED] * tuning.dt_s
         work.course[i, 0], work.course[i, 1] = state[i, L.X] + way * ux, state[i, L.Y] + way * uy
         work.course[i, 2], work.course[i, 3] = ux, uy
-        top_i = max(boats.params[i, L.MAX_SPEED], state[i, L.SPEED])
+        top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
         for j in range(i):
-            top = top_i + max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED])
+            top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
             horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * STRIDE * tuning.dt_s + tuning.tail_s
             radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
@@ -84,8 +84,8 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
 @kernel
 def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
     """Most the distance of a pair can shrink from sample to sample, m."""
-    top_i = max(boats.params[i, L.MAX_SPEED], state[i, L.SPEED])
-    top_j = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED])
+    top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
+    top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
     return (top_i + top_j) * STRIDE * tuning.dt_s
 
 

@@ -132,6 +132,20 @@ class Platform:
             row[L.MAP_SPEED + i] = speed_mps
         return row
 
+    def fastest_mps(self, dt_s: float) -> float:
+        """Highest speed over ground, m/s, in a step of ``dt_s``.
+
+        A thrust boat moves with the mean of old and new speed, of which only the stored one is cut to top speed.
+        """
+        if self.kind != "usv":
+            return self.max_speed_mps
+        thrusts, speeds = np.asarray(self.thrust_map).T
+        reached = [self.max_thrust, *(thrust for thrust in thrusts if 0.0 <= thrust <= self.max_thrust)]
+        new = float(np.interp(reached, thrusts, speeds).max())
+        if self.max_acc > 0.0:
+            new = min(new, self.max_speed_mps + self.max_acc * dt_s)
+        return max(self.max_speed_mps, 0.5 * (self.max_speed_mps + new))
+
     def max_turn_rate_at(self, speed_mps: float) -> float:
         """Highest steady turn rate, deg/s, at a straight-line speed (m/s): full rudder at that speed's thrust."""
         if self.kind != "usv":

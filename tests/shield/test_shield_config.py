@@ -60,7 +60,7 @@ def test_none_means_off_only_where_it_says_so(name):
 
 @pytest.mark.parametrize("share", [1.0000001, 2, 50])
 def test_a_share_is_between_none_and_all(share):
-    with pytest.raises(ConfigError, match="opponent_share .* between 0 and 1"):
+    with pytest.raises(ConfigError, match=r"opponent_share .* between 0 and 1"):
         ShieldConfig(opponent_share=share)
 
 
