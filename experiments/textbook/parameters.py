@@ -1,0 +1,63 @@
+"""Names of the filters and their gains: published where no tuning is known, else the winners of `sweep`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from steerclear.shield.jit import Array
+
+from .barriers import COLLISION_CONE, DISTANCE, EXPONENTIAL, N_GAIN, PARABOLIC
+
+KINDS = {
+    "velocity_cbf": DISTANCE,
+    "exponential_cbf": EXPONENTIAL,
+    "collision_cone": COLLISION_CONE,
+    "parabolic": PARABOLIC,
+}
+NAMES = tuple(KINDS)
+
+INFLATION = 1.05
+"""The parabolic filter's widening of the radius, s in its authors' library."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a filter.
+
+    Attributes:
+        alpha_per_s: rate of the class-K function of the row.
+        first_per_s: a1 of the exponential barrier; alpha is then its a2.
+        lambda_share: k_lambda of the parabolic barrier in units of sqrt(s^2 - 1)/R, s = `INFLATION`.
+        mu_share: k_mu of the parabolic barrier in the same units.
+    """
+
+    alpha_per_s: float
+    first_per_s: float = 1.0
+    lambda_share: float = 0.1
+    mu_share: float = 0.5
+
+    def pack(self, radius_m: float) -> Array:
+        """(N_GAIN,) for compiled code, at the radius to keep."""
+        unit = math.sqrt(INFLATION**2 - 1.0) / radius_m
+        row = np.empty(N_GAIN)
+        row[:] = self.first_per_s, self.alpha_per_s, self.lambda_share * unit, self.mu_share * unit
+        return row
+
+
+PUBLISHED = {
+    "velocity_cbf": Gains(1.0),
+    "exponential_cbf": Gains(1.0, first_per_s=1.0),
+    "collision_cone": Gains(1.0),
+    "parabolic": Gains(1.0),
+}
+"""Where a platform was not swept."""
+
+TUNED: dict[tuple[str, str], Gains] = {}
+"""By filter and platform, as `sweep` prints it."""
+
+
+def gains_of(name: str, platform: str) -> Gains:
+    """Gains of a filter for a platform, by their names."""
+    return TUNED.get((name, platform), PUBLISHED[name])
