@@ -1,0 +1,44 @@
+"""Oracle: was a breach avoidable, until when, and whose command made it?
+
+It looks back at a recorded run with every other boat's actual track held fixed in time and searches the own boat's
+commands with a full model of boat and autopilot. It shares no code with the shield and never imports it: what it says
+about the shield is independent of what the shield believes.
+
+How to call it (all arrays float64, numpy)::
+
+    boats = boats_of_rows(params)             # (n, 38) rows, as `Platform.pack()` gives; or a list of `Boat`
+    verdict = judge(states, boats, own=0, step=123, radius_m=2.5, dt_s=0.1)          # one boat's side -> Verdict
+    both = judge_breach(states, boats, (0, 3), 123, radius_m=2.5, driven=driven)      # both sides -> BreachVerdict
+    many = judge_breaches(states, boats, [(123, 0, 3), ...], radius_m=2.5, progress=print)   # list[BreachVerdict]
+
+- ``states`` (T+1, n, 11): every boat's full state row (columns x m, y m, heading deg, speed m/s, thrust, rudder, last
+  speed error, speed integral, last heading error, heading integral, turn rate deg/s; the two errors NaN before the
+  controllers' first call), index 0 the start, index k after k steps.
+- ``step``: index of the first state in which the pair is within ``radius_m`` (at exactly the radius is inside), as
+  the first column of ``env.record.find_breaches``.
+- ``driven`` (T, n) bool or None: whether the game, not the policy or shield, drove the boat in step k -> k+1.
+- ``verdict.outcome`` (`Outcome`), ``verdict.last_preventable_s`` (s before the breach, None if never),
+  ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
+"""
+
+from .boat import Boat, boats_of_rows
+from .errors import OracleError
+from .judge import judge
+from .settings import Settings
+from .sides import judge_breach, judge_breaches
+from .verdict import BreachVerdict, Outcome, Plan, Responsible, Verdict
+
+__all__ = [
+    "Boat",
+    "BreachVerdict",
+    "OracleError",
+    "Outcome",
+    "Plan",
+    "Responsible",
+    "Settings",
+    "Verdict",
+    "boats_of_rows",
+    "judge",
+    "judge_breach",
+    "judge_breaches",
+]

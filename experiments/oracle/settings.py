@@ -1,0 +1,78 @@
+"""How far the oracle looks and how finely it searches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+
+from .errors import OracleError
+
+
+@dataclass(frozen=True)
+class Level:
+    """Fineness of one search.
+
+    Attributes:
+        width: most states kept per layer.
+        position_m: states of one layer closer than this (and the next three) count as the same.
+        heading_deg: see ``position_m``.
+        speed_mps: see ``position_m``.
+        thrust: see ``position_m``, percent.
+        rudders: rudder choices, shares of full rudder.
+        first_s: lengths of the first choices, s; later ones are as the last.
+    """
+
+    width: int
+    position_m: float
+    heading_deg: float
+    speed_mps: float
+    thrust: float
+    rudders: tuple[float, ...]
+    first_s: tuple[float, ...]
+
+
+QUICK = Level(150, 0.5, 10.0, 0.25, 15.0, (-1.0, 0.0, 1.0), (0.5, 0.5, 0.5, 1.0))
+FULL = Level(1500, 0.2, 5.0, 0.1, 8.0, (-1.0, -0.5, 0.0, 0.5, 1.0), (0.3, 0.3, 0.4, 0.5))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a judgement.
+
+    Attributes:
+        look_back_s: T, how long before the breach own commands may begin to differ, s.
+        settle_s: how long after the breach the radius must still be kept, s. A plan that is clear when the real pair
+            came apart, but heads into the next contact, has avoided nothing; beyond a few seconds, however, the
+            others' recorded tracks answer a boat that is no longer there. 5 s lets a heron turn through 180 deg.
+        longest_s: a breach counts as over after this time, s, so that boats parked side by side for minutes can be
+            judged in bounded time.
+        quick: level tried first; what it finds is proof.
+        full: level that must fail before a breach is called unavoidable.
+    """
+
+    look_back_s: float = 30.0
+    settle_s: float = 5.0
+    longest_s: float = 30.0
+    quick: Level = QUICK
+    full: Level = FULL
+
+    def __post_init__(self) -> None:
+        for name, low in (("look_back_s", 0.0), ("settle_s", 0.0), ("longest_s", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= low):
+                raise OracleError(f"{name} must be a number of seconds, at least {low:g}; got {value}")
+        for level in (self.quick, self.full):
+            _check(level)
+
+    def refined(self, times: int = 2) -> Settings:
+        """Return settings whose full search is finer: cells smaller and width larger by ``times``."""
+        full = self.full
+        cells = {name: getattr(full, name) / times for name in ("position_m", "heading_deg", "speed_mps", "thrust")}
+        return replace(self, full=replace(full, width=full.width * times**2, **cells))
+
+
+def _check(level: Level) -> None:
+    numbers = [getattr(level, field.name) for field in fields(level) if field.name not in ("rudders", "first_s")]
+    sound = all(value > 0 for value in (*numbers, *level.first_s))
+    if not (sound and level.first_s and level.rudders and all(-1 <= value <= 1 for value in level.rudders)):
+        raise OracleError(f"a search level needs positive sizes and rudders within [-1, 1]; got {level}")
