@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import OracleError
 
+Array = NDArray[np.float64]
 N_STATE = 11
 """Columns of a state row: x, y, heading, speed, thrust, rudder, speed error and integral, heading error and integral,
 turn rate."""

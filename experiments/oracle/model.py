@@ -1,0 +1,199 @@
+"""The boat and its autopilot, written from their published equations, for the oracle alone.
+
+``p`` is `Boat.numbers`: kind, top speed, speed factor, max thrust, max rudder, turn loss, turn rate, max acc, max dec,
+rotation, speed kp ki kd limit gain, heading kp ki kd limit, max turn rate, max angular acceleration, then the thrust
+map's points. ``s`` is a state row, see `boat.N_STATE`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .boat import Array
+from .compiled import compiled
+
+DOWN, HOLD, UP = 0, 1, 2
+"""Speed choices of a search: slow down, leave the thrust as it is, speed up."""
+
+
+@compiled
+def within(value: float, limit: float) -> float:
+    """Cut to [-limit, limit]."""
+    return max(-limit, min(limit, value))
+
+
+@compiled
+def speed_at(p: Array, thrust: float) -> float:
+    """Straight-line speed of a thrust, m/s, between the points of the map; flat beyond its ends."""
+    last = p.size - 2
+    if thrust <= p[21]:
+        return p[22]
+    for i in range(23, last + 1, 2):
+        if thrust <= p[i]:
+            share = (thrust - p[i - 2]) / (p[i] - p[i - 2])
+            return p[i - 1] + share * (p[i + 1] - p[i - 1])
+    return p[last + 1]
+
+
+@compiled
+def _set_thrust(p: Array, s: Array, speed_mps: float, dt_s: float) -> None:
+    if p[2] != 0.0:
+        thrust = p[2] * speed_mps
+    else:
+        error = speed_mps - s[3]
+        slope = 0.0 if math.isnan(s[6]) else (error - s[6]) / dt_s
+        s[6] = error
+        s[7] = within(s[7] + p[11] * error * dt_s, p[13])
+        thrust = s[4] + p[14] * within(p[10] * error + s[7] + p[12] * slope, p[3])
+    s[4] = within(thrust, p[3]) if thrust >= 0.01 else 0.0
+
+
+@compiled
+def _set_rudder(p: Array, s: Array, error_deg: float, dt_s: float) -> None:
+    if not s[4] > 0.0:
+        s[5] = 0.0
+        return
+    slope = 0.0 if math.isnan(s[8]) else (error_deg - s[8]) / dt_s
+    s[8] = error_deg
+    s[9] = within(s[9] + p[16] * error_deg * dt_s, p[18])
+    s[5] = within(p[15] * error_deg + s[9] + p[17] * slope, min(p[4], 100.0))
+
+
+@compiled
+def _hull(p: Array, s: Array, dt_s: float) -> None:
+    thrust, rudder = s[4], s[5]
+    speed = speed_at(p, thrust) * (1.0 - p[5] * abs(rudder) / 100.0)
+    if p[7] > 0.0:
+        speed = min(speed, s[3] + p[7] * dt_s)
+    if p[8] > 0.0:
+        speed = max(speed, s[3] - p[8] * dt_s)
+    turn = rudder / 100.0 * p[6] * dt_s * abs(thrust) / 50.0
+    turn = 0.0 if speed == 0.0 else math.copysign(1.0, thrust) * turn
+    mean = 0.5 * (speed + s[3])
+    _go(s, mean, turn + p[9] * dt_s, dt_s)
+    s[3] = max(0.0, min(mean, p[1]))
+
+
+@compiled
+def _integrate(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
+    if p[0] == 1.0:
+        speed, rate = within(speed_mps, p[1]), within(error_deg / dt_s, p[19])
+    else:
+        speed = within(s[3] + dt_s * within((speed_mps - s[3]) / dt_s, p[7]), p[1])
+        rate = within(s[10] + dt_s * within((error_deg / dt_s - s[10]) / dt_s, p[20]), p[19])
+        s[10] = rate
+    _go(s, 0.5 * (speed + s[3]), rate * dt_s, dt_s)
+    s[3] = max(0.0, min(speed, p[1]))
+
+
+@compiled
+def _go(s: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
+    course = math.radians(s[2] + 0.5 * turn_deg)
+    s[0] += speed_mps * dt_s * math.sin(course)
+    s[1] += speed_mps * dt_s * math.cos(course)
+    s[2] = turned(s[2], turn_deg)
+
+
+@compiled
+def turned(heading_deg: float, turn_deg: float) -> float:
+    """Heading after a turn, within [-180, 180]."""
+    heading = heading_deg + turn_deg
+    if heading > 180.0:
+        return heading - 360.0
+    return heading + 360.0 if heading < -180.0 else heading
+
+
+@compiled
+def step(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
+    """Advance the whole boat by one step, in place.
+
+    Args:
+        p: parameters.
+        s: state row.
+        speed_mps: commanded speed.
+        error_deg: commanded heading, relative to the boat's.
+        dt_s: length of the step.
+    """
+    if p[0] != 0.0:
+        _integrate(p, s, speed_mps, error_deg, dt_s)
+        return
+    _set_thrust(p, s, speed_mps, dt_s)
+    _set_rudder(p, s, error_deg, dt_s)
+    _hull(p, s, dt_s)
+
+
+@compiled
+def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> tuple[float, float]:
+    """Command (speed m/s, relative heading deg) by which the autopilot now does what a search chose.
+
+    The heading controller answers a command at once through its derivative, so nearly any rudder can be had in any
+    step; what cannot (a relative heading beyond 180 deg) is cut, and the boat then does what the command gives.
+
+    Args:
+        p: parameters.
+        s: state row.
+        choice: DOWN, HOLD or UP.
+        rudder: share of full rudder (or turn rate), -1 to 1, positive to the right.
+        dt_s: length of the step.
+    """
+    if choice == HOLD:
+        speed = s[4] / p[2] if p[0] == 0.0 and p[2] != 0.0 else s[3]
+    else:
+        speed = 0.0 if choice == DOWN else p[1]
+    if p[0] != 0.0:
+        return speed, within(rudder * p[19] * dt_s, 180.0)
+    return speed, within(_error_for(p, s, rudder * min(p[4], 100.0), dt_s), 180.0)
+
+
+@compiled
+def _error_for(p: Array, s: Array, rudder: float, dt_s: float) -> float:
+    """Heading error for a rudder: kp e + I + ki e dt + kd (e - last)/dt = rudder, I cut at its limit."""
+    slope, known = p[15], rudder
+    if not math.isnan(s[8]):
+        slope += p[17] / dt_s
+        known += p[17] / dt_s * s[8]
+    steep = slope + p[16] * dt_s
+    if steep <= 0.0:
+        return 0.0
+    error = (known - s[9]) / steep
+    if abs(s[9] + p[16] * dt_s * error) <= p[18] or slope <= 0.0:
+        return error
+    return (known - within(s[9] + p[16] * dt_s * error, p[18])) / slope
+
+
+@compiled
+def gap_m(s: Array, others: Array) -> float:
+    """Distance to the nearest of the others (m, 2), m; infinite without any."""
+    nearest = np.inf
+    for m in range(others.shape[0]):
+        dx, dy = others[m, 0] - s[0], others[m, 1] - s[1]
+        nearest = min(nearest, dx * dx + dy * dy)
+    return math.sqrt(nearest)
+
+
+@compiled
+def replay(
+    p: Array, start: Array, commands: Array, others: Array, dt_s: float, path: Array, headings: Array
+) -> float:
+    """Drive a boat by commands and return the smallest distance to the others after any step, m.
+
+    Args:
+        p: parameters.
+        start: state row at the beginning.
+        commands: (S, 2) speed m/s, relative heading deg.
+        others: (S+1, m, 2) tracks, index 0 at the beginning.
+        dt_s: length of a step.
+        path: (S+1, 2), filled with the positions.
+        headings: (S,), filled with the heading before each step, deg.
+    """
+    s = start.copy()
+    path[0, 0], path[0, 1] = s[0], s[1]
+    closest = np.inf
+    for k in range(commands.shape[0]):
+        headings[k] = s[2]
+        step(p, s, commands[k, 0], commands[k, 1], dt_s)
+        path[k + 1, 0], path[k + 1, 1] = s[0], s[1]
+        closest = min(closest, gap_m(s, others[k + 1]))
+    return closest

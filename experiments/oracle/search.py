@@ -1,0 +1,226 @@
+"""Searching own commands that keep clear of given tracks: layer by layer, equal states merged, the best kept.
+
+A layer holds the states reachable at one time. From each, every choice of speed and rudder is held for a few steps of
+the full model, controllers included, and dropped as soon as a boat comes within the radius. States in the same cell
+(position, heading, speed, thrust) are one. When more are left than the width, most places go to those whose straight
+course stays clear longest, the rest are spread over all others. From the best of each layer simple courses are run to
+the end: the first that stays clear ends the search.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .boat import Array
+from .compiled import compiled
+from .model import DOWN, HOLD, UP, command_of, step
+
+N_SPEEDS = 3
+_TRIED = 3  # states of a layer from which simple courses are run to the end
+_LOOK = 5  # steps between looks along a straight course
+
+
+@compiled
+def clear_after(
+    p: Array, s: Array, choice: int, rudder: float, steps: int, others: Array, k: int, limit_m: float, dt_s: float
+) -> bool:
+    """Hold a choice for some steps from time index ``k``, in place; False as soon as a boat is within ``limit_m``."""
+    limit = limit_m * limit_m
+    for i in range(k + 1, k + steps + 1):
+        speed, error = command_of(p, s, choice, rudder, dt_s)
+        step(p, s, speed, error, dt_s)
+        for m in range(others.shape[1]):
+            dx, dy = others[i, m, 0] - s[0], others[i, m, 1] - s[1]
+            if not dx * dx + dy * dy > limit:
+                return False
+    return True
+
+
+@compiled
+def promise(s: Array, others: Array, k: int, limit_m: float, dt_s: float) -> float:
+    """Rate a state at time index ``k``: steps until a straight course meets a boat, plus a little for clearance."""
+    east, north = s[3] * math.sin(math.radians(s[2])) * dt_s, s[3] * math.cos(math.radians(s[2])) * dt_s
+    limit, nearest = limit_m * limit_m, np.inf
+    last = others.shape[0] - 1
+    i = k
+    while i < last:
+        i = min(i + _LOOK, last)
+        x, y = s[0] + east * (i - k), s[1] + north * (i - k)
+        for m in range(others.shape[1]):
+            dx, dy = others[i, m, 0] - x, others[i, m, 1] - y
+            nearest = min(nearest, dx * dx + dy * dy)
+        if nearest <= limit:
+            break
+    return i + min(math.sqrt(nearest), 50.0) / 50.0
+
+
+@compiled
+def _cell(s: Array, sizes: Array) -> int:
+    key = 1469598103934665603
+    for i in range(5):
+        key = (key ^ (int(math.floor(s[i] / sizes[i])) + 1048576)) * 1099511628211
+        key ^= key >> 29
+    return key
+
+
+@compiled
+def _slot(table: Array, keys: Array, key: int) -> int:
+    """Place of a key in the hash table, or of the empty place where it belongs."""
+    place = (key ^ (key >> 17)) & (table.size - 1)
+    while table[place] >= 0 and keys[table[place]] != key:
+        place = (place + 1) & (table.size - 1)
+    return place
+
+
+@compiled
+def _expand(
+    p: Array, layer: Array, others: Array, k: int, steps: int, limit_m: float, dt_s: float,
+    rudders: Array, sizes: Array, made: Array, keys: Array, rates: Array, origin: Array, table: Array
+) -> int:  # fmt: skip
+    """Make the next layer from ``layer``; returns how many states it has."""
+    count = 0
+    table[:] = -1
+    s = np.empty(layer.shape[1])
+    for node in range(layer.shape[0]):
+        for action in range(N_SPEEDS * rudders.size):
+            s[:] = layer[node]
+            choice, rudder = action // rudders.size, rudders[action % rudders.size]
+            if not clear_after(p, s, choice, rudder, steps, others, k, limit_m, dt_s):
+                continue
+            key = _cell(s, sizes)
+            rate = promise(s, others, k + steps, limit_m, dt_s)
+            place = _slot(table, keys, key)
+            row = table[place]
+            if row < 0:
+                row = count
+                count += 1
+                table[place] = row
+            elif rates[row] >= rate:
+                continue
+            made[row] = s
+            keys[row], rates[row] = key, rate
+            origin[row, 0], origin[row, 1] = node, action
+    return count
+
+
+@compiled
+def _choose(rates: Array, width: int) -> Array:
+    """Indices of the states to keep: three quarters by promise, the rest evenly from what remains."""
+    if rates.size <= width:
+        return np.arange(rates.size)
+    best = max(1, width - width // 4)
+    border = np.partition(rates, rates.size - best)[rates.size - best]
+    chosen = np.empty(width, dtype=np.int64)
+    rest = np.empty(rates.size, dtype=np.int64)
+    kept = left = 0
+    for i in range(rates.size):
+        if rates[i] >= border and kept < best:
+            chosen[kept] = i
+            kept += 1
+        else:
+            rest[left] = i
+            left += 1
+    for j in range(kept, width):
+        chosen[j] = rest[((j - kept) * left) // max(1, width - kept)]
+    return chosen
+
+
+@compiled
+def _run_out(
+    p: Array, start: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array
+) -> int:
+    """Return an action that, held to the end, stays clear; -1 when none of the simple ones does."""
+    middle, last = rudders.size // 2, rudders.size - 1
+    for choice in (HOLD, UP, DOWN):
+        for r in (middle, 0, last):
+            s = start.copy()
+            if clear_after(p, s, choice, rudders[r], others.shape[0] - 1 - k, others, k, limit_m, dt_s):
+                return choice * rudders.size + r
+    return -1
+
+
+@compiled
+def _finish(p: Array, layer: Array, rates: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array
+            ) -> tuple[int, int]:  # fmt: skip
+    """Try simple courses from the most promising states; (state, action) of one that stays clear, or (-1, -1)."""
+    left = rates.copy()
+    for _ in range(min(_TRIED, left.size)):
+        node = int(np.argmax(left))
+        left[node] = -np.inf
+        action = _run_out(p, layer[node], others, k, limit_m, dt_s, rudders)
+        if action >= 0:
+            return node, action
+    return -1, -1
+
+
+@compiled
+def search(
+    p: Array, start: Array, others: Array, limit_m: float, dt_s: float, lengths: Array, rudders: Array, sizes: Array,
+    width: int, actions: Array
+) -> tuple[bool, bool]:  # fmt: skip
+    """Look for actions that keep farther than ``limit_m`` from the others until their tracks end.
+
+    Args:
+        p: parameters of the own boat.
+        start: its state row at the beginning.
+        others: (K+1, m, 2) tracks, index 0 at the beginning.
+        limit_m: distance to be kept.
+        dt_s: length of a step.
+        lengths: (N,) steps per choice, summing to K.
+        rudders: choices of rudder, shares of full, rising, symmetric.
+        sizes: (5,) cells of x, y, heading, speed, thrust.
+        width: most states per layer.
+        actions: (N,) int64, filled with the action of each choice when found: speed choice * rudders + rudder.
+
+    Returns:
+        Whether a sequence was found, and whether no state was ever dropped for lack of width.
+    """
+    room = width * N_SPEEDS * rudders.size
+    made, keys = np.empty((room, start.size)), np.empty(room, dtype=np.int64)
+    rates, origin = np.empty(room), np.empty((room, 2), dtype=np.int64)
+    table = np.empty(1 << int(math.ceil(math.log2(2 * room + 2))), dtype=np.int64)
+    history = np.empty((lengths.size, width, 2), dtype=np.int64)
+    layer, layer_rates = start.copy().reshape(1, -1), np.zeros(1)
+    k, whole = 0, True
+    for n in range(lengths.size):
+        node, action = _finish(p, layer, layer_rates, others, k, limit_m, dt_s, rudders)
+        if node >= 0:
+            actions[n:] = action
+            _trace(history, n, node, actions)
+            return True, whole
+        steps = lengths[n]
+        count = _expand(p, layer, others, k, steps, limit_m, dt_s, rudders, sizes, made, keys, rates, origin, table)
+        if count == 0:
+            return False, whole
+        chosen = _choose(rates[:count], width)
+        whole = whole and chosen.size == count
+        layer, layer_rates = made[chosen], rates[chosen]
+        history[n, : chosen.size] = origin[chosen]
+        k += steps
+    _trace(history, lengths.size, int(np.argmax(layer_rates)), actions)
+    return True, whole
+
+
+@compiled
+def _trace(history: Array, layers: int, node: int, actions: Array) -> None:
+    """Write the actions that led to a state of a layer."""
+    for n in range(layers - 1, -1, -1):
+        actions[n] = history[n, node, 1]
+        node = history[n, node, 0]
+
+
+@compiled
+def commands_of(
+    p: Array, start: Array, actions: Array, lengths: Array, rudders: Array, dt_s: float, commands: Array
+) -> None:
+    """Turn actions into the commands (K, 2) that make the autopilot do them."""
+    s, k = start.copy(), 0
+    for n in range(lengths.size):
+        for _ in range(lengths[n]):
+            choice, rudder = actions[n] // rudders.size, rudders[actions[n] % rudders.size]
+            speed, error = command_of(p, s, choice, rudder, dt_s)
+            commands[k, 0], commands[k, 1] = speed, error
+            step(p, s, speed, error, dt_s)
+            k += 1
