@@ -6,7 +6,7 @@ Every h is >= 0 where safe. Derivatives are those of the formula in closed form;
 | name | h | source |
 | --- | --- | --- |
 | distance | \|p\|^2 - R^2 | Ames et al. 2019 (ECC); pairwise as Wang, Ames, Egerstedt 2017 (T-RO) |
-| exponential | h' + a1 h of the distance | Nguyen, Sreenath 2016 (ACC); Xiao, Belta 2021 (TAC), class-K functions linear |
+| exponential | h' + a1 h of the distance | Nguyen, Sreenath 2016 (ACC); Xiao, Belta 2021 (TAC), linear class K |
 | collision cone | <p, v> + \|v\| s, which is <p, v> + \|p\| \|v\| cos(phi) | Thontepu et al. 2022, arXiv 2209.11524 |
 | parabolic | v_x + k_l s/\|v\| v_y^2 + k_m s, (v_x, v_y) = v along and across p | Park et al. 2025, arXiv 2510.01402 |
 
@@ -48,7 +48,7 @@ def exponential(px: float, py: float, vx: float, vy: float, radius_m: float, a1_
 
 @kernel
 def _clear(px: float, py: float, radius_m: float) -> tuple[float, float]:
-    """s and the factor of p in its derivative: ds/dp = p/s, or 0 where s is cut."""
+    """Give s and the factor of p in its derivative: ds/dp = p/s, or 0 where s is cut."""
     square = px * px + py * py - radius_m * radius_m
     if square <= NEAREST_M2:
         return math.sqrt(NEAREST_M2), 0.0

@@ -32,15 +32,15 @@ class Outcome:
     Attributes:
         closest_m: (B,) least distance, m.
         breached: (B,) came within the separation.
-        changed: share of decisions whose command is not the wanted one.
-        relaxed: share of decisions whose program had to be relaxed.
+        changed: (B,) share of decisions whose command is not the wanted one.
+        relaxed: (B,) share of decisions whose program had to be relaxed.
         progress: (B,) way made towards the goal, as a share of that at top speed.
     """
 
     closest_m: Array
     breached: Array
-    changed: float
-    relaxed: float
+    changed: Array
+    relaxed: Array
     progress: Array
 
 
@@ -115,18 +115,18 @@ def run_drill(guard: Any, family: str, platform: str, games: int, seed: int, con
     params, top = kind.pack(), kind.max_speed_mps
     wanted, ours = np.zeros((games, 2, 2)), np.tile([True, False], (games, 1))
     closest_m = np.full(games, np.inf)
-    steps, changed, relaxed = int(LENGTH_S / config.dt_s), 0, 0
+    steps, changed, relaxed = int(LENGTH_S / config.dt_s), np.zeros(games), np.zeros(games)
     for _ in range(steps):
         _wish(state, goal, family == "rammer", top, wanted)
         sent = wanted if guard is None else guard.decide(state, wanted, ours)
-        changed += int((sent != wanted).any(axis=2).sum())
-        relaxed += 0 if guard is None else int((guard.reason[:, 0] > 1).sum())
+        changed += (sent != wanted).any(axis=(1, 2))
+        relaxed += 0.0 if guard is None else guard.reason[:, 0] > 1
         _move(params, state, sent, config.dt_s, closest_m)
     left = np.hypot(goal[:, 0] - state[:, 0, L.X], goal[:, 1] - state[:, 0, L.Y])
     return Outcome(
         closest_m=closest_m,
         breached=closest_m < config.separation_m,
-        changed=changed / (steps * games),
-        relaxed=relaxed / (steps * games),
+        changed=changed / steps,
+        relaxed=relaxed / steps,
         progress=(top * AWAY_S - left) / (top * LENGTH_S),
     )

@@ -37,7 +37,7 @@ def _barrier_rows(
                 continue
             gains = 0.5 * (setup.gains[i] + setup.gains[j]) if both else setup.gains[i]
             a, b, c, e, need = pair_row(setup, state, unit, i, j, both, gains)
-            worst = least(setup, i, a, b) + (least(setup, j, c, e) if both else 0.0)
+            worst = least(setup, state[i], i, a, b) + (least(setup, state[j], j, c, e) if both else 0.0)
             if worst >= need:
                 continue
             C[count, 2 * slot[i]], C[count, 2 * slot[i] + 1] = a, b
@@ -50,7 +50,7 @@ def _barrier_rows(
 
 @kernel
 def _stack(
-    setup: Setup, rows: Array, need: Array, pair: IntArray, slot: IntArray, corner_deg: Array
+    setup: Setup, state: Array, rows: Array, need: Array, pair: IntArray, slot: IntArray, corner_deg: Array
 ) -> tuple[Array, Array, int]:
     """Limits of the boats that stand in a row, then the rows."""
     n = slot.shape[0]
@@ -62,7 +62,7 @@ def _stack(
     at = 0
     for i in range(n):
         if met[i]:
-            at = limit_rows(setup, i, 2 * slot[i], C, d, at, corner_deg[i])
+            at = limit_rows(setup, state[i], i, 2 * slot[i], C, d, at, corner_deg[i])
     C[hard:], d[hard:] = rows, need
     return C, d, hard
 
@@ -122,7 +122,7 @@ def decide_game(
     count = _barrier_rows(setup, state, unit, slot, rows, need, pair, clear_m)
     if holds(rows[:count], need[:count], z0, SAME):
         return
-    C, d, hard = _stack(setup, rows[:count], need[:count], pair, slot, corner_deg)
+    C, d, hard = _stack(setup, state, rows[:count], need[:count], pair, slot, corner_deg)
     z, slack = z0.copy(), np.zeros(count)
     status = solve(C, d, hard, z0, z, slack)
     met, loose = np.zeros(n, np.bool_), np.zeros(n, np.bool_)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import clamp
 
 from .barriers import DISTANCE, barrier
 from .inputs import inputs_of_command
@@ -42,15 +43,24 @@ def wanted_velocity(setup: Setup, state: Array, command: Array, i: int) -> tuple
 
 
 @kernel
+def reach(setup: Setup, state: Array, i: int) -> tuple[float, float]:
+    """Least and greatest acceleration in this step, as shares of braking: a boat neither reverses nor tops its top."""
+    step = setup.limits[i, 2] * setup.dt_s
+    low, high = max(state[L.SPEED], 0.0) / step, max(setup.limits[i, 0] - state[L.SPEED], 0.0) / step
+    return -min(1.0, low), min(setup.limits[i, 1] / setup.limits[i, 2], high)
+
+
+@kernel
 def wanted_inputs(setup: Setup, state: Array, command: Array, i: int) -> tuple[float, float, float, float]:
-    """z of a command (2) and the units of z (2)."""
+    """Inputs z that a command amounts to (2) and the units of z (2)."""
     if setup.kind == DISTANCE:
         east, north = wanted_velocity(setup, state, command, i)
         return east, north, 1.0, 1.0
     limits = setup.limits[i]
     gain, turn, most = inputs_of_command(setup.params[i], limits, state, command[0], command[1], setup.dt_s)
     unit = most if most > 0.0 else 1.0
-    return gain / limits[2], turn / unit, limits[2], unit
+    low, high = reach(setup, state, i)
+    return clamp(gain / limits[2], low, high), turn / unit, limits[2], unit
 
 
 @kernel
@@ -107,27 +117,27 @@ def pair_row(
 
 
 @kernel
-def least(setup: Setup, i: int, a: float, b: float) -> float:
+def least(setup: Setup, state: Array, i: int, a: float, b: float) -> float:
     """Least value of a z_1 + b z_2 over the inputs boat i has."""
     if setup.kind == DISTANCE:
         return -setup.limits[i, 0] * math.sqrt(a * a + b * b)
-    up = setup.limits[i, 1] / setup.limits[i, 2]
-    return min(-a, up * a) - abs(b)
+    low, high = reach(setup, state, i)
+    return min(low * a, high * a) - abs(b)
 
 
 @kernel
-def limit_rows(setup: Setup, i: int, column: int, C: Array, d: Array, at: int, heading_deg: float) -> int:
+def limit_rows(setup: Setup, state: Array, i: int, column: int, C: Array, d: Array, at: int, heading_deg: float) -> int:
     """Write the limits of boat i's inputs as rows from ``at`` on; returns the next free row."""
     if setup.kind == DISTANCE:
-        reach = setup.limits[i, 0] * math.cos(math.pi / FACETS)
+        fastest = setup.limits[i, 0] * math.cos(math.pi / FACETS)
         for k in range(FACETS):
             angle = math.radians(heading_deg) + (2 * k + 1) * math.pi / FACETS
-            C[at, column], C[at, column + 1], d[at] = -math.sin(angle), -math.cos(angle), -reach
+            C[at, column], C[at, column + 1], d[at] = -math.sin(angle), -math.cos(angle), -fastest
             at += 1
         return at
-    up = setup.limits[i, 1] / setup.limits[i, 2]
-    C[at, column], d[at] = 1.0, -1.0
-    C[at + 1, column], d[at + 1] = -1.0, -up
+    low, high = reach(setup, state, i)
+    C[at, column], d[at] = 1.0, low
+    C[at + 1, column], d[at + 1] = -1.0, -high
     C[at + 2, column + 1], d[at + 2] = 1.0, -1.0
     C[at + 3, column + 1], d[at + 3] = -1.0, -1.0
     return at + 4
