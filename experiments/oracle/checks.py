@@ -62,6 +62,9 @@ def checked(
             f"boats {own} and {partner} are {gaps[partner]:.3f} m apart at step {step}, which is no breach of "
             f"{radius_m:g} m; give the first step inside the radius"
         )
+    before = np.hypot(*(table[step - 1, partner, :2] - table[step - 1, own, :2]))
+    if step > 1 and before <= radius_m:
+        raise OracleError(f"boats {own} and {partner} are inside already before step {step}; give the first step inside")
     tracks = np.ascontiguousarray(np.delete(table[:, :, :2], own, axis=1))
     place = partner - (partner > own)
     return Case(table, tracks, chosen.numbers(), chosen.top_mps(), partner, place, float(radius_m))

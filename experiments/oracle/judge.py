@@ -1,11 +1,13 @@
 """Judging one boat's side of a breach.
 
-Looking back from the breach, own commands may begin to differ at any step of the last T seconds at which the boat is
-clear of all others. Their tracks stay as they were. The breach is avoidable when, from one of those steps on, some
-sequence of commands keeps the radius from every boat until the pair was apart again, and a settle time longer.
+Looking back from the breach, own commands may begin to differ at any step of the last T seconds at which the pair is
+apart. The tracks of all others stay as they were. The breach is avoidable when, from one of those steps on, some
+sequence of commands keeps the radius from every boat until the pair was apart again, and a settle time longer. A third
+boat that is inside the radius when the commands begin is another breach, already under way: it is left out until it
+was apart in the record, and kept clear of from then on.
 
-Between two steps with no contact in between, whoever can still avoid from the later one can also avoid from the
-earlier one, by following the recorded track. So the latest such step is found by doubling the lead and bisection.
+Between two steps with no entry in between, whoever can still avoid from the later one can also avoid from the earlier
+one, by following the recorded track. So the latest such step is found by growing leads and bisection.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ from .verdict import Outcome, Plan, Verdict
 
 ROUNDING_M = 1e-9
 """Kept above the radius, so that a plan replayed with other rounding is still clear."""
+FAR_M = 1e9
+"""Where boats are that need not be kept clear of, m."""
 DEFAULT = Settings()
 
 
@@ -58,13 +62,15 @@ def judge(
     gaps = np.hypot(*np.moveaxis(case.tracks - case.states[:, None, own, :2], -1, 0))
     end = _end_of(gaps[:, case.partner], case.radius_m, step, settings, dt_s)
     first = max(0, step - round(settings.look_back_s / dt_s))
-    inside = (gaps <= case.radius_m + ROUNDING_M).any(axis=1)
-    asked = _Question(case.states[:, own], case.numbers, case.tracks, end, case.radius_m, dt_s, case.top_mps, settings)
+    inside = gaps <= case.radius_m + ROUNDING_M
+    asked = _Question(
+        case.states[:, own], case.numbers, case.tracks, inside, end, case.radius_m, dt_s, case.top_mps, settings
+    )
     facts = {"own": own, "other": case.other, "step": step, "radius_m": case.radius_m, "end_step": end}
     facts["looked_back_s"] = (step - first) * dt_s
-    if (gaps[:step, case.partner] <= case.radius_m).all():
+    if inside[:step, case.partner].all():
         return Verdict(**facts, outcome=Outcome.STARTED_INSIDE, **_nothing(True, 0))
-    for low, high in reversed(_runs(~inside[first:step], first)):
+    for low, high in reversed(_runs(inside[first:step], case.partner, first)):
         latest, exhausted = _latest(asked, low, high)
         if latest is not None:
             return _avoidable(asked, facts, latest, exhausted)
@@ -78,6 +84,7 @@ class _Question:
     rows: Array
     numbers: Array
     tracks: Array
+    inside: NDArray[np.bool_]
     end: int
     radius_m: float
     dt_s: float
@@ -115,9 +122,15 @@ class _Question:
         """Whether the full searches that failed dropped no state."""
         return all(whole for (_, level), whole in self.failures.items() if level == self.settings.full)
 
+    def _tracks(self, begin: int) -> Array:
+        """Tracks from ``begin`` on; a boat that is inside at that step is far away until it was apart."""
+        tracks = self.tracks[begin : self.end + 1].copy()
+        tracks[np.logical_and.accumulate(self.inside[begin : self.end + 1], axis=0)] = FAR_M
+        return tracks
+
     def _reachable(self, begin: int) -> Array:
-        """Tracks from ``begin`` on of the boats that the own one could come near at all."""
-        tracks = self.tracks[begin : self.end + 1]
+        """Of those tracks the ones that the own boat could come near at all."""
+        tracks = self._tracks(begin)
         start = self.rows[begin]
         reach = self.radius_m + 1.0 + self.dt_s * max(self.top_mps, start[3]) * np.arange(len(tracks))
         gaps = np.hypot(*np.moveaxis(tracks - start[:2], -1, 0))
@@ -126,7 +139,7 @@ class _Question:
     def _prove(self, begin: int, commands: Array) -> None:
         """Replay the commands against all boats; a plan counts only when that, too, stays clear."""
         path = np.empty((len(commands) + 1, 2))
-        others = np.ascontiguousarray(self.tracks[begin : self.end + 1])
+        others = self._tracks(begin)
         headings = np.empty(len(commands))
         closest_m = replay(self.numbers, self.rows[begin], commands, others, self.dt_s, path, headings)
         if not closest_m > self.radius_m:
@@ -141,9 +154,9 @@ def _latest(asked: _Question, low: int, high: int) -> tuple[int | None, bool]:
     Returns:
         The step, None when there is none; whether the search that failed after it was exhausted.
     """
-    best, failed = _bracket(asked, low, high, asked.settings.quick)
+    best, failed = _bracket(asked, low, high, asked.settings.quick, growth=2)
     if best is None:
-        best, failed = _bracket(asked, low, high, asked.settings.full)
+        best, failed = _bracket(asked, low, high, asked.settings.full, growth=4)
         if best is None:
             return None, asked.exhausted
     else:
@@ -155,8 +168,8 @@ def _latest(asked: _Question, low: int, high: int) -> tuple[int | None, bool]:
     return best, asked.failures[failed, asked.settings.full]
 
 
-def _bracket(asked: _Question, low: int, high: int, level: Level) -> tuple[int | None, int]:
-    """Double the lead until a search succeeds: the step it began at, and the latest one tried before."""
+def _bracket(asked: _Question, low: int, high: int, level: Level, growth: int) -> tuple[int | None, int]:
+    """Multiply the lead until a search succeeds: the step it began at, and the latest one tried before."""
     failed, lead = high + 1, 0
     while True:
         begin = max(low, high - lead)
@@ -164,7 +177,7 @@ def _bracket(asked: _Question, low: int, high: int, level: Level) -> tuple[int |
             return begin, failed
         if begin == low:
             return None, low
-        failed, lead = begin, 2 * lead + 1
+        failed, lead = begin, growth * lead + growth - 1
 
 
 def _press_on(asked: _Question, best: int, high: int) -> tuple[int, int]:
@@ -218,10 +231,23 @@ def _end_of(gap_m: Array, radius_m: float, step: int, settings: Settings, dt_s: 
     return min(len(gap_m) - 1, over + round(settings.settle_s / dt_s))
 
 
-def _runs(clear: NDArray[np.bool_], first: int) -> list[tuple[int, int]]:
-    """Stretches of consecutive clear steps, as (first, last) indices of the record."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], clear, [False])).astype(np.int8)))
-    return [(first + int(a), first + int(b) - 1) for a, b in edges.reshape(-1, 2)]
+def _runs(inside: NDArray[np.bool_], partner: int, first: int) -> list[tuple[int, int]]:
+    """Stretches of steps with the pair apart and no other boat entering, as (first, last) indices of the record.
+
+    Args:
+        inside: (steps, m) whether each boat is within the radius.
+        partner: column of the boat the breach is with.
+        first: index of the first of these steps in the record.
+    """
+    entered = np.zeros(len(inside), dtype=np.bool_)
+    entered[1:] = (inside[1:] & ~inside[:-1]).any(axis=1)
+    runs: list[tuple[int, int]] = []
+    for k in np.flatnonzero(~inside[:, partner]) + first:
+        if runs and runs[-1][1] == k - 1 and not entered[k - first]:
+            runs[-1] = (runs[-1][0], int(k))
+        else:
+            runs.append((int(k), int(k)))
+    return runs
 
 
 def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> NDArray[np.int64]:
