@@ -35,9 +35,7 @@ class Case:
     radius_m: float
 
 
-def checked(
-    states: Any, boats: Any, own: int, step: int, radius_m: float, dt_s: float, other: int | None
-) -> Case:
+def checked(states: Any, boats: Any, own: int, step: int, radius_m: float, dt_s: float, other: int | None) -> Case:
     """Check the arguments of `judge`.
 
     Raises:
@@ -64,7 +62,9 @@ def checked(
         )
     before = np.hypot(*(table[step - 1, partner, :2] - table[step - 1, own, :2]))
     if step > 1 and before <= radius_m:
-        raise OracleError(f"boats {own} and {partner} are inside already before step {step}; give the first step inside")
+        raise OracleError(
+            f"boats {own} and {partner} are inside already before step {step}; give the first step inside"
+        )
     tracks = np.ascontiguousarray(np.delete(table[:, :, :2], own, axis=1))
     place = partner - (partner > own)
     return Case(table, tracks, chosen.numbers(), chosen.top_mps(), partner, place, float(radius_m))

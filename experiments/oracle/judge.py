@@ -259,4 +259,3 @@ def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> NDArray[np.
         lengths.append(min(left, max(1, round(wanted_s / dt_s))))
         left -= lengths[-1]
     return np.array(lengths, dtype=np.int64)
-

@@ -14,6 +14,8 @@ import numpy as np
 from .boat import Array
 from .compiled import compiled
 
+LARGEST_ERROR_DEG = 179.9
+"""Largest relative heading commanded: at 180 an absolute heading no longer tells to which side."""
 DOWN, HOLD, UP = 0, 1, 2
 """Speed choices of a search: slow down, leave the thrust as it is, speed up."""
 
@@ -129,7 +131,7 @@ def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> t
     """Command (speed m/s, relative heading deg) by which the autopilot now does what a search chose.
 
     The heading controller answers a command at once through its derivative, so nearly any rudder can be had in any
-    step; what cannot (a relative heading beyond 180 deg) is cut, and the boat then does what the command gives.
+    step; what cannot (a relative heading beyond 179.9 deg) is cut, and the boat then does what the command gives.
 
     Args:
         p: parameters.
@@ -143,8 +145,8 @@ def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> t
     else:
         speed = 0.0 if choice == DOWN else p[1]
     if p[0] != 0.0:
-        return speed, within(rudder * p[19] * dt_s, 180.0)
-    return speed, within(_error_for(p, s, rudder * min(p[4], 100.0), dt_s), 180.0)
+        return speed, within(rudder * p[19] * dt_s, LARGEST_ERROR_DEG)
+    return speed, within(_error_for(p, s, rudder * min(p[4], 100.0), dt_s), LARGEST_ERROR_DEG)
 
 
 @compiled
@@ -174,9 +176,7 @@ def gap_m(s: Array, others: Array) -> float:
 
 
 @compiled
-def replay(
-    p: Array, start: Array, commands: Array, others: Array, dt_s: float, path: Array, headings: Array
-) -> float:
+def replay(p: Array, start: Array, commands: Array, others: Array, dt_s: float, path: Array, headings: Array) -> float:
     """Drive a boat by commands and return the smallest distance to the others after any step, m.
 
     Args:

@@ -75,6 +75,14 @@ def _slot(table: Array, keys: Array, key: int) -> int:
 
 
 @compiled
+def _power_of_two(least: int) -> int:
+    size = 1
+    while size < least:
+        size *= 2
+    return size
+
+
+@compiled
 def _expand(
     p: Array, layer: Array, others: Array, k: int, steps: int, limit_m: float, dt_s: float,
     rudders: Array, sizes: Array, made: Array, keys: Array, rates: Array, origin: Array, table: Array
@@ -128,9 +136,7 @@ def _choose(rates: Array, width: int) -> Array:
 
 
 @compiled
-def _run_out(
-    p: Array, start: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array
-) -> int:
+def _run_out(p: Array, start: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array) -> int:
     """Return an action that, held to the end, stays clear; -1 when none of the simple ones does."""
     middle, last = rudders.size // 2, rudders.size - 1
     for choice in (HOLD, UP, DOWN):
@@ -180,7 +186,7 @@ def search(
     room = width * N_SPEEDS * rudders.size
     made, keys = np.empty((room, start.size)), np.empty(room, dtype=np.int64)
     rates, origin = np.empty(room), np.empty((room, 2), dtype=np.int64)
-    table = np.empty(1 << int(math.ceil(math.log2(2 * room + 2))), dtype=np.int64)
+    table = np.empty(_power_of_two(2 * room), dtype=np.int64)
     history = np.empty((lengths.size, width, 2), dtype=np.int64)
     layer, layer_rates = start.copy().reshape(1, -1), np.zeros(1)
     k, whole = 0, True

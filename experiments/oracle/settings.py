@@ -57,7 +57,7 @@ class Settings:
     full: Level = FULL
 
     def __post_init__(self) -> None:
-        for name, low in (("look_back_s", 0.0), ("settle_s", 0.0), ("longest_s", 0.0)):
+        for name, low in (("look_back_s", 0.1), ("settle_s", 0.0), ("longest_s", 0.0)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= low):
                 raise OracleError(f"{name} must be a number of seconds, at least {low:g}; got {value}")

@@ -24,11 +24,13 @@ def driven_track(params, state, commands):
 
 
 def random_run(name, boats, size_m, steps, seed, chasers=0):
-    """Boats between random waypoints; the last few chase the nearest of the others. States (T+1, n, 11), rows (n, 38)."""
+    """Boats between random waypoints; the last few chase. States (T+1, n, 11), rows (n, 38)."""
     random = np.random.default_rng(seed)
     platform = get_platform(name)
     params, top_mps = platform.pack(), platform.max_speed_mps
-    spread = [(*random.uniform(0, size_m, 2), random.uniform(-180, 180), random.uniform(0, top_mps)) for _ in range(boats)]
+    spread = [
+        (*random.uniform(0, size_m, 2), random.uniform(-180, 180), random.uniform(0, top_mps)) for _ in range(boats)
+    ]
     state = np.array([fresh_state(*place) for place in spread])
     goal = random.uniform(0, size_m, (boats, 2))
     rows = [state.copy()]

@@ -120,5 +120,5 @@ def test_unusable_parameter_rows(rows, words):
     "change", [{"kind": "ship"}, {"max_speed_mps": np.nan}, {"thrust_map": ((0.0, 0.0), (0.0, 1.0))}]
 )
 def test_unusable_boats(change):
-    with pytest.raises(OracleError, match="choose one of|finite parameters|rising thrust"):
+    with pytest.raises(OracleError, match=r"choose one of|finite parameters|rising thrust"):
         Boat(**{"kind": "usv", "max_speed_mps": 2.0, **change})

@@ -1,0 +1,122 @@
+"""Brute force over all bang sequences finds nothing that the oracle misses, and every plan holds when replayed."""
+
+import numpy as np
+import pytest
+from brute import any_sequence
+from oracle_runs import DT_S, random_run
+from steerclear.env.record import find_breaches
+from steerclear.experiments.oracle import Outcome, Settings, judge
+from steerclear.shield.platforms import step_boat
+
+RADIUS_M = 2.5
+SHORT = Settings(settle_s=0.5, longest_s=0.8, look_back_s=4.0)
+
+
+def replayed(states, rows, verdict):
+    """Closest distance when the plan is driven with the package's boat, by relative and by absolute heading."""
+    plan, own = verdict.plan, verdict.own
+    closest = []
+    for absolute in (False, True):
+        state = states[plan.begin_step, own].copy()
+        nearest = np.inf
+        for k in range(len(plan.speed_mps)):
+            error_deg = plan.heading_error_deg[k]
+            if absolute:
+                error_deg = (plan.heading_deg[k] - state[2] + 180.0) % 360.0 - 180.0
+            step_boat(rows[own], state, plan.speed_mps[k], error_deg, DT_S)
+            others = np.delete(states[plan.begin_step + k + 1, :, :2], own, axis=0)
+            nearest = min(nearest, np.hypot(*(others - state[:2]).T).min())
+        closest.append(nearest)
+    return closest
+
+
+def close_calls(name, seed, size_m, boats=3):
+    """Breaches of short runs in a small basin."""
+    states, rows = random_run(name, boats, size_m, 150, seed, chasers=boats - 1)
+    return states, rows, [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1]
+
+
+def brute_last(states, rows, verdict, rudders, macro):
+    """Latest step within 2 s from which brute force avoids the breach; None when there is none."""
+    others = np.ascontiguousarray(np.delete(states[:, :, :2], verdict.own, axis=1))
+    for begin in range(verdict.step - 1, max(-1, verdict.step - 20), -1):
+        start = states[begin, verdict.own]
+        if np.hypot(*(others[begin] - start[:2]).T).min() <= RADIUS_M:
+            return None
+        tracks = others[begin : verdict.end_step + 1]
+        if any_sequence(rows[verdict.own], start, tracks, rudders, macro, RADIUS_M, DT_S):
+            return begin
+    return None
+
+
+def compare(name, seed, size_m, rudders, macro, most):
+    """Judge the first breaches of a run both ways; returns how many were compared and found avoidable."""
+    states, rows, breaches = close_calls(name, seed, size_m)
+    found = 0
+    for step, a, b, _ in breaches[:most]:
+        for own, other in ((int(a), int(b)), (int(b), int(a))):
+            verdict = judge(states, rows, own, int(step), RADIUS_M, other=other, settings=SHORT)
+            last = brute_last(states, rows, verdict, rudders, macro)
+            if last is not None:
+                found += 1
+                assert verdict.outcome is Outcome.AVOIDABLE
+                assert verdict.last_step >= last
+    return found
+
+
+@pytest.mark.parametrize(("name", "size_m"), [("heron", 12.0), ("surveyor", 20.0), ("si", 25.0), ("di", 25.0)])
+def test_brute_force_finds_nothing_more(name, size_m):
+    found = [compare(name, seed, size_m, np.array([-1.0, 0.0, 1.0]), 5, most=3) for seed in range(5)]
+    assert sum(found) > 3
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("name", "size_m"), [("heron", 12.0), ("surveyor", 20.0), ("large_usv", 60.0), ("di", 25.0)])
+def test_large_brute_force_finds_nothing_more(name, size_m):
+    rudders = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+    found = [compare(name, seed, size_m, rudders, 3, most=3) for seed in range(100, 115)]
+    assert sum(found) > 20
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor", "mctf2024_sim", "large_usv", "si", "di"])
+def test_plans_hold_when_replayed_with_the_packages_boat(name):
+    size_m = {"large_usv": 100.0, "si": 60.0, "di": 60.0}.get(name, 35.0)
+    states, rows = random_run(name, 5, size_m, 900, seed=11, chasers=2)
+    breaches = [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1][:12]
+    assert len(breaches) >= 3
+    checked = 0
+    for step, a, b, _ in breaches:
+        verdict = judge(states, rows, int(a), int(step), RADIUS_M, other=int(b))
+        if verdict.plan is None or not _apart(states, verdict):
+            continue
+        checked += 1
+        closest = replayed(states, rows, verdict)
+        assert min(closest) > RADIUS_M
+        assert closest[0] == pytest.approx(verdict.plan.closest_m, abs=1e-6)
+        assert (verdict.plan.speed_mps >= 0.0).all()
+        assert (np.abs(verdict.plan.heading_error_deg) <= 180.0).all()
+        assert len(verdict.plan.path_m) == len(verdict.plan.speed_mps) + 1 == verdict.end_step - verdict.last_step + 1
+    assert checked >= 2
+
+
+def _apart(states, verdict):
+    """Whether no third boat was inside when the plan began."""
+    begin = states[verdict.last_step]
+    others = np.delete(begin[:, :2], verdict.own, axis=0)
+    return np.hypot(*(others - begin[verdict.own, :2]).T).min() > RADIUS_M
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor"])
+def test_what_cannot_be_avoided_cannot_be_on_a_finer_search(name):
+    # one step after the last preventable moment nothing was found: nothing is found there by a finer search either
+    later = []
+    for seed in range(8):
+        states, rows, breaches = close_calls(name, seed, {"heron": 18.0, "surveyor": 25.0}[name])
+        if not breaches:
+            continue
+        step, a, b = (int(value) for value in breaches[0][:3])
+        coarse = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0))
+        fine = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0).refined())
+        later.append((fine.last_step or -1) - (coarse.last_step or -1))
+        assert (fine.outcome, abs(later[-1]) <= 2) == (coarse.outcome, True)
+    assert len(later) >= 2

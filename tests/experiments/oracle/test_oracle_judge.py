@@ -1,0 +1,176 @@
+"""What a verdict means: where the search may begin and end, third boats, and both sides."""
+
+import numpy as np
+import pytest
+from oracle_runs import DT_S, driven_track, first_breach, random_run, straight_track
+from steerclear.env.record import find_breaches
+from steerclear.experiments.oracle import Outcome, Responsible, Settings, judge, judge_breach, judge_breaches
+from steerclear.shield.platforms import fresh_state, get_platform
+
+RADIUS_M = 2.5
+HERON = get_platform("heron")
+
+
+def heron_towards(other, steps=200, start_m=(0.0, 0.0), speed_mps=2.0):
+    """A heron going straight north at full speed beside other rows; states and parameters."""
+    own = fresh_state(*start_m, 0.0, speed_mps)
+    own[4] = 100.0
+    rows = driven_track(HERON.pack(), own, [(speed_mps, 0.0)] * steps)
+    return np.stack([rows, *other], axis=1), np.array([HERON.pack()] * (1 + len(other)))
+
+
+def test_facts_of_a_verdict():
+    states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M)
+    assert (verdict.own, verdict.other, verdict.step, verdict.radius_m) == (0, 1, step, RADIUS_M)
+    assert verdict.looked_back_s == pytest.approx(step * DT_S)
+    assert verdict.last_preventable_s == pytest.approx((step - verdict.last_step) * DT_S)
+    assert verdict.plan.begin_step == verdict.last_step
+    assert verdict.plan.closest_m > RADIUS_M
+    gap_m = np.hypot(*(states[:, 0, :2] - states[:, 1, :2]).T)
+    assert verdict.end_step == step + int(np.argmax(gap_m[step:] > RADIUS_M)) + 50
+    assert 0 < verdict.searches < 40
+
+
+def test_avoidable_from_every_earlier_step():
+    states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
+    step = first_breach(states, RADIUS_M)
+    last = judge(states, rows, 0, step, RADIUS_M).last_step
+    for begin in (0, last - 20, last - 1, last):
+        cut = judge(states[begin:], rows, 0, step - begin, RADIUS_M)
+        assert cut.last_step == last - begin
+    gone = judge(states[last + 1 :], rows, 0, step - last - 1, RADIUS_M)
+    assert gone.outcome is Outcome.UNAVOIDABLE
+
+
+def test_look_back_limits_the_search():
+    states, rows = heron_towards([straight_track((0.0, 25.0), (0.0, 0.0), 200)])
+    step = first_breach(states, RADIUS_M)
+    lead_s = judge(states, rows, 0, step, RADIUS_M).last_preventable_s
+    short = judge(states, rows, 0, step, RADIUS_M, settings=Settings(look_back_s=lead_s - DT_S))
+    assert short.outcome is Outcome.UNAVOIDABLE
+    assert short.looked_back_s == pytest.approx(lead_s - DT_S)
+
+
+def test_a_third_boat_in_the_way_counts():
+    # walls of stopped boats left and right leave only the brake
+    wall = [straight_track((side * 2.6, 2.6 * k - 3.0), (0, 0), 200) for side in (-1, 1) for k in range(12)]
+    ahead = straight_track((0.0, 25.0), (0.0, 0.0), 200)
+    alone, rows = heron_towards([ahead])
+    walled, many = heron_towards([ahead, *wall])
+    step = first_breach(alone, RADIUS_M)
+    free = judge(alone, rows, 0, step, RADIUS_M)
+    held = judge(walled, many, 0, step, RADIUS_M, other=1)
+    assert held.last_preventable_s is None or held.last_preventable_s > free.last_preventable_s + 1.0
+
+
+def test_a_contact_under_way_with_a_third_boat_is_another_breach():
+    # boat 2 rides inside the radius all along: boat 1 must still be judged
+    ahead, rider = straight_track((0.0, 25.0), (0.0, 0.0), 120), straight_track((1.0, 0.0), (0.0, 2.0), 120)
+    states, rows = heron_towards([ahead, rider], steps=120)
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M, other=1)
+    assert verdict.outcome is Outcome.AVOIDABLE
+    assert np.hypot(*(verdict.plan.path_m - [0.0, 25.0]).T).min() > RADIUS_M
+
+
+def test_the_plan_keeps_clear_while_settling():
+    # beside the stopped boat 1 a second one waits where an early end of the search would send the boat
+    states, rows = heron_towards([straight_track((0.5, 25.0), (0, 0), 200), straight_track((-4.0, 28.0), (0, 0), 200)])
+    step = first_breach(states, RADIUS_M, (0, 1))
+    plan = judge(states, rows, 0, step, RADIUS_M, other=1).plan
+    for other in ((0.5, 25.0), (-4.0, 28.0)):
+        assert np.hypot(*(plan.path_m - other).T).min() > RADIUS_M
+
+
+def test_started_inside():
+    states, rows = heron_towards([straight_track((0.0, 1.0), (0.0, 0.0), 60)], steps=60)
+    both = judge_breach(states, rows, (0, 1), 1, RADIUS_M)
+    assert both.first.outcome is both.second.outcome is Outcome.STARTED_INSIDE
+    assert both.responsible is Responsible.START
+    assert both.responsible_boats() == ()
+
+
+def test_second_entry_is_judged_from_between_the_two():
+    own = straight_track((0.0, 0.0), (0.0, 0.0), 300)
+    away = np.concatenate([np.linspace(4, 1, 40), np.linspace(1, 6, 60), np.linspace(6, 1, 60), np.full(141, 1.0)])
+    other = straight_track((0.0, 0.0), (0.0, 0.0), 300)
+    other[:, 1] = away
+    states, rows = np.stack([own, other], axis=1), [HERON.pack()] * 2
+    steps = np.flatnonzero((away[1:] <= RADIUS_M) & (away[:-1] > RADIUS_M)) + 1
+    assert len(steps) == 2
+    verdict = judge(states, rows, 0, int(steps[1]), RADIUS_M)
+    assert verdict.outcome is Outcome.AVOIDABLE
+    assert verdict.last_step > steps[0] + 10
+
+
+def test_same_verdict_in_another_frame():
+    states, rows = random_run("heron", 2, 15.0, 200, seed=2, chasers=1)
+    step = first_breach(states, RADIUS_M)
+    turned = states.copy()
+    turned[:, :, 0], turned[:, :, 1] = states[:, :, 1] + 7.0, -states[:, :, 0] - 3.0
+    turned[:, :, 2] = (states[:, :, 2] + 90.0 + 180.0) % 360.0 - 180.0
+    here, there = (judge(s, rows, 0, step, RADIUS_M, other=1) for s in (states, turned))
+    assert here.outcome is there.outcome
+    assert abs(here.last_step - there.last_step) <= 1
+
+
+class TestSides:
+    """Who is responsible."""
+
+    def test_the_one_with_the_last_chance(self):
+        # the other cannot turn or brake: a point on a rail, so its last chance is none
+        states, rows = heron_towards([straight_track((0.0, 40.0), (0.0, -2.0), 150)], steps=150)
+        step = first_breach(states, RADIUS_M)
+        rail = get_platform("di").pack()
+        rail[[1, 7, 19]] = 2.0, 0.0, 0.0
+        states[:, 1, 2:4] = 180.0, 2.0
+        both = judge_breach(states, np.array([rows[0], rail]), (0, 1), step, RADIUS_M)
+        assert both.second.outcome is Outcome.UNAVOIDABLE
+        assert both.responsible is Responsible.FIRST
+        assert both.responsible_boats() == (0,)
+        assert both.of(1) is both.second
+        mirrored = judge_breach(states, np.array([rows[0], rail]), (1, 0), step, RADIUS_M)
+        assert mirrored.responsible is Responsible.SECOND
+        assert mirrored.responsible_boats() == (0,)
+
+    def test_both_of_a_symmetric_meeting_unless_driven(self):
+        steps = 150
+        first = fresh_state(0.0, 0.0, 0.0, 2.0)
+        second = fresh_state(0.0, 40.0, 180.0, 2.0)
+        first[4] = second[4] = 100.0
+        tracks = [driven_track(HERON.pack(), state, [(2.0, 0.0)] * steps) for state in (first, second)]
+        states, rows = np.stack(tracks, axis=1), np.array([HERON.pack()] * 2)
+        step = first_breach(states, RADIUS_M)
+        assert judge_breach(states, rows, (0, 1), step, RADIUS_M).responsible is Responsible.BOTH
+        driven = np.zeros((steps, 2), dtype=bool)
+        driven[:, 1] = True
+        assert judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven).responsible is Responsible.FIRST
+        driven[:, 0] = True
+        both = judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven)
+        assert (both.responsible, both.responsible_boats()) == (Responsible.GAME, ())
+
+    def test_neither(self):
+        rail = get_platform("di").pack()
+        rail[[1, 7, 19]] = 2.0, 0.0, 0.0
+        tracks = [straight_track((0, 0), (0, 2.0), 90), straight_track((0, 12.0), (0, -2.0), 90)]
+        states = np.stack(tracks, axis=1)
+        states[:, :, 3], states[:, 1, 2] = 2.0, 180.0
+        both = judge_breach(states, np.array([rail, rail]), (0, 1), first_breach(states, RADIUS_M), RADIUS_M)
+        assert both.responsible is Responsible.NEITHER
+
+    def test_many_at_once_say_how_far_they_are(self):
+        states, rows = random_run("heron", 4, 18.0, 300, seed=4, chasers=2)
+        breaches = find_breaches(states[:, :, :2], RADIUS_M)[:4]
+        seen = []
+        verdicts = judge_breaches(states, rows, breaches, RADIUS_M, progress=lambda *at: seen.append(at))
+        assert seen == [(k + 1, len(breaches)) for k in range(len(breaches))]
+        assert [(v.step, v.first.own, v.second.own) for v in verdicts] == [tuple(map(int, b[:3])) for b in breaches]
+        one = judge(states, rows, int(breaches[0][1]), int(breaches[0][0]), RADIUS_M, other=int(breaches[0][2]))
+        assert verdicts[0].first.last_step == one.last_step
+
+    def test_no_such_boat_in_the_pair(self):
+        states, rows = heron_towards([straight_track((0.0, 1.0), (0.0, 0.0), 60)], steps=60)
+        with pytest.raises(KeyError, match="not in the pair"):
+            judge_breach(states, rows, (0, 1), 1, RADIUS_M).of(2)

@@ -1,0 +1,150 @@
+"""Verdicts against limits known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from oracle_runs import DT_S, driven_track, first_breach, straight_track
+from steerclear.experiments.oracle import Boat, Outcome, judge
+from steerclear.shield.platforms import Platform, fresh_state, get_platform
+
+RADIUS_M = 2.5
+
+
+def straight_boat(top_mps, **changes):
+    """A double integrator without a rudder: it can only brake."""
+    return Platform("rail", "double_integrator", top_mps, **changes)
+
+
+def meeting(platform, start_m, speed_mps, other, steps=150):
+    """States of a boat going straight north beside another boat's rows; the boats' parameters."""
+    own = fresh_state(*start_m, 0.0, speed_mps)
+    rows = driven_track(platform.pack(), own, [(speed_mps, 0.0)] * steps)
+    return np.stack([rows, other], axis=1), np.array([platform.pack()] * 2)
+
+
+@pytest.mark.parametrize("speed_mps", [1.0, 2.0, 3.0, 5.0])
+@pytest.mark.parametrize("max_acc", [0.5, 1.0])
+def test_last_stop_before_a_stopped_boat(speed_mps, max_acc):
+    # braking v -> 0 with trapezoid steps takes exactly v^2 / 2a when v is a whole number of steps
+    platform = straight_boat(10.0, max_acc=max_acc)
+    states, rows = meeting(platform, (0.0, 0.0), speed_mps, straight_track((0.0, 40.0), (0.0, 0.0), 400), steps=400)
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M)
+    gap_m = 40.0 - states[:step, 0, 1]
+    last = int(np.flatnonzero(gap_m - speed_mps**2 / (2 * max_acc) > RADIUS_M + 1e-8)[-1])
+    assert verdict.outcome is Outcome.AVOIDABLE
+    assert verdict.last_step == last
+    assert verdict.last_preventable_s == pytest.approx((step - last) * DT_S)
+
+
+@pytest.mark.parametrize("closing_mps", [1.0, 2.5])
+def test_last_stop_head_on_with_a_boat_that_stops_too(closing_mps):
+    # the other brakes from the record's start at 0.25 m/s2; ours must then stop short of where it ends
+    platform = straight_boat(10.0, max_acc=1.0)
+    other = driven_track(
+        straight_boat(10.0, max_acc=0.25).pack(), fresh_state(0, 60.0, 180.0, closing_mps), [(0, 0)] * 400
+    )
+    states, rows = meeting(platform, (0.0, 0.0), 2.0, other, steps=400)
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M)
+    stops_at_m = states[:step, 0, 1] + 2.0**2 / 2.0
+    assert other[-1, 3] == 0.0
+    assert verdict.last_step == int(np.flatnonzero(other[-1, 1] - stops_at_m > RADIUS_M + 1e-8)[-1])
+
+
+@pytest.mark.parametrize("distance_m", [2.501, 2.52, 2.58])
+def test_single_integrator_stops_at_once(distance_m):
+    # set to 0, it still moves with the mean of old and new speed for one step: 0.15 m here
+    platform = Platform("si", "single_integrator", 3.0, max_turn_rate_dps=0.0)
+    speed_mps, ahead_m = 3.0, distance_m + 6.0 + 0.15
+    states, rows = meeting(platform, (0.0, 0.0), speed_mps, straight_track((0.0, ahead_m), (0.0, 0.0), 150))
+    verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
+    assert verdict.last_step == 20
+    assert verdict.plan.closest_m == pytest.approx(distance_m, abs=1e-6)
+
+
+def test_single_integrator_against_a_faster_boat_from_behind():
+    # it can speed up only to its top speed, and has no rudder: nothing helps but starting ahead
+    platform = Platform("si", "single_integrator", 2.0, max_turn_rate_dps=0.0)
+    states, rows = meeting(platform, (0.0, 0.0), 2.0, straight_track((0.0, -20.0), (0.0, 4.0), 150))
+    verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
+    assert verdict.outcome is Outcome.UNAVOIDABLE
+    assert verdict.exhausted
+    assert verdict.plan is None
+    assert verdict.last_preventable_s is None
+
+
+def dubins(speed_mps, turn_dps):
+    """A boat of constant speed whose turn rate obeys at once within its bound."""
+    return Platform(
+        "dubins", "double_integrator", speed_mps, max_turn_rate_dps=turn_dps, max_angular_acc_dps2=1e6, max_acc=0.0
+    )
+
+
+@pytest.mark.parametrize(("speed_mps", "turn_dps"), [(2.0, 30.0), (3.0, 20.0), (1.0, 10.0)])
+@pytest.mark.parametrize("offset_m", [0.0, 0.8, 2.0])
+def test_turning_circle_past_a_stopped_boat(speed_mps, turn_dps, offset_m):
+    # the turning circle (radius R, centre R to the side) must stay outside the disc: d^2 + (R + b)^2 >= (R + r)^2
+    circle_m = speed_mps / math.radians(turn_dps)
+    other = straight_track((-offset_m, 25.0), (0.0, 0.0), 350)
+    states, rows = meeting(dubins(speed_mps, turn_dps), (0.0, 0.0), speed_mps, other, steps=350)
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M)
+    needed_m = math.sqrt((circle_m + RADIUS_M) ** 2 - (circle_m + offset_m) ** 2)
+    left_m = 25.0 - states[verdict.last_step, 0, 1]
+    assert verdict.exhausted
+    assert needed_m - 0.05 * speed_mps <= left_m <= needed_m + 1.2 * speed_mps * DT_S
+
+
+@pytest.mark.parametrize("mover_mps", [(0.0, -2.0), (0.0, 1.0), (1.5, 0.0), (-1.0, -1.0)])
+def test_constant_speed_evader_against_a_straight_mover(mover_mps):
+    # the extremals of this game turn hard one way and then run straight: the best over all lengths of the turn
+    speed_mps, turn_dps = 2.0, 30.0
+    meet_m = np.array([0.0, 20.0])
+    start = meet_m - np.array(mover_mps) * 10.0
+    other = straight_track(start, mover_mps, 200)
+    states, rows = meeting(dubins(speed_mps, turn_dps), (0.0, 0.0), speed_mps, other, steps=200)
+    step = first_breach(states, RADIUS_M)
+    verdict = judge(states, rows, 0, step, RADIUS_M)
+    clear = [
+        turn_then_straight(states[k, 0], other[k : verdict.end_step + 1, :2], speed_mps, turn_dps) for k in range(step)
+    ]
+    last = int(np.flatnonzero(np.array(clear) > RADIUS_M)[-1])
+    assert verdict.outcome is Outcome.AVOIDABLE
+    assert last <= verdict.last_step <= last + 1
+
+
+def turn_then_straight(row, track, speed_mps, turn_dps):
+    """Largest closest distance over all turns one way followed by straight running, in exact arcs."""
+    time_s = np.arange(len(track)) * DT_S
+    best = 0.0
+    for side in (-1.0, 1.0):
+        rate = math.radians(side * turn_dps)
+        for turning_s in np.arange(0.0, 9.0, 0.05):
+            angle = math.radians(row[2]) + rate * np.minimum(time_s, turning_s)
+            arc = np.minimum(time_s, turning_s)
+            east = speed_mps / rate * (np.cos(math.radians(row[2])) - np.cos(math.radians(row[2]) + rate * arc))
+            north = speed_mps / rate * (np.sin(math.radians(row[2]) + rate * arc) - np.sin(math.radians(row[2])))
+            run = speed_mps * np.maximum(0.0, time_s - turning_s)
+            path = row[:2] + np.stack([east + run * np.sin(angle), north + run * np.cos(angle)], axis=1)
+            best = max(best, float(np.hypot(*(path - track).T)[1:].min()))
+    return best
+
+
+def test_heron_without_thrust_cannot_save_itself():
+    # it drifts at 1 m/s with no thrust: the rudder needs thrust, which needs time
+    heron = get_platform("heron")
+    own = fresh_state(0.0, 0.0, 0.0, 1.0)
+    rows = driven_track(heron.pack(), own, [(0.0, 0.0)] * 60)
+    states = np.stack([rows, straight_track((0.0, 2.6), (0.0, 0.0), 60)], axis=1)
+    verdict = judge(states, [heron.pack()] * 2, 0, first_breach(states, RADIUS_M), RADIUS_M)
+    assert verdict.outcome is Outcome.UNAVOIDABLE
+    assert verdict.exhausted
+
+
+def test_boats_given_by_name_of_parameters():
+    own = Boat("single_integrator", 3.0, max_turn_dps=90.0)
+    states = np.stack([straight_track((0, 0), (0, 3.0), 60), straight_track((0, 9.0), (0, 0), 60)], axis=1)
+    states[:, 0, 3] = 3.0
+    assert judge(states, [own, own], 0, first_breach(states, RADIUS_M), RADIUS_M).outcome is Outcome.AVOIDABLE
