@@ -90,7 +90,7 @@ class BatchedShield:
         self._fixed = surroundings.pack(config)
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
-        self._work = new_work(n, int(self._boats.samples.max()))
+        self._work = new_work(n, int(self._boats.hunt_samples.max()))
         self._plan = new_plan(n, n * (n + 5) + 2)
         self._margin = np.full(n, config.position_error_m)
         self.reason = np.zeros((games, n), np.int64)

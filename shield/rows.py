@@ -65,7 +65,7 @@ def _add_effect(
     r: int,
     i: int,
     sign: float,
-    k: int,
+    at: float,
     nx: float,
     ny: float,
     path: Array,
@@ -74,7 +74,11 @@ def _add_effect(
     work: Work,
 ) -> None:
     """Add boat i's share to row r; ``gain`` holds d(psi)/d(z_t) in rad and d(v)/d(z_s) in m/s."""
-    rx, ry = path[k, 0] - work.next_state[i, L.X], path[k, 1] - work.next_state[i, L.Y]
+    k = min(int(at), path.shape[0] - 2)
+    part = min(1.0, at - k)
+    x = path[k, 0] + part * (path[k + 1, 0] - path[k, 0])
+    y = path[k, 1] + part * (path[k + 1, 1] - path[k, 1])
+    rx, ry = x - work.next_state[i, L.X], y - work.next_state[i, L.Y]
     C[r, first] += sign * (nx * ry - ny * rx) * gain[i, 0]
     speed = max(work.next_state[i, L.SPEED], SLOW_MPS)
     C[r, first + 1] += sign * (nx * rx + ny * ry) / speed * gain[i, 1]
@@ -155,7 +159,7 @@ def _pair_row(
         clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR, tuning.margin_cap_m)
         if work.out[MARGIN] > work.spare2[MARGIN]:
             work.out[:] = work.spare2
-    k, nx, ny = int(work.out[SAMPLE]), work.out[NORMAL_X], work.out[NORMAL_Y]
+    k, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
     lack = work.target[i] + AIM_M - work.out[MARGIN]
     C[r, :] = 0.0
     _add_effect(C, r, i, 1.0, k, nx, ny, work.path[i], 2 * m, gain, work)
@@ -240,7 +244,7 @@ def build_rows(
         )
         if work.out[MARGIN] < FAR:
             C[r, :] = 0.0
-            k = int(work.out[SAMPLE])
+            k = work.out[SAMPLE]
             _add_effect(C, r, i, 1.0, k, work.out[NORMAL_X], work.out[NORMAL_Y], work.path[i], 2 * m, gain, work)
             lack = AIM_M - work.out[MARGIN]
             if not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now):

@@ -25,7 +25,11 @@ class Boats(NamedTuple):
         granted_turn_dps: turn rate granted to each boat as an opponent at its top speed, (n,).
         granted_acc_mps2: acceleration granted to each boat as an opponent, (n,).
         samples: path samples of each boat's horizon, (n,).
+        hunt_samples: path samples over which hunting opponents are followed, (n,), at least ``samples``.
+        fade: factor of negative margins against hunters per path sample, (n,).
         static_samples: samples over which fixed things are looked at, (n,).
+        stride: model steps between path samples.
+        sample_s: time between path samples, s.
     """
 
     params: Array
@@ -34,7 +38,11 @@ class Boats(NamedTuple):
     granted_turn_dps: Array
     granted_acc_mps2: Array
     samples: IntArray
+    hunt_samples: IntArray
+    fade: Array
     static_samples: IntArray
+    stride: int
+    sample_s: float
 
 
 class Fixed(NamedTuple):
@@ -112,6 +120,7 @@ class Work(NamedTuple):
         target: (n,) margin the boat must keep, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
+        hunted: (n,) whether some opponent that may hunt the boat is near.
         breach: (n, n) pairs inside the separation.
         radius: (n, n) radius to keep, m.
         course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
@@ -130,6 +139,7 @@ class Work(NamedTuple):
     target: Array
     bound: IntArray
     near: BoolArray
+    hunted: BoolArray
     breach: BoolArray
     radius: Array
     course: Array
@@ -157,6 +167,7 @@ def new_work(boats: int, samples: int) -> Work:
         target=np.zeros(boats),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
+        hunted=np.zeros(boats, np.bool_),
         breach=np.zeros((boats, boats), np.bool_),
         radius=np.zeros((boats, boats)),
         course=np.zeros((boats, 4)),

@@ -130,7 +130,7 @@ class Shield:
             n = len(fleet)
             seats = 1 if self.config.coordination == "team" else n
             rows = min(n * (n + 5) + 2, MOST_ROWS)
-            samples = int(self._boats.samples.max(initial=1))
+            samples = int(self._boats.hunt_samples.max(initial=1))
             self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
             self._key, self._sent = key, None
         return self._boats

@@ -65,6 +65,12 @@ def candidate(
 
 
 @kernel
+def hysteresis(merit: float, tuning: Tuning) -> float:
+    """Merit by which another manoeuvre must beat the one under way, in the units of its level."""
+    return tuning.hysteresis_m if merit < FIXED_LOST else 1e-3 * tuning.hysteresis_m
+
+
+@kernel
 def choose_plan(
     i: int,
     wanted_mps: float,
@@ -90,10 +96,11 @@ def choose_plan(
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
-        bonus = tuning.hysteresis_m if p == 0 and memory.escaping[i] else 0.0
         lay_path(i, trial, side, togo, speed, done, state, boats, tuning, work)
-        merit = rate_path(i, trial, best - bonus, state, ours, boats, fixed, tuning, work)
-        kept_merit = merit + (bonus if merit < FIXED_LOST else 1e-3 * bonus)
+        merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
+        kept_merit = merit
+        if p == 0 and memory.escaping[i]:
+            kept_merit += hysteresis(merit, tuning)
         if kept_merit > best:
             best = kept_merit
             _take(i, trial, merit, work)

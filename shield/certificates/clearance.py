@@ -1,7 +1,7 @@
 """How near two boats come along sampled paths, and what a neighbour may do meanwhile.
 
-A result is the row ``(margin, sample, nx, ny)``: least distance minus radius in m, the sample at the end of the
-segment where it occurs, and the unit vector from the neighbour to the boat there.
+A result is the row ``(margin, sample, nx, ny)``: least distance minus radius in m, the sample (with the fraction of
+the way to the next) where it occurs, and the unit vector from the neighbour to the boat there.
 """
 
 from __future__ import annotations
@@ -34,9 +34,46 @@ def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k
     x, y = x0 + part * dx, y0 + part * dy
     square = x * x + y * y
     if square < best:
-        out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = k, x, y
+        out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = k - 1.0 + part, x, y
         return square
     return best
+
+
+@kernel
+def _note_faded(
+    out: Array,
+    worst: float,
+    weight: float,
+    radius_m: float,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    k: int,
+    span: int,
+) -> float:
+    """Least margin over a straight segment, weighted when negative; noted in ``out`` when below ``worst``."""
+    limit = radius_m + (worst if worst >= 0.0 else worst / weight)
+    if limit <= 0.0:
+        return worst
+    dx, dy = x1 - x0, y1 - y0
+    length = dx * dx + dy * dy
+    part = 0.0
+    if length > 0.0:
+        part = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / length))
+    x, y = x0 + part * dx, y0 + part * dy
+    square = x * x + y * y
+    if square >= limit * limit:
+        return worst
+    distance = math.sqrt(square)
+    margin = distance - radius_m
+    worst = margin if margin >= 0.0 else margin * weight
+    out[MARGIN], out[SAMPLE] = worst, k - span * (1.0 - part)
+    if distance > 1e-9:
+        out[NORMAL_X], out[NORMAL_Y] = x / distance, y / distance
+    else:
+        out[NORMAL_X], out[NORMAL_Y] = 1.0, 0.0
+    return worst
 
 
 @kernel
@@ -171,11 +208,15 @@ def clear_of_pursuer(
     samples: int,
     closing_m: float,
     radius_m: float,
+    fade: float,
     floor_m: float,
     cap_m: float,
     out: Array,
 ) -> None:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
+
+    Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
+    for hunters rarely play as well as they are granted to.
 
     Args:
         own: the boat's path, m.
@@ -192,16 +233,16 @@ def clear_of_pursuer(
         samples: last sample.
         closing_m: most the distance can shrink per sample, m.
         radius_m: radius to keep, m.
+        fade: factor of negative margins per sample, 0 to 1.
         floor_m: margin below which the search stops, m.
         cap_m: margin above which nothing is looked at closely, m.
         out: the result row.
     """
     root = radius_m + cap_m
-    best = root * root
+    worst = cap_m
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
-    stop = max(0.0, floor_m + radius_m)
-    stop *= stop
-    out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = samples, 0.0, 0.0
+    weight = 1.0
+    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = cap_m, samples, 1.0, 0.0
     c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
     x0, y0 = own[0, 0] - x, own[0, 1] - y
     k = 0
@@ -238,8 +279,9 @@ def clear_of_pursuer(
         x += way * ux
         y += way * uy
         x1, y1 = own[k, 0] - x, own[k, 1] - y
-        best = _note(out, best, x0, y0, x1, y1, k)
-        if best < stop:
-            break
+        for _ in range(stride):
+            weight *= fade
+        worst = _note_faded(out, worst, weight, radius_m, x0, y0, x1, y1, k, stride)
+        if worst < floor_m:
+            return
         x0, y0 = x1, y1
-    _finish(out, best, radius_m)

@@ -12,13 +12,16 @@ import numpy as np
 
 from ..jit import Array
 from ..platforms import Platform
-from ..platforms.limits import limits_of
+from ..platforms.limits import Limits, limits_of
 from .assign import COMMANDED
 
 TURNS_DEG = (30.0, 60.0, 90.0, 120.0, 150.0, 180.0)
 
 REACTION_S = 4.0
 """Time beyond a half turn over which a turning escape is followed, s."""
+
+LONGEST_HUNT_S = 60.0
+"""Longest time over which a hunting opponent is followed, s."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,11 @@ class Certificate:
         """Time over which the manoeuvres are followed, s."""
         limits = limits_of(platform, dt_s)
         return limits.stop_s + 1.0 if self.braking else limits.half_turn_s + REACTION_S
+
+    def hunt_s(self, limits: Limits) -> float:
+        """Time over which hunting opponents are followed, s: a boat outruns them only once it is up to speed again."""
+        regain_s = limits.top_speed_mps / max(limits.acceleration_mps2, 1e-6)
+        return min(LONGEST_HUNT_S, limits.half_turn_s + REACTION_S + regain_s)
 
 
 def _turning_family() -> Array:

@@ -18,7 +18,7 @@ from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course, clear_of_pursuer
-from .paths import STRIDE, trace_path
+from .paths import trace_path
 from .surroundings import clear_of_surroundings
 
 PAIR_SAFE = 1e3
@@ -57,6 +57,7 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
     """
     n = state.shape[0]
     for i in range(n):
+        work.hunted[i] = False
         heading = math.radians(state[i, L.HEADING])
         ux, uy = math.sin(heading), math.cos(heading)
         way = state[i, L.SPEED] * tuning.dt_s
@@ -65,7 +66,10 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
         top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
         for j in range(i):
             top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
-            horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * STRIDE * tuning.dt_s + tuning.tail_s
+            samples = max(boats.samples[i], boats.samples[j])
+            if boats.team[i] != boats.team[j]:
+                samples = max(samples, max(boats.hunt_samples[i], boats.hunt_samples[j]))
+            horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
             radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
             square = dx * dx + dy * dy
@@ -73,6 +77,9 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
             hit = square <= reach * reach
             work.near[i, j], work.near[j, i] = hit, hit
             if hit:
+                if boats.team[i] != boats.team[j]:
+                    work.hunted[i] = work.hunted[i] or boats.granted_turn_dps[j] > 0.0
+                    work.hunted[j] = work.hunted[j] or boats.granted_turn_dps[i] > 0.0
                 least = radius - tuning.buffer_m
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least
@@ -86,7 +93,7 @@ def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float
     """Most the distance of a pair can shrink from sample to sample, m."""
     top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
     top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
-    return (top_i + top_j) * STRIDE * tuning.dt_s
+    return (top_i + top_j) * boats.sample_s
 
 
 @kernel
@@ -94,7 +101,7 @@ def clear_of_opponent(
     i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
 ) -> None:
     """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
-    sample_s = STRIDE * tuning.dt_s
+    sample_s = boats.sample_s
     course = work.course[j]
     way = state[j, L.SPEED] * sample_s
     clear_of_course(
@@ -116,13 +123,21 @@ def clear_of_opponent(
 
 @kernel
 def clear_of_hunter(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+    cap_m: float,
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
     The worse of two hunters: one steers at the boat, one for the meeting point.
     """
-    sample_s = STRIDE * tuning.dt_s
+    sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
     course = work.course[j]
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, SLOWEST))
@@ -140,9 +155,10 @@ def clear_of_hunter(
             turn,
             lead == 1,
             sample_s,
-            boats.samples[i],
+            boats.hunt_samples[i],
             closing(i, j, state, boats, tuning),
             work.radius[i, j],
+            boats.fade[i],
             floor_m,
             cap_m,
             work.spare,
@@ -158,7 +174,7 @@ def _rank_recovery(
     i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work
 ) -> None:
     """In breach no margin is left to compare: rank by not closing further and by the distance soon after."""
-    sample_s = STRIDE * tuning.dt_s
+    sample_s = boats.sample_s
     k = min(boats.samples[i], max(1, int(RECOVERY_S / sample_s)))
     if ours[j]:
         x, y = work.path[j, k, 0], work.path[j, k, 1]
@@ -190,7 +206,7 @@ def clear_of_boat(
         floor, cap = -FAR, FAR
     if ours[j]:
         samples = min(boats.samples[i], boats.samples[j])
-        tail = tuning.tail_s / (STRIDE * tuning.dt_s)
+        tail = tuning.tail_s / boats.sample_s
         clear_of_course(
             path,
             work.path[j],
@@ -338,4 +354,5 @@ def lay_path(
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
     path = work.path[slot]
     work.row[:] = work.next_state[i] if done == 1 else state[i]
-    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.samples[i], path)
+    samples = boats.hunt_samples[i] if work.hunted[i] else boats.samples[i]
+    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)

@@ -1,6 +1,6 @@
 """Where a boat goes under an escape manoeuvre: turn to one side at full rudder, then straight, at a set speed.
 
-Paths are sampled every ``STRIDE`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
+Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
 candidate command, or after the manoeuvre's own first step.
 """
 
@@ -13,8 +13,8 @@ from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 
-STRIDE = 2
-"""Model steps between samples of a path."""
+SAG_M = 0.022
+"""Most a straight line between two samples may cut off the arc sailed between them, m."""
 
 STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
@@ -49,6 +49,7 @@ def trace_path(
     speed_mps: float,
     dt_s: float,
     done: int,
+    stride: int,
     samples: int,
     path: Array,
 ) -> None:
@@ -62,11 +63,12 @@ def trace_path(
         speed_mps: speed commanded throughout, m/s.
         dt_s: model step, s.
         done: 1 when ``row`` is the state one step from now, 0 when it is the present one.
+        stride: model steps between samples.
         samples: number of samples after sample 0.
         path: shape (>= samples + 1, 2), float64.
     """
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
-        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, samples, path)
+        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, path)
         return
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
@@ -76,7 +78,7 @@ def trace_path(
     while k <= samples:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
-        if step % STRIDE == 0:
+        if step % stride == 0:
             path[k, 0], path[k, 1] = row[L.X], row[L.Y]
             k += 1
 
@@ -90,6 +92,7 @@ def _trace_usv(
     speed_mps: float,
     dt_s: float,
     done: int,
+    stride: int,
     samples: int,
     path: Array,
 ) -> None:
@@ -135,18 +138,20 @@ def _trace_usv(
         change = abs(mean - v) + abs(thrust - last)
         v = min(max(mean, 0.0), top)
         step += 1
-        if step % STRIDE == 0:
+        if step % stride == 0:
             path[k, 0], path[k, 1] = x, y
             k += 1
         if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and k > 0:
-            _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, samples, path)
+            _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, samples, path)
             return
 
 
 @kernel
-def _run_on(x: float, y: float, dx: float, dy: float, step: int, k: int, samples: int, path: Array) -> None:
+def _run_on(
+    x: float, y: float, dx: float, dy: float, step: int, k: int, stride: int, samples: int, path: Array
+) -> None:
     """Fill the rest of a path with equal steps: a steady straight run needs no model."""
     while k <= samples:
-        ahead = k * STRIDE - step
+        ahead = k * stride - step
         path[k, 0], path[k, 1] = x + ahead * dx, y + ahead * dy
         k += 1

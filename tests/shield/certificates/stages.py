@@ -37,7 +37,7 @@ def stages_of(config, state, platforms, team, surroundings=None):
         plans_of(config),
         tuning_of(config),
         new_memory(n),
-        new_work(n, int(boats.samples.max())),
+        new_work(n, int(boats.hunt_samples.max())),
         flow.new_plan(n, n * (n + 5) + 2),
     )
 
