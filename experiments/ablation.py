@@ -10,7 +10,7 @@ import numpy as np
 
 from .score import DEFAULT_PENALTY
 from .spec import SIDES, MatchSpec
-from .statistics import paired_ratio
+from .statistics import count_interval, paired_ratio
 from .summary import Row, by_game, summarise
 from .tally import RADII_M, breach_column
 
@@ -43,6 +43,7 @@ class AblationSettings:
     rules: Mapping[str, Any] = field(default_factory=dict)
     fixed_start: bool = False
     penalty: float = DEFAULT_PENALTY
+    judge: str = "shielded"
 
     @property
     def separation_m(self) -> float:
@@ -77,6 +78,7 @@ class AblationSettings:
             fixed_start=self.fixed_start,
             penalty=self.penalty,
             radii_m=self.radii_m,
+            judge=self.judge,
         )
 
 
@@ -106,10 +108,23 @@ def ablation_bars(rows: Sequence[Row], separation_m: float) -> list[dict[str, An
     hits = sum(int(on[teammate]) for _, on in pairs)
     zero = {"value": float(hits), "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": hits == 0}
     return [
+        *_avoidable_bar(rows, separation_m),
         {"name": f"hits with team-mates at {separation_m:g} m, shielded, all games", **zero},
         {"name": f"hits with opponents at {separation_m:g} m, on / off", **_ratio(pairs, opponent, "<=", 0.1)},
         {"name": "captures, on / off", **_ratio(pairs, "captures", ">=", 0.9)},
     ]
+
+
+def _avoidable_bar(rows: Sequence[Row], separation_m: float) -> list[dict[str, Any]]:
+    """Judge the shielded games that the oracle judged; no bar without any."""
+    judged = [row for row in rows if row["shielded"] and row.get("breaches") is not None]
+    if not judged:
+        return []
+    found = sum(breach["verdict"] == "avoidable" for row in judged for breach in row["breaches"])
+    rate = count_interval(found, len(judged))
+    name = f"avoidable hits at {separation_m:g} m, shielded, per game"
+    limits = {"value": rate.value, "low": rate.low, "high": rate.high}
+    return [{"name": name, **limits, "sense": "<=", "limit": 0.0, "met": found == 0}]
 
 
 def most_instructive(rows: Sequence[Row], separation_m: float) -> tuple[Row, Row] | None:

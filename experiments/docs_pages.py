@@ -13,6 +13,7 @@ from .docs_plots import plot_off_on
 from .keys import KEYS
 from .tables import interval_text, number_text
 from .tally import RADII_M, breach_column
+from .verdicts import HEADS, verdict_rows
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
@@ -74,6 +75,8 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     lines += [f"![off and on]({path.name})\n" for path in plots]
     for summary in content["pairings"]:
         lines += [f"## {summary['pairing']}", "", *_metrics_table(summary), ""]
+        if summary.get("verdicts"):
+            lines += ["Breaches judged in hindsight:", "", *_markdown(HEADS, _verdicts(summary)), ""]
         if summary["reasons"]:
             lines += [_reasons_line(summary["reasons"]), ""]
     if content["bars"]:
@@ -124,6 +127,10 @@ def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
         for figures in summary["metrics"].values()
     ]
     return _markdown(["", *(head for _, head in present)], rows)
+
+
+def _verdicts(summary: Mapping[str, Any]) -> list[list[str]]:
+    return verdict_rows(summary["verdicts"], interval_text)
 
 
 def _bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -10,6 +10,21 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+BREACH = {
+    "step": "first step inside the radius",
+    "time_s": "the same as game time, s",
+    "boats[]": "the two boats",
+    "kind": "teammate or opponent",
+    "radius_m": "separation radius, m",
+    "closest_m": "closest distance until they were apart again, m",
+    "verdict": "avoidable, unavoidable, started_inside or not_judged; of team-mates, whether either could",
+    "last_preventable_s": "last moment at which own commands could still prevent it, s before; null when never",
+    "other_last_preventable_s": "the same of the opponent's boat; null for team-mates",
+    "exhausted": "whether the search that found no later way kept every state it reached at its resolution",
+    "responsible": "who let the later last moment pass: own, opponent, both, game (it drove the boat), neither, start",
+    "responsible_boats[]": "those boats",
+}
+
 GAME_COLUMNS = {
     "pairing": "own policy vs opponent policy",
     "game": "number within the pairing; the same number off and on starts from the same seed",
@@ -49,10 +64,24 @@ GAME_COLUMNS = {
     "first_failure": "text of the first of them",
     "primary": "captures - captures_against - penalty * collisions",
     "secondary": "grabs + tags - grabs_against - tags_against",
-    "wall_s": "time it took to play, s",
+    "avoidable_*": "breaches of that kind and radius that own commands could have avoided; null when not judged",
+    "unavoidable_*": "breaches that no own command of the last 30 s could have avoided",
+    "started_inside_*": "breaches of a pair that was inside when the game began",
+    "not_judged_*": "breaches beyond the 500 of a game that are judged",
+    "breaches": "every breach at the shield's radius with its verdict (see breaches[] of ablate); null when not judged",
+    **{f"breaches[].{name}": words for name, words in BREACH.items()},
+    "wall_s": "time it took to play and judge, s",
 }
 
 _FIGURE = {"value": "figure", "low": "lower 95 % limit", "high": "upper 95 % limit"}
+_VERDICTS = {
+    "breaches": "breaches of team-mates or with opponents at the shield's radius, judged games",
+    "avoidable": "of those avoidable",
+    "unavoidable": "of those unavoidable",
+    "started_inside": "of those between boats that started inside",
+    "not_judged": "of those beyond what is judged in a game",
+    "avoidable_per_game": "null when no game was judged",
+}
 _BAR = {
     "name": "what is judged",
     "value": "measured",
@@ -86,12 +115,21 @@ RESULTS = {
     "pairings[].games_off": "games without shield",
     "pairings[].games_on": "games with shield",
     "pairings[].policy_failures": "failures of the own policy in all games",
+    "pairings[].verdicts.*.games": "games, shield off or on",
+    "pairings[].verdicts.*.games_judged": "of those, games whose breaches were judged",
+    **{f"pairings[].verdicts.*.*.{k}": v for k, v in _VERDICTS.items()},
+    **{f"pairings[].verdicts.*.*.avoidable_per_game.{k}": f"{v}, judged games" for k, v in _FIGURE.items()},
+    "pairings[].verdicts.*.*.responsible.*": "breaches for which that side is responsible",
     "pairings[].reasons.*": "boat-steps per reason, all shielded games",
     "pairings[].metrics.*.label": "words of the tables",
     **{f"pairings[].metrics.*.off.{k}": f"{v}, shield off, per game" for k, v in _FIGURE.items()},
     **{f"pairings[].metrics.*.on.{k}": f"{v}, shield on, per game" for k, v in _FIGURE.items()},
     **{f"pairings[].metrics.*.difference.{k}": f"{v}, mean of on - off, paired" for k, v in _FIGURE.items()},
     **{f"bars[].{k}": v for k, v in _BAR.items()},
+    "breaches[].pairing": "pairing of the game",
+    "breaches[].game": "its number",
+    "breaches[].shielded": "whether its own team had a shield",
+    **{f"breaches[].{name}": words for name, words in BREACH.items()},
     "replay.pairing": "pairing of the game in replay.html: the one with the most breaches without shield",
     "replay.game": "its number",
     "replay.breaches_off": "its breaches without shield",

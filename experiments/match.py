@@ -16,12 +16,14 @@ from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
+from .judging import StateLog, judge_game
 from .openings import opening
 from .score import scores
 from .seat import Failures, Seat
 from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
 from .tally import reason_counts, tally
+from .verdicts import verdict_columns
 
 Watcher = Callable[[MctfEnv], bool]
 """Called after every step with the env; False ends the game early (a closed window)."""
@@ -68,6 +70,7 @@ class Match:
             for k, name in enumerate(names)
         ]
         self._recorder = GameRecorder()
+        self._log = StateLog() if spec.judged else None
         self._decision_us: list[float] = []
         self._moment: tuple[Array, Array, Seen] | None = None
 
@@ -102,6 +105,8 @@ class Match:
             team.reset(self.shielding.env, 2 * spec.seed + number)
         meta = self._meta()
         self._recorder.start(self.env.view(), meta)
+        if self._log is not None:
+            self._log.start(self.env.core)
         if self.env.renderer is not None:
             self.env.renderer.describe(meta)
             self.env.renderer.speedup = self.speedup
@@ -139,6 +144,8 @@ class Match:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
         self._recorder.step(self.env.view(), wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        if self._log is not None:
+            self._log.step(self.env.core)
         if seen.solve_time_s is not None:
             self._decision_us.append(1e6 * seen.solve_time_s)
 
@@ -158,6 +165,7 @@ class Match:
             **self._decision_columns(),
             **{f"reason_{name}": count for name, count in reason_counts(record, spec.own_team).items()},
             **_failure_columns(own, opponent),
+            **self._verdict_columns(record),
             "wall_s": wall_s,
         }
 
@@ -179,6 +187,12 @@ class Match:
             for name in ("captures", "grabs", "tags")
             for suffix, team in (("", own), ("_against", 1 - own))
         }
+
+    def _verdict_columns(self, record: Record) -> dict[str, Any]:
+        breaches = None
+        if self._log is not None:
+            breaches = judge_game(self._log, self.env.core.params, record, self.spec.own_team)
+        return {**verdict_columns(breaches, self.shielding.separation_m), "breaches": breaches}
 
     def _decision_columns(self) -> dict[str, float | None]:
         timed = self._decision_us[1:]  # the first one loads compiled code

@@ -12,6 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from .page import as_text, fill, template, write_page
 from .report_parts import bars_table, games_table, headlines, legend, pairing_tables, replay_links, values_table
 from .report_plots import closest_plot, figure_plot, reason_plot
+from .report_verdicts import breaches_table, verdict_tables
 from .tally import RADII_M, breach_column
 
 REQUIRED = ("settings", "versions", "pairings", "games")
@@ -49,6 +50,8 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         "REPLAYS": replay_links(replays),
         "PLOTS": _plots(results, separation_m),
         "PAIRINGS": pairing_tables(results["pairings"]),
+        "VERDICTS": verdict_tables(results["pairings"]),
+        "BREACHES": breaches_table(results.get("breaches") or ()),
         "SETTINGS": values_table(results["settings"]),
         "VERSIONS": values_table({**results["versions"], **(results.get("machine") or {})}),
         "GAMES": games_table(results["games"]),

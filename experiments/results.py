@@ -18,6 +18,7 @@ from .spec import MatchSpec
 from .store import write_json, write_table
 from .summary import Row
 from .tally import breach_column
+from .verdicts import all_breaches, without_breaches
 
 NAMES = {"games": "games", "replay": "replay.html", "report": "report.html", "results": "results.json"}
 
@@ -49,6 +50,7 @@ def results_of(
         "failed": played.failed,
         "pairings": summaries(played.rows, settings),
         "bars": ablation_bars(played.rows, settings.separation_m),
+        "breaches": all_breaches(played.rows),
     }
 
 
@@ -64,13 +66,14 @@ def write_results(folder: Path, results: dict[str, Any], rows: Sequence[Row], re
     Returns:
         The path of results.json.
     """
-    files = {"results": NAMES["results"], "games": write_table(folder, rows, NAMES["games"]).name}
+    flat = without_breaches(rows)
+    files = {"results": NAMES["results"], "games": write_table(folder, flat, NAMES["games"]).name}
     results["files"] = files
     links = []
     if records:
         files["replay"] = write_replay(records, folder / NAMES["replay"]).name
         links = [{"label": _replay_label(results["replay"]), "path": files["replay"]}]
-    files["report"] = write_report({**results, "games": rows, "replays": links}, folder / NAMES["report"]).name
+    files["report"] = write_report({**results, "games": flat, "replays": links}, folder / NAMES["report"]).name
     path = folder / NAMES["results"]
     write_json(path, results)
     return path

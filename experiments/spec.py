@@ -10,6 +10,7 @@ from typing import Any
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
+from .judging import check_judge
 from .score import DEFAULT_PENALTY
 from .store import key_of
 from .tally import RADII_M
@@ -35,6 +36,7 @@ class MatchSpec:
         fixed_start: start on the preset's fixed places instead of random ones.
         penalty: weight of a collision in the primary score.
         radii_m: radii at which breaches are counted.
+        judge: whose breaches the oracle judges, see `judging.JUDGE`.
     """
 
     preset: str
@@ -50,9 +52,11 @@ class MatchSpec:
     fixed_start: bool = False
     penalty: float = DEFAULT_PENALTY
     radii_m: tuple[float, ...] = RADII_M
+    judge: str = "shielded"
 
     def __post_init__(self) -> None:
         check_side(self.side)
+        check_judge(self.judge)
 
     @property
     def pairing(self) -> str:
@@ -66,8 +70,13 @@ class MatchSpec:
 
     @property
     def key(self) -> str:
-        """Short name that two specs share exactly when they describe the same game."""
-        return key_of(asdict(self))
+        """Short name that two specs share exactly when they describe the same game, however its breaches are judged."""
+        return key_of({name: value for name, value in asdict(self).items() if name != "judge"})
+
+    @property
+    def judged(self) -> bool:
+        """Whether the oracle judges this game's breaches."""
+        return self.judge == "all" or (self.judge == "shielded" and self.shield is not None)
 
     def config(self) -> GameConfig:
         """Build the game's settings.

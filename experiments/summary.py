@@ -19,6 +19,7 @@ from .statistics import (
     share_interval,
 )
 from .tally import breach_column
+from .verdicts import summarise_verdicts
 
 Row = Mapping[str, Any]
 
@@ -52,7 +53,8 @@ def summarise(rows: Sequence[Row], radii_m: Sequence[float], seed: int = 0) -> d
 
     Returns:
         JSON-ready: ``pairing``, ``games_off``, ``games_on``, ``metrics`` (per name ``label``, ``off``, ``on``,
-        ``difference``, each with value, low, high; absent where there is none), ``reasons``, ``policy_failures``.
+        ``difference``, each with value, low, high; absent where there is none), ``verdicts`` (as
+        `verdicts.summarise_verdicts`), ``reasons``, ``policy_failures``.
     """
     off, on = (by_game(rows, shielded) for shielded in (False, True))
     metrics = {m.name: _figures(m, off, on, seed) for m in metrics_of(radii_m, seed)}
@@ -61,6 +63,7 @@ def summarise(rows: Sequence[Row], radii_m: Sequence[float], seed: int = 0) -> d
         "games_off": len(off),
         "games_on": len(on),
         "metrics": metrics,
+        "verdicts": summarise_verdicts([*off.values(), *on.values()]),
         "reasons": _reasons(on.values()),
         "policy_failures": sum(int(row["policy_failures"]) for row in rows),
     }

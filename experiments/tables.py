@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .tally import breach_column
+from .verdicts import SHORT_HEADS, verdict_rows
 
 Figure = Mapping[str, float | None]
 _KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
@@ -37,6 +38,17 @@ def pairing_table(summary: Mapping[str, Any]) -> Group:
         for figures in summary["metrics"].values()
     ]
     return titled(title, ["", *(head for _, head in shown)], rows)
+
+
+def verdict_table(summary: Mapping[str, Any]) -> Group:
+    """Build the table of what the oracle says about a pairing's breaches.
+
+    Args:
+        summary: as `summary.summarise` returns it.
+    """
+    return titled(
+        "Breaches judged in hindsight", SHORT_HEADS, verdict_rows(summary.get("verdicts") or {}, interval_text)
+    )
 
 
 def titled(title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]], width: int | None = None) -> Group:

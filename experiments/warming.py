@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 
+from . import oracle
 from .match import play_match
 from .pool import run_all
 from .spec import MatchSpec
@@ -18,10 +19,11 @@ SECONDS = 1.0
 
 @dataclass(frozen=True)
 class WarmUp:
-    """One part to compile: a shield with these settings, or what a short game needs."""
+    """One part to compile: a shield with these settings, what a short game needs, or the oracle."""
 
-    shield: dict[str, Any] | None
-    game: MatchSpec | None
+    shield: dict[str, Any] | None = None
+    game: MatchSpec | None = None
+    judge: bool = False
 
 
 def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
@@ -30,9 +32,11 @@ def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
     What goes wrong here is left to the games themselves to report.
     """
     unshielded = {spec.opponent: replace(spec, shield=None, opponent_shield=None) for spec in specs}
-    parts = [WarmUp(None, _short(spec)) for spec in list(unshielded.values())[:1]]
+    parts = [WarmUp(game=_short(spec)) for spec in list(unshielded.values())[:1]]
     shields = [spec.shield for spec in specs if spec.shield is not None]
-    parts += [WarmUp(dict(settings), None) for settings in shields[:1]]
+    parts += [WarmUp(shield=dict(settings)) for settings in shields[:1]]
+    if any(spec.judged for spec in specs):
+        parts.append(WarmUp(judge=True))
     for _ in run_all(compile_part, parts, processes):
         pass
 
@@ -43,6 +47,16 @@ def compile_part(part: WarmUp) -> None:
         compile_shield(part.shield)
     if part.game is not None:
         play_match(part.game)
+    if part.judge:
+        compile_oracle()
+
+
+def compile_oracle() -> None:
+    """Let the oracle judge a boat that runs into a stopped one."""
+    boat = oracle.Boat("single_integrator", 2.0, max_turn_dps=90.0)
+    states = np.zeros((40, 2, oracle.N_STATE))
+    states[:, 0, 1], states[:, 0, 3], states[:, 1, 1] = 0.2 * np.arange(40), 2.0, 5.0
+    oracle.judge(states, [boat, boat], own=0, step=13, radius_m=2.5)
 
 
 def compile_shield(settings: dict[str, Any]) -> None:

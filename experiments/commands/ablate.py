@@ -38,6 +38,7 @@ def ablate(
     platform: o.Platform = None,
     rules: o.RuleSet = None,
     fixed_start: o.FixedStart = False,
+    judge: o.Judge = "shielded",
     check: o.Check = False,
     json_file: o.JsonFile = None,
 ) -> None:
@@ -55,6 +56,7 @@ def ablate(
         rules=o.game_settings(max_time, platform, rules),
         fixed_start=fixed_start,
         penalty=penalty,
+        judge=judge,
     )
     if quick:
         settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)

@@ -41,6 +41,7 @@ def evaluate(
     platform: o.Platform = None,
     rules: o.RuleSet = None,
     fixed_start: o.FixedStart = False,
+    judge: o.Judge = "shielded",
     json_file: o.JsonFile = None,
 ) -> None:
     """Play a policy or submission against opponents and report how it did.
@@ -58,6 +59,7 @@ def evaluate(
         rules=o.game_settings(max_time, platform, rules),
         fixed_start=fixed_start,
         penalty=penalty,
+        judge=judge,
     )
     if quick:
         settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)

@@ -13,12 +13,13 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
+from ..judging import check_judge
 from ..pool import check_jobs
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
-from ..tables import bars_table, pairing_table
+from ..tables import bars_table, pairing_table, verdict_table
 from ..warming import warm_up
 from .console import Interrupted, err, out, progress
 
@@ -32,6 +33,7 @@ def check_settings(settings: AblationSettings) -> None:
     if settings.games < 1:
         raise ConfigError(f"--games must be at least 1; got {settings.games}")
     check_penalty(settings.penalty)
+    check_judge(settings.judge)
     check_shield(settings.shield)
     settings.specs()[0].config()
     for name in dict.fromkeys([settings.own, *settings.opponents]):
@@ -82,6 +84,7 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     """Print the tables of a run and where its files are."""
     for summary in results["pairings"]:
         console.print(pairing_table(summary))
+        console.print(verdict_table(summary))
         if summary["policy_failures"]:
             console.print(f"The policy failed {summary['policy_failures']} times; its boats held for those steps.")
         console.print()

@@ -30,6 +30,12 @@ Penalty = Annotated[float, typer.Option(metavar="W", help="Weight of a collision
 MaxTime = Annotated[float | None, typer.Option(metavar="S", help="Length of a game, s.", show_default="600")]
 Platform = Annotated[str | None, typer.Option(metavar="NAME", help="Platform of all boats, else the preset's.")]
 RuleSet = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any setting of the game.")]
+Judge = Annotated[
+    str,
+    typer.Option(
+        metavar="WHO", help="Whose breaches the oracle judges: all, shielded (games with the shield) or none."
+    ),
+]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]

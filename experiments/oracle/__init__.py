@@ -21,7 +21,7 @@ How to call it (all arrays float64, numpy)::
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
 
-from .boat import Boat, boats_of_rows
+from .boat import N_STATE, Boat, boats_of_rows
 from .errors import OracleError
 from .judge import judge
 from .settings import Settings
@@ -29,6 +29,7 @@ from .sides import judge_breach, judge_breaches
 from .verdict import BreachVerdict, Outcome, Plan, Responsible, Verdict
 
 __all__ = [
+    "N_STATE",
     "Boat",
     "BreachVerdict",
     "OracleError",

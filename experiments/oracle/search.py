@@ -60,7 +60,7 @@ def promise(s: Array, others: Array, k: int, limit_m: float, dt_s: float) -> flo
 def _cell(s: Array, sizes: Array) -> int:
     key = 1469598103934665603
     for i in range(5):
-        key = (key ^ (int(math.floor(s[i] / sizes[i])) + 1048576)) * 1099511628211
+        key = (key ^ (math.floor(s[i] / sizes[i]) + 1048576)) * 1099511628211
         key ^= key >> 29
     return key
 

@@ -160,8 +160,10 @@ def test_an_unknown_side_is_refused():
 
 def test_a_spec_travels_through_json_and_its_key_names_the_game():
     spec = spec_of(shield={"separation_m": 3.0})
-    assert spec.key == spec_of(shield={"separation_m": 3.0}).key == key_of(json.loads(json.dumps(vars(spec))))
+    plain = {name: value for name, value in json.loads(json.dumps(vars(spec))).items() if name != "judge"}
+    assert spec.key == spec_of(shield={"separation_m": 3.0}).key == key_of(plain)
     assert len({spec.key, spec_of().key, replace(spec, seed=9).key, replace(spec, penalty=0.0).key}) == 4
+    assert replace(spec, judge="all").key == spec.key
 
 
 @pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
