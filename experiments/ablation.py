@@ -108,10 +108,10 @@ def ablation_bars(rows: Sequence[Row], separation_m: float) -> list[dict[str, An
     hits = sum(int(on[teammate]) for _, on in pairs)
     zero = {"value": float(hits), "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": hits == 0}
     return [
-        *_avoidable_bar(rows, separation_m),
         {"name": f"hits with team-mates at {separation_m:g} m, shielded, all games", **zero},
         {"name": f"hits with opponents at {separation_m:g} m, on / off", **_ratio(pairs, opponent, "<=", 0.1)},
         {"name": "captures, on / off", **_ratio(pairs, "captures", ">=", 0.9)},
+        *_avoidable_bar(rows, separation_m),
     ]
 
 

@@ -115,10 +115,10 @@ def test_bars_judge_pairs_of_all_pairings(played):
     _, games = played
     rows = [{**hits(row, 10, 1), "captures": 4, "breaches_teammate_2.5m": 0} for row in games.rows]
     bars = ablation_bars(rows, 2.5)
-    assert [bar["met"] for bar in bars] == [True, True, True]
+    assert [bar["met"] for bar in bars] == [True, True, True, True]
     assert bars[1]["value"] == pytest.approx(0.1)
     worse = [{**hits(row, 10, 2), "captures": 3 if row["shielded"] else 4, "breaches_teammate_2.5m": 1} for row in rows]
-    assert [bar["met"] for bar in ablation_bars(worse, 2.5)] == [False, False, False]
+    assert [bar["met"] for bar in ablation_bars(worse, 2.5)] == [False, False, False, True]
     assert ablation_bars(worse, 2.5)[0]["value"] == 4
     nothing = [{**row, "captures": 0} for row in rows]
     assert ablation_bars(nothing, 2.5)[2]["met"] is None

@@ -1,0 +1,137 @@
+"""Asking the oracle about the breaches of a game.
+
+`StateLog` keeps what the oracle looks back at: all boats' full states and who drove them, about 0.6 kB a step for six
+boats. Nothing is computed while the game goes on, and nothing at all when it had no breach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.env.core import BatchedMctf
+from steerclear.env.record import Record, read_meta
+from steerclear.experiments import oracle
+from steerclear.experiments.oracle import BreachVerdict, Outcome, Responsible, Verdict
+from steerclear.shield.exceptions import ConfigError
+
+JUDGE = ("all", "shielded", "none")
+"""Whose breaches the oracle judges: in every game, in games whose own team is shielded, in none."""
+MOST_JUDGED = 500
+"""Breaches of one game beyond this many are not judged."""
+NOT_JUDGED = "not_judged"
+
+
+def check_judge(choice: str) -> str:
+    """Return the choice.
+
+    Raises:
+        ConfigError: none of `JUDGE`.
+    """
+    if choice not in JUDGE:
+        raise ConfigError(f"--judge is {choice!r}; choose one of {', '.join(JUDGE)}")
+    return choice
+
+
+class StateLog:
+    """Full states of a game (index 0 the start) and which boats the game itself drove, step by step."""
+
+    def __init__(self) -> None:
+        self._states: list[np.ndarray] = []
+        self._driven: list[np.ndarray] = []
+
+    def start(self, core: BatchedMctf) -> None:
+        """Begin with a game's start."""
+        self._states, self._driven = [core.state[0].copy()], []
+
+    def step(self, core: BatchedMctf) -> None:
+        """Add the state after a step."""
+        self._states.append(core.state[0].copy())
+        self._driven.append(core.driven[0].copy())
+
+    @property
+    def states(self) -> np.ndarray:
+        """(T+1, n, 11) state rows."""
+        return np.array(self._states)
+
+    @property
+    def driven(self) -> np.ndarray:
+        """(T, n) bool."""
+        return np.array(self._driven, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
+
+
+def judge_game(log: StateLog, params: np.ndarray, record: Record, side: int) -> list[dict[str, Any]]:
+    """Judge the breaches of a game that a team's boats were in, at the record's separation radius.
+
+    Args:
+        log: the game's states.
+        params: (n, N_PARAM) parameter rows of its boats.
+        record: the game, with its ``breaches``.
+        side: the team in question.
+
+    Returns:
+        Per breach, in order of time, the entries that `keys.BREACH` describes.
+    """
+    meta = read_meta(record)
+    team = np.asarray(meta["team"])
+    found = [row for row in record["breaches"] if side in (team[int(row[1])], team[int(row[2])])]
+    if not found:
+        return []
+    verdicts = oracle.judge_breaches(
+        log.states, params, found[:MOST_JUDGED], float(meta["separation_m"]), float(meta["dt_s"]), log.driven
+    )
+    padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
+    return [_entry(row, verdict, meta, team, side) for row, verdict in zip(found, padded, strict=True)]
+
+
+def _entry(
+    row: np.ndarray, verdict: BreachVerdict | None, meta: Mapping[str, Any], team: np.ndarray, side: int
+) -> dict[str, Any]:
+    step, pair = int(row[0]), (int(row[1]), int(row[2]))
+    own = [boat for boat in pair if team[boat] == side]
+    entry = {
+        "step": step,
+        "time_s": step * float(meta["dt_s"]),
+        "boats": [meta["agent_ids"][boat] for boat in pair],
+        "kind": "teammate" if len(own) == 2 else "opponent",
+        "radius_m": float(meta["separation_m"]),
+        "closest_m": float(row[3]),
+    }
+    if verdict is None:
+        return {**entry, **_unjudged()}
+    return {**entry, **_judged(verdict, own, meta["agent_ids"])}
+
+
+def _unjudged() -> dict[str, Any]:
+    empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
+    return {"verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
+
+
+def _judged(both: BreachVerdict, own: Sequence[int], agent_ids: Sequence[str]) -> dict[str, Any]:
+    ours = [both.of(boat) for boat in own]
+    best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
+    theirs = [verdict for verdict in (both.first, both.second) if verdict.own not in own]
+    return {
+        "verdict": best.outcome.value,
+        "last_preventable_s": best.last_preventable_s,
+        "other_last_preventable_s": _lead(theirs),
+        "exhausted": all(verdict.exhausted for verdict in ours),
+        "responsible": _side(both, own),
+        "responsible_boats": [agent_ids[boat] for boat in both.responsible_boats()],
+    }
+
+
+def _lead(verdicts: Sequence[Verdict]) -> float | None:
+    return verdicts[0].last_preventable_s if verdicts else None
+
+
+def _side(both: BreachVerdict, own: Sequence[int]) -> str:
+    """Name the responsible side as the team sees it: own, opponent, both, game, neither or start."""
+    if both.responsible in (Responsible.GAME, Responsible.NEITHER, Responsible.START):
+        return both.responsible.value
+    inside = [boat in own for boat in both.responsible_boats()]
+    return "own" if all(inside) else "both" if any(inside) else "opponent"
+
+
+OUTCOMES = tuple(outcome.value for outcome in Outcome)
