@@ -1,0 +1,1 @@
+"""The search for opponents that cause breaches."""
