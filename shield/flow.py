@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .active_set import OPTIMAL, project
-from .certificates.assign import assign_plans
+from .certificates.assign import assign_plans, hold, recheck
 from .certificates.clearance import MARGIN
 from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, look_around
 from .jit import Array, BoolArray, IntArray, kernel
@@ -50,6 +50,7 @@ class Plan(NamedTuple):
     commands: Array
     kept_commands: Array
     wanted_turn: Array
+    held: Array
     movers: IntArray
     place: IntArray
     moving: BoolArray
@@ -71,6 +72,7 @@ def new_plan(boats: int, rows: int) -> Plan:
         commands=np.zeros((boats, 2)),
         kept_commands=np.zeros((boats, 2)),
         wanted_turn=np.zeros(boats),
+        held=np.zeros((boats, 3)),
         movers=np.zeros(boats, np.int64),
         place=np.full(boats, -1, np.int64),
         moving=np.zeros(boats, np.bool_),
@@ -187,6 +189,8 @@ def build(
 ) -> int:
     """Linearise about the candidate commands; returns the number of rows, -1 when there are too many."""
     movers = plan.movers[:count]
+    for m in range(count):
+        hold(movers[m], plan.held, work)
     inputs_of(
         plan.commands,
         plan.kept_commands,
@@ -263,16 +267,15 @@ def check(
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
-    plans: Array,
     tuning: Tuning,
     memory: Memory,
     work: Work,
     plan: Plan,
 ) -> bool:
-    """Exact re-check of candidate commands: full model one step on, then an escape for everybody."""
+    """Exact re-check of candidate commands: full model one step on, then the escapes the rows were about."""
     for m in range(count):
         predict(plan.movers[m], plan.commands, state, boats, tuning, work)
-    return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
+    return recheck(plan.moving, plan.held, state, ours, boats, fixed, tuning, memory, work)
 
 
 @kernel
@@ -341,10 +344,11 @@ def ladder(
     before = worst_merit(ours, work)
     for m in range(count):
         work.target[plan.movers[m]] = 0.0
+        hold(plan.movers[m], plan.held, work)
     good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
     after = worst_merit(ours, work)
     if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
-        check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
         mark_relaxed(count, work, plan)
         return
     for m in range(count):
@@ -435,5 +439,5 @@ def decide_compiled(
             break
         if not take_answer(plan.z, count, state, boats, tuning, plan):
             break
-        safe = check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)

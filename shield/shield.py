@@ -158,7 +158,7 @@ class Shield:
             z = self._solve(count, rows, plan) if rows >= 0 else None
             if z is None or not flow.take_answer(z, count, state, boats, tuning, plan):
                 break
-            safe = flow.check(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+            safe = flow.check(count, state, ours, boats, fixed, tuning, memory, work, plan)
         flow.finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:

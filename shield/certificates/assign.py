@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
-from .manoeuvre import FIXED_LOST, PAIR_SAFE, lay_path, rate_path
+from .manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, lay_path, rate_path
 from .paths import angle_to_go
 
 COMMANDED = -1.0
@@ -123,6 +125,73 @@ def refresh(
 
 
 @kernel
+def short(i: int, memory: Memory) -> bool:
+    """Whether boat i was on its escape at the last decision, and that one short of its margin."""
+    return memory.kept[i] and memory.escaping[i] and memory.margin_m[i] < 0.0
+
+
+@kernel
+def settled(i: int, sweep: int, exhaustive: bool, memory: Memory, work: Work) -> bool:
+    """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
+    if work.merit[i] >= PAIR_SAFE or (sweep > 0 and work.merit[i] >= STRAIGHT_SAFE):
+        return True
+    return not exhaustive and short(i, memory)
+
+
+@kernel
+def hold(i: int, held: Array, work: Work) -> None:
+    """Note the manoeuvre boat i has from its predicted state: side, heading it ends on (NaN: no turn), speed."""
+    side, togo = work.plan[i, 0], work.plan[i, 1]
+    held[i, 0], held[i, 2] = side, work.plan[i, 2]
+    held[i, 1] = work.next_state[i, L.HEADING] + side * togo if togo > 0.0 else np.nan
+
+
+@kernel
+def recheck(
+    who: BoolArray,
+    held: Array,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+) -> bool:
+    """Whether all boats of ours keep clear when those of ``who`` go on, from newly predicted states, as they were.
+
+    Each is offered the manoeuvre in ``held`` and failing that the one in memory.
+    """
+    n, trial = state.shape[0], state.shape[0]
+    for i in range(n):
+        if who[i]:
+            togo = 0.0
+            if not math.isnan(held[i, 1]):
+                togo = angle_to_go(work.next_state[i, L.HEADING], held[i, 1], held[i, 0])
+                togo = 0.0 if togo > DONE_DEG else togo
+            lay_path(i, i, held[i, 0], togo, held[i, 2], 1, state, boats, tuning, work)
+    for i in range(n):
+        if not who[i]:
+            continue
+        refresh(i, state, ours, boats, fixed, tuning, work)
+        heading = work.next_state[i, L.HEADING]
+        if work.merit[i] >= PAIR_SAFE or not remembered(i, 1, heading, memory):
+            continue
+        lay_path(
+            i, trial, memory.side[i], kept_turn(i, heading, memory), memory.speed_mps[i], 1, state, boats, tuning, work
+        )
+        merit = rate_path(i, trial, work.merit[i], state, ours, boats, fixed, tuning, work)
+        if merit > work.merit[i]:
+            _take(i, trial, merit, work)
+    good = True
+    for i in range(n):
+        if ours[i]:
+            refresh(i, state, ours, boats, fixed, tuning, work)
+            good = good and work.merit[i] >= PAIR_SAFE
+    return good
+
+
+@kernel
 def assign_plans(
     commands: Array,
     done: int,
@@ -139,7 +208,9 @@ def assign_plans(
 ) -> bool:
     """Give the boats of ``who`` a manoeuvre, from their predicted (done = 1) or present states (0).
 
-    Boats of ours outside ``who`` keep the paths they have.
+    Boats of ours outside ``who`` keep the paths they have. A boat that was short of its margin on its escape is only
+    offered that escape, unless ``exhaustive``: what all manoeuvres could not do a step ago is not searched twice. Nor
+    is a boat whose trouble are hunters, which the others' manoeuvres do not change.
 
     Returns:
         Whether all boats of ours keep clear of all boats and of fixed things.
@@ -159,7 +230,7 @@ def assign_plans(
                 continue
             if not (exhaustive and sweep == 0):
                 refresh(i, state, ours, boats, fixed, tuning, work)
-                if work.merit[i] >= PAIR_SAFE:
+                if settled(i, sweep, exhaustive, memory, work):
                     continue
             choose_plan(
                 i,

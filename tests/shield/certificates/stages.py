@@ -82,7 +82,7 @@ def screened_with_all_pairs(at, wanted):
 
 def checked(at, count):
     """The exact check of the candidate commands."""
-    return flow.check(count, at.state, at.ours, at.boats, at.fixed, at.plans, at.tuning, at.memory, at.work, at.plan)
+    return flow.check(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.memory, at.work, at.plan)
 
 
 def built(at):
