@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield import Surroundings, flow
+from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.program import Program, solve
@@ -76,7 +77,20 @@ def screened_with_all_pairs(at, wanted):
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
     at.plan.kept_commands[:] = at.plan.commands
-    safe = checked(at, 0)
+    safe = assign_plans(
+        at.plan.commands,
+        1,
+        False,
+        at.ours,
+        at.state,
+        at.ours,
+        at.boats,
+        at.fixed,
+        at.plans,
+        at.tuning,
+        at.memory,
+        at.work,
+    )
     return safe, int(left_out.sum()) // 2
 
 
