@@ -12,7 +12,6 @@ one, by following the recorded track. So the latest such step is found by growin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,16 +19,10 @@ from numpy.typing import NDArray
 
 from .boat import Array
 from .checks import checked
-from .errors import OracleError
-from .model import replay, turned
-from .search import commands_of, search
+from .question import ROUNDING_M, Question
 from .settings import Level, Settings
-from .verdict import Outcome, Plan, Verdict
+from .verdict import Outcome, Verdict
 
-ROUNDING_M = 1e-9
-"""Kept above the radius, so that a plan replayed with other rounding is still clear."""
-FAR_M = 1e9
-"""Where boats are that need not be kept clear of, m."""
 DEFAULT = Settings()
 
 
@@ -63,7 +56,7 @@ def judge(
     end = _end_of(gaps[:, case.partner], case.radius_m, step, settings, dt_s)
     first = max(0, step - round(settings.look_back_s / dt_s))
     inside = gaps <= case.radius_m + ROUNDING_M
-    asked = _Question(
+    asked = Question(
         case.states[:, own], case.numbers, case.tracks, inside, end, case.radius_m, dt_s, case.top_mps, settings
     )
     facts = {"own": own, "other": case.other, "step": step, "radius_m": case.radius_m, "end_step": end}
@@ -77,78 +70,7 @@ def judge(
     return Verdict(**facts, outcome=Outcome.UNAVOIDABLE, **_nothing(asked.exhausted, asked.searches))
 
 
-@dataclass
-class _Question:
-    """Can the boat keep clear from a given step on? Answers are searched, and proved by replay."""
-
-    rows: Array
-    numbers: Array
-    tracks: Array
-    inside: NDArray[np.bool_]
-    end: int
-    radius_m: float
-    dt_s: float
-    top_mps: float
-    settings: Settings
-    searches: int = 0
-    plans: dict[int, Plan] = field(default_factory=dict)
-    failures: dict[tuple[int, Level], bool] = field(default_factory=dict)
-
-    def answer(self, begin: int, level: Level) -> bool:
-        """Search from state ``begin``; a plan found is kept."""
-        if begin in self.plans:
-            return True
-        if (begin, level) in self.failures:
-            return False
-        self.searches += 1
-        start, others = self.rows[begin].copy(), self._reachable(begin)
-        lengths = _lengths(level.first_s, self.end - begin, self.dt_s)
-        rudders, actions = np.array(sorted(level.rudders)), np.zeros(lengths.size, dtype=np.int64)
-        sizes = np.array([level.position_m, level.position_m, level.heading_deg, level.speed_mps, level.thrust])
-        limit_m = self.radius_m + ROUNDING_M
-        found, whole = search(
-            self.numbers, start, others, limit_m, self.dt_s, lengths, rudders, sizes, level.width, actions
-        )
-        if not found:
-            self.failures[begin, level] = whole
-            return False
-        commands = np.empty((self.end - begin, 2))
-        commands_of(self.numbers, start, actions, lengths, rudders, self.dt_s, commands)
-        self._prove(begin, commands)
-        return True
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether the full searches that failed dropped no state."""
-        return all(whole for (_, level), whole in self.failures.items() if level == self.settings.full)
-
-    def _tracks(self, begin: int) -> Array:
-        """Tracks from ``begin`` on; a boat that is inside at that step is far away until it was apart."""
-        tracks = self.tracks[begin : self.end + 1].copy()
-        tracks[np.logical_and.accumulate(self.inside[begin : self.end + 1], axis=0)] = FAR_M
-        return tracks
-
-    def _reachable(self, begin: int) -> Array:
-        """Of those tracks the ones that the own boat could come near at all."""
-        tracks = self._tracks(begin)
-        start = self.rows[begin]
-        reach = self.radius_m + 1.0 + self.dt_s * max(self.top_mps, start[3]) * np.arange(len(tracks))
-        gaps = np.hypot(*np.moveaxis(tracks - start[:2], -1, 0))
-        return np.ascontiguousarray(tracks[:, (gaps <= reach[:, None]).any(axis=0)])
-
-    def _prove(self, begin: int, commands: Array) -> None:
-        """Replay the commands against all boats; a plan counts only when that, too, stays clear."""
-        path = np.empty((len(commands) + 1, 2))
-        others = self._tracks(begin)
-        headings = np.empty(len(commands))
-        closest_m = replay(self.numbers, self.rows[begin], commands, others, self.dt_s, path, headings)
-        if not closest_m > self.radius_m:
-            raise OracleError(f"the plan from step {begin} does not hold in the replay; report the record")
-        absolute = np.array([turned(h, e) for h, e in zip(headings, commands[:, 1], strict=True)])
-        self.plans[begin] = Plan(begin, commands[:, 0], commands[:, 1], absolute, path, closest_m)
-
-
-def _latest(asked: _Question, low: int, high: int) -> tuple[int | None, bool]:
+def _latest(asked: Question, low: int, high: int) -> tuple[int | None, bool]:
     """Find the latest step of [low, high] from which the breach can be avoided.
 
     Returns:
@@ -168,7 +90,7 @@ def _latest(asked: _Question, low: int, high: int) -> tuple[int | None, bool]:
     return best, asked.failures[failed, asked.settings.full]
 
 
-def _bracket(asked: _Question, low: int, high: int, level: Level, growth: int) -> tuple[int | None, int]:
+def _bracket(asked: Question, low: int, high: int, level: Level, growth: int) -> tuple[int | None, int]:
     """Multiply the lead until a search succeeds: the step it began at, and the latest one tried before."""
     failed, lead = high + 1, 0
     while True:
@@ -180,7 +102,7 @@ def _bracket(asked: _Question, low: int, high: int, level: Level, growth: int) -
         failed, lead = begin, growth * lead + growth - 1
 
 
-def _press_on(asked: _Question, best: int, high: int) -> tuple[int, int]:
+def _press_on(asked: Question, best: int, high: int) -> tuple[int, int]:
     """From a success of the quick search go later with the full one, in growing strides, until it fails."""
     stride = 1
     while best < high:
@@ -191,7 +113,7 @@ def _press_on(asked: _Question, best: int, high: int) -> tuple[int, int]:
     return best, high + 1
 
 
-def _bisect(asked: _Question, best: int, failed: int, level: Level) -> tuple[int, int]:
+def _bisect(asked: Question, best: int, failed: int, level: Level) -> tuple[int, int]:
     while failed - best > 1:
         middle = (best + failed) // 2
         if asked.answer(middle, level):
@@ -201,7 +123,7 @@ def _bisect(asked: _Question, best: int, failed: int, level: Level) -> tuple[int
     return best, failed
 
 
-def _avoidable(asked: _Question, facts: dict[str, Any], latest: int, exhausted: bool) -> Verdict:
+def _avoidable(asked: Question, facts: dict[str, Any], latest: int, exhausted: bool) -> Verdict:
     return Verdict(
         **facts,
         outcome=Outcome.AVOIDABLE,
@@ -248,14 +170,3 @@ def _runs(inside: NDArray[np.bool_], partner: int, first: int) -> list[tuple[int
         else:
             runs.append((int(k), int(k)))
     return runs
-
-
-def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> NDArray[np.int64]:
-    """Split a number of steps into choices: the first lengths as given, then the last one over and over."""
-    lengths: list[int] = []
-    left = steps
-    while left > 0:
-        wanted_s = first_s[min(len(lengths), len(first_s) - 1)]
-        lengths.append(min(left, max(1, round(wanted_s / dt_s))))
-        left -= lengths[-1]
-    return np.array(lengths, dtype=np.int64)
