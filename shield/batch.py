@@ -16,6 +16,7 @@ from .platforms import layout as L
 from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
+from .tracks import queue_commands, run_on_commands, steps_of_delay
 
 
 @kernel
@@ -30,14 +31,24 @@ def decide_games(
     memory: Memory,
     work: Work,
     plan: Plan,
-    margin_m: Array,
+    error_m: Array,
+    late_m: float,
+    pending: Array,
     sent: Array,
     reason: IntArray,
     clearance_m: Array,
 ) -> None:
-    """Decide for every game in turn; arrays carry a leading games axis."""
+    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis."""
     n = state.shape[1]
+    ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
+        ahead[:] = state[b]
+        run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
+        for i in range(n):
+            asked[i] = wanted[b, i]
+            margin_m[i] = error_m[i] if ours[b, i] else error_m[i] + late_m
+            if ahead[i, L.HEADING] != state[b, i, L.HEADING]:
+                asked[i, 1] += state[b, i, L.HEADING] - ahead[i, L.HEADING]
         own = Memory(
             memory.kept[b],
             memory.side[b],
@@ -46,21 +57,26 @@ def decide_games(
             memory.margin_m[b],
             memory.escaping[b],
         )
-        decide_compiled(state[b], wanted[b], margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
+        decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
         for i in range(n):
-            sent[b, i, 0], sent[b, i, 1] = plan.commands[i, 0], plan.commands[i, 1]
+            sent[b, i] = wanted[b, i]
+            if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
+                sent[b, i, 0] = plan.commands[i, 0]
+                sent[b, i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[b, i, L.HEADING]
             reason[b, i] = plan.reason[i]
             clearance_m[b, i] = work.clear[i, 0] if ours[b, i] else np.inf
+        if pending.shape[1] > 0:
+            queue_commands(pending[b], ahead, plan.commands)
 
 
 class BatchedShield:
     """`Shield` for B games of the same fleet, with the exact compiled projection as its QP solver.
 
     Decisions are those of `Shield` to rounding: the stages are the same functions. Tracks are taken as fresh and
-    exact up to ``position_error_m``; age and delay belong to boats, not to a batch.
+    exact up to ``position_error_m``.
 
     Args:
-        config: settings; coordination must be "team" and delay 0.
+        config: settings; coordination must be "team".
         games: number of games B.
         platforms: platforms of the n boats.
         team: team of the n boats.
@@ -78,8 +94,8 @@ class BatchedShield:
         team: tuple[int, ...],
         surroundings: Surroundings = OPEN_WATER,
     ) -> None:
-        if config.coordination != "team" or config.delay_s > 0:
-            raise ConfigError("a batch decides for whole teams at once: set coordination='team' and delay_s=0")
+        if config.coordination != "team":
+            raise ConfigError("a batch decides for whole teams at once: set coordination='team'")
         if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
             raise ConfigError(f"games is {games!r}; give a whole number >= 1")
         if len(platforms) != len(team) or not platforms:
@@ -93,6 +109,8 @@ class BatchedShield:
         self._work = new_work(n, int(self._boats.hunt_samples.max()))
         self._plan = new_plan(n, n * (n + 5) + 2)
         self._margin = np.full(n, config.position_error_m)
+        self._late_m = config.track_error_mps * config.delay_s
+        self._pending = np.full((games, steps_of_delay(config), n, 2), np.nan)
         self.reason = np.zeros((games, n), np.int64)
         self.certificate_m = np.full((games, n), np.inf)
         self.sent = np.zeros((games, n, 2))
@@ -102,6 +120,7 @@ class BatchedShield:
         which = slice(None) if mask is None else mask
         self._memory.kept[which] = False
         self._memory.escaping[which] = False
+        self._pending[which] = np.nan
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
         """Safe commands.
@@ -139,6 +158,8 @@ class BatchedShield:
             self._work,
             self._plan,
             self._margin,
+            self._late_m,
+            self._pending,
             self.sent,
             self.reason,
             self.certificate_m,

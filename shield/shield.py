@@ -22,7 +22,7 @@ from .program import Program, solve
 from .scene import Boats, Fixed, Memory, Work, new_memory, new_work
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import prepare
+from .tracks import prepare, queue_commands, steps_of_delay
 
 MOST_ROWS = 3000
 """Programs with more rows than this go to the ladder instead."""
@@ -70,12 +70,11 @@ class Shield:
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
         self._key: tuple[Any, ...] | None = None
-        self._sent: Array | None = None
+        self._pending = np.zeros((0, 0, 2))
 
     def reset(self) -> None:
         """Forget all escapes, as before a new game."""
         self._key = None
-        self._sent = None
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
@@ -95,8 +94,9 @@ class Shield:
         if wanted.values.shape != (len(fleet), 2):
             raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
         boats = self._scene(fleet)
-        state, margin = prepare(fleet, self.config, boats.params, self._sent)
-        asked = wanted.as_relative_deg(state[:, L.HEADING])
+        state, margin = prepare(fleet, self.config, boats.params, self._pending)
+        turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
+        asked = _less_turn(wanted.as_relative_deg(fleet.state[:, L.HEADING]), turned)
         fixed = self._fixed(self.surroundings if surroundings is None else surroundings)
         if self.config.coordination == "team":
             seat = self._seats[0]
@@ -104,7 +104,7 @@ class Shield:
             answer = _Answer(seat.plan, seat.work, len(fleet))
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        return self._report(fleet, wanted, asked, state, answer, started)
+        return self._report(fleet, wanted, asked, turned, answer, started)
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
         """Put this shield around a policy.
@@ -132,7 +132,7 @@ class Shield:
             rows = min(n * (n + 5) + 2, MOST_ROWS)
             samples = int(self._boats.hunt_samples.max(initial=1))
             self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
-            self._key, self._sent = key, None
+            self._key, self._pending = key, np.full((steps_of_delay(self.config), n, 2), np.nan)
         return self._boats
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
@@ -187,14 +187,14 @@ class Shield:
         return answer
 
     def _report(
-        self, fleet: Fleet, wanted: Commands, asked: Array, state: Array, answer: _Answer, started: float
+        self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer, started: float
     ) -> Decisions:
         changed = (answer.reason != flow.NOT_COVERED) & (answer.reason != flow.PASSED)
         changed &= (answer.commands != asked).any(axis=1)
-        sent = wanted.replaced(changed, answer.commands, state[:, L.HEADING]) if changed.any() else wanted
-        if self.config.delay_s > 0:
-            relative = sent.as_relative_deg(state[:, L.HEADING])
-            self._sent = np.stack([relative[:, 0], state[:, L.HEADING] + relative[:, 1]], axis=1)
+        seen_deg = fleet.state[:, L.HEADING]
+        sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), seen_deg) if changed.any() else wanted
+        if len(self._pending) > 0:
+            queue_commands(self._pending, fleet.state, sent.as_relative_deg(seen_deg))
         return Decisions(
             fleet=fleet,
             wanted=wanted,
@@ -206,6 +206,13 @@ class Shield:
             bound=answer.bound,
             solve_time_s=time.perf_counter() - started,
         )
+
+
+def _less_turn(commands: Array, turned_deg: Array) -> Array:
+    """Commands (speed, relative heading deg) as seen after a turn; those of boats that do not turn bit for bit."""
+    if not turned_deg.any():
+        return commands
+    return np.stack([commands[:, 0], commands[:, 1] - turned_deg], axis=1)
 
 
 class _Answer:

@@ -48,26 +48,56 @@ def run_on(state: Array, seconds: Array) -> None:
 
 
 @kernel
-def run_on_commands(state: Array, who: BoolArray, params: Array, target: Array, steps: int, dt_s: float) -> None:
-    """Step boats of ``who`` under the last command sent: ``target`` is (speed m/s, absolute heading deg)."""
-    for _ in range(steps):
+def run_on_commands(state: Array, who: BoolArray, params: Array, pending: Array, dt_s: float) -> None:
+    """Step boats of ``who`` through commands on their way, the others straight on; in place.
+
+    Args:
+        state: (n, N_STATE) boats now.
+        who: (n,) boats whose commands are known.
+        params: (n, N_PARAM) platform rows.
+        pending: (steps, n, 2) speed m/s and absolute heading deg, the next to take effect first; NaN: none was sent,
+            the boat goes straight on.
+        dt_s: step, s.
+    """
+    for k in range(pending.shape[0]):
         for i in range(state.shape[0]):
-            if who[i]:
-                error = (target[i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
-                step_boat(params[i], state[i], target[i, 0], error, dt_s)
+            if who[i] and not math.isnan(pending[k, i, 0]):
+                error = (pending[k, i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
+                step_boat(params[i], state[i], pending[k, i, 0], error, dt_s)
+            else:
+                way = state[i, L.SPEED] * dt_s
+                heading = math.radians(state[i, L.HEADING])
+                state[i, L.X] += way * math.sin(heading)
+                state[i, L.Y] += way * math.cos(heading)
 
 
-def prepare(fleet: Fleet, config: ShieldConfig, params: Array, last_sent: Array | None) -> tuple[Array, Array]:
+@kernel
+def queue_commands(pending: Array, state: Array, commands: Array) -> None:
+    """Put commands (n, 2), speed m/s and heading deg relative to ``state``, at the end of the queue, in place."""
+    last = pending.shape[0] - 1
+    for k in range(last):
+        pending[k] = pending[k + 1]
+    for i in range(state.shape[0]):
+        pending[last, i, 0] = commands[i, 0]
+        pending[last, i, 1] = state[i, L.HEADING] + commands[i, 1]
+
+
+def steps_of_delay(config: ShieldConfig) -> int:
+    """Decisions whose commands are on their way at any time."""
+    return round(config.delay_s / config.dt_s)
+
+
+def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -> tuple[Array, Array]:
     """State at the moment the command takes effect, and each boat's error margin.
 
     Tracks are run on straight by their age and by the delay; own boats are run through the delay by the model under
-    the last command sent. The error margin of a boat is its bound plus ``track_error_mps`` times age plus delay.
+    the commands on their way. The error margin of a boat is its bound plus ``track_error_mps`` times age plus delay.
 
     Args:
         fleet: what was seen.
         config: settings.
         params: (n, N_PARAM) platform rows.
-        last_sent: (n, 2) last commands sent, speed m/s and absolute heading deg, or None.
+        pending: (steps of delay, n, 2) commands on their way, see `run_on_commands`.
 
     Returns:
         State (n, N_STATE), a copy, and margins (n,), m.
@@ -86,12 +116,8 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, last_sent: Array 
         _check_age(fleet, config)
         run_on(state, fleet.age_s)
         margin = margin + config.track_error_mps * fleet.age_s
-    steps = round(config.delay_s / config.dt_s)
-    if steps > 0:
-        own: BoolArray = fleet.controlled if last_sent is not None else np.zeros(n, np.bool_)
-        run_on(state, np.where(own, 0.0, config.delay_s))
-        if last_sent is not None:
-            run_on_commands(state, own, params, last_sent, steps, config.dt_s)
+    if len(pending) > 0:
+        run_on_commands(state, fleet.controlled, params, pending, config.dt_s)
         margin = margin + np.where(fleet.controlled, 0.0, config.track_error_mps * config.delay_s)
     return state, margin
 

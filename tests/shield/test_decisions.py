@@ -134,5 +134,5 @@ def test_bad_surroundings_are_refused():
 
 
 def test_a_batch_refuses_what_it_cannot_honour():
-    with pytest.raises(ConfigError, match="delay_s=0"):
-        BatchedShield(ShieldConfig(delay_s=0.3), 1, ("heron",), (0,))
+    with pytest.raises(ConfigError, match="coordination='team'"):
+        BatchedShield(ShieldConfig(coordination="per_boat"), 1, ("heron",), (0,))
