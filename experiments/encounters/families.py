@@ -1,0 +1,147 @@
+"""The families of encounters, and drawing encounters of them: a seed and a number always give the same one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+from steerclear.shield.exceptions import ConfigError
+
+from . import duels, groups
+from .cast import Cast
+from .field import Box, field_of
+from .scenes import Conditions, Scenes
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of encounter.
+
+    Attributes:
+        name: of the family.
+        build: puts the boats of one encounter into a cast.
+        field_for: number of boats that its field is made for; 0 is open water.
+        others: how many boats the own team does not command.
+    """
+
+    name: str
+    build: Callable[[Cast], None]
+    others: int
+    field_for: int = 0
+
+    @property
+    def words(self) -> str:
+        """What happens in it."""
+        return (self.build.__doc__ or self.name).strip().splitlines()[0]
+
+
+FAMILIES: dict[str, Family] = {
+    family.name: family
+    for family in (
+        Family("head_on", duels.head_on, 1),
+        Family("crossing_left", duels.crossing_left, 1),
+        Family("crossing_right", duels.crossing_right, 1),
+        Family("overtaking", duels.overtaking, 1),
+        Family("converging_2", groups.converging_2, 0),
+        Family("converging_3", groups.converging_3, 0),
+        Family("doorway", groups.doorway, 2, field_for=4),
+        Family("cluster", groups.cluster, groups.CLUSTER),
+        Family("corner", duels.corner, 1, field_for=2),
+        Family("sudden_turn", duels.sudden_turn, 1),
+        Family("rammer_1", groups.rammer_1, 1),
+        Family("rammer_2", groups.rammer_2, 2),
+        Family("rammer_3", groups.rammer_3, 3),
+        Family("rammer_3v3", groups.rammer_3v3, 3),
+        Family("crowd_6", groups.crowd_6, 3, field_for=6),
+        Family("crowd_12", groups.crowd_12, 6, field_for=12),
+        Family("crowd_40", groups.crowd_40, 20, field_for=40),
+        Family("crowd_40_own", groups.crowd_40_own, 0, field_for=40),
+    )
+}
+MOST_DRAWS = 200
+
+
+def get_family(name: str) -> Family:
+    """The family of that name.
+
+    Raises:
+        ConfigError: there is none; the message names the nearest, or all.
+    """
+    if name not in FAMILIES:
+        near = get_close_matches(name, FAMILIES, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(FAMILIES)}"
+        raise ConfigError(f"unknown family {name!r}; {hint}")
+    return FAMILIES[name]
+
+
+def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, first: int, count: int) -> Scenes:
+    """Draw the encounters ``first`` .. ``first + count - 1`` of a family.
+
+    Args:
+        family: its name.
+        own: platform of the own boats.
+        other: platform of the others.
+        conditions: of the run; only the radius and the noise have a say in where boats start.
+        seed: of the run.
+        first: number of the first encounter.
+        count: how many.
+
+    Raises:
+        SteerclearError: an unknown name, or an encounter that cannot be drawn with this radius.
+    """
+    kind = get_family(family)
+    if first < 0 or count < 1:
+        raise ConfigError(f"encounters {first} to {first + count - 1} cannot be drawn; ask for at least one, from 0 on")
+    casts = [_one(kind, own, other, conditions, seed, number) for number in range(first, first + count)]
+    scale = casts[0].scale
+    return Scenes(
+        family=family,
+        platforms=tuple(casts[0].platforms),
+        team=np.array(casts[0].team, dtype=np.int64),
+        state=np.array([cast.state for cast in casts for _ in _variants(cast)], dtype=np.float64),
+        script=np.array([rows for cast in casts for rows in _scripts(cast)], dtype=np.float64),
+        goals=np.array([_even(cast.goals) for cast in casts for _ in _variants(cast)], dtype=np.float64),
+        current=np.array([cast.current for cast in casts for _ in _variants(cast)]),
+        noise_seed=np.array([cast.noise_seed for cast in casts for _ in _variants(cast)], dtype=np.uint64),
+        number=np.array([first + k for k, cast in enumerate(casts) for _ in _variants(cast)], dtype=np.int64),
+        field=_field(kind, casts[0]),
+        length_s=30.0 + 15.0 * min(scale, 4.0),
+    )
+
+
+def _one(kind: Family, own: str, other: str, conditions: Conditions, seed: int, number: int) -> Cast:
+    """Draw until no two boats start too close."""
+    cast = Cast(own, other, conditions, seed, kind.name, number)
+    gap = 1.1 * conditions.radius_m + 2.0 * conditions.noise_m
+    for _ in range(MOST_DRAWS):
+        cast.clear()
+        kind.build(cast)
+        if cast.closest_m() > gap:
+            if kind.field_for == 0:
+                cast.turn(cast.uniform(-180.0, 180.0))
+            cast.settle()
+            return cast
+    raise ConfigError(f"no encounter of {kind.name} fits a radius of {conditions.radius_m:g} m; choose a smaller one")
+
+
+def _field(kind: Family, cast: Cast) -> Box | None:
+    return field_of(cast, kind.field_for) if kind.field_for else None
+
+
+def _variants(cast: Cast) -> Sequence[object]:
+    return cast.variants or [None]
+
+
+def _scripts(cast: Cast) -> list[list[np.ndarray]]:
+    """Scripts of all boats, once per variant."""
+    if not cast.variants:
+        return [cast.script]
+    return [[row if k == boat else own for k, own in enumerate(cast.script)] for boat, row in cast.variants]
+
+
+def _even(goals: list[list[tuple[float, float]]]) -> np.ndarray:
+    """Goals of all boats, (n, G, 2): boats with fewer stay at their last one."""
+    most = max(len(line) for line in goals)
+    return np.array([[*line, *[line[-1]] * (most - len(line))] for line in goals], dtype=np.float64)

@@ -1,0 +1,135 @@
+"""Playing encounters of one family with one guard: chunks of games, the worst variant of each, verdicts."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import ConfigError
+
+from .families import draw
+from .guards import NONE, GuardMaker
+from .play import Film, play
+from .scenes import Conditions, Scenes
+from .summary import summarise
+from .tally import Columns, tally
+from .verdicts import VERDICT_COLUMNS, judge_game
+
+CHUNK_MIB = 96.0
+"""Memory of a chunk's films, MiB."""
+BASE = ("goal_s", "closest_m", "breaches_teammate", "breaches_opponent", "reversals_per_min")
+"""Columns that are kept of the same scene without a guard, with ``unshielded_`` before the name."""
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of n encounters.
+
+    Attributes:
+        columns: arrays (n,) by name: see `tally.tally`, `verdicts.judge_game` and `measure_chunk`.
+        summary: figures over all of them, see `summary.summarise`.
+    """
+
+    columns: Columns
+    summary: dict[str, Any]
+
+
+def measure(
+    family: str,
+    guard: str | GuardMaker = "shield",
+    own: str = "heron",
+    other: str = "heron",
+    n: int = 200,
+    seed: int = 0,
+    conditions: Conditions | None = None,
+    judge: bool = True,
+    first: int = 0,
+) -> Outcome:
+    """Play encounters in this process.
+
+    Args:
+        family: name of the family.
+        guard: a name (see `guards`) or what makes a guard from (config, games, platforms, team, surroundings).
+        own: platform of the own boats.
+        other: platform of the others.
+        n: how many encounters.
+        seed: of the scenes.
+        conditions: radius, delay, noise, current.
+        judge: ask the oracle about breaches (seconds each); without, they count as not judged.
+        first: number of the first encounter.
+
+    Raises:
+        SteerclearError: bad input.
+    """
+    asked = conditions or Conditions()
+    parts = [measure_chunk(scenes, guard, asked, judge) for scenes in chunks(family, own, other, asked, seed, first, n)]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return Outcome(columns, summarise(columns))
+
+
+def chunks(
+    family: str, own: str, other: str, conditions: Conditions, seed: int, first: int, n: int
+) -> Iterator[Scenes]:
+    """Scenes of ``n`` encounters in batches that fit into memory.
+
+    Raises:
+        ConfigError: nothing to play.
+    """
+    if n < 1:
+        raise ConfigError(f"the number of encounters is {n}; ask for at least 1")
+    size = chunk_size(draw(family, own, other, conditions, seed, first, 1))
+    for start in range(first, first + n, size):
+        yield draw(family, own, other, conditions, seed, start, min(size, first + n - start))
+
+
+def chunk_size(sample: Scenes) -> int:
+    """Encounters per chunk: their films, with a guard and without, take about `CHUNK_MIB`."""
+    per_game = 2 * 8 * sample.steps * len(sample.team) * (sample.state.shape[2] + 5)
+    return max(1, min(500, int(CHUNK_MIB * 2**20 / (per_game * sample.games))))
+
+
+def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Conditions, judge: bool = True) -> Columns:
+    """Play a batch of scenes with a guard and without, and count.
+
+    Returns:
+        Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
+        those of `tally.tally`, ``unshielded_*`` of `BASE`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
+        game and step), and the verdicts.
+    """
+    film = play(scenes, guard, conditions)
+    counted = tally(film)
+    bare = counted if guard == NONE else tally(play(scenes, NONE, conditions))
+    worst = worst_games(scenes, counted["closest_m"])
+    columns = {"number": scenes.number[worst].astype(np.float64), "game": worst.astype(np.float64)}
+    columns["variant"] = np.array([game - np.argmax(scenes.number == scenes.number[game]) for game in worst], float)
+    columns |= {name: values[worst] for name, values in counted.items()}
+    columns |= {f"unshielded_{name}": bare[name][worst] for name in BASE}
+    columns["decision_us"] = np.full(len(worst), float(np.median(film.decision_us)))
+    columns["decision_p999_us"] = np.full(len(worst), float(np.quantile(film.decision_us, 0.999)))
+    return columns | _verdicts(film, worst, counted, judge)
+
+
+def worst_games(scenes: Scenes, closest_m: np.ndarray) -> np.ndarray:
+    """Games, one per encounter, in which its boats came closest."""
+    order = np.lexsort((closest_m, scenes.number))
+    firsts = np.flatnonzero(np.diff(scenes.number[order], prepend=-1))
+    return np.asarray(order[firsts])
+
+
+def _verdicts(film: Film, worst: np.ndarray, counted: Columns, judge: bool) -> Columns:
+    columns = {name: np.zeros(len(worst)) for name in VERDICT_COLUMNS}
+    columns["last_preventable_s"] = np.full(len(worst), np.nan)
+    breaches = counted["breaches_teammate"] + counted["breaches_opponent"]
+    for k, game in enumerate(worst):
+        if breaches[game] > 0:
+            found = judge_game(film, int(game)) if judge else {"not_judged": breaches[game]}
+            for name, value in found.items():
+                columns[name][k] = value
+    return columns
+
+
+Notice = Callable[[int], None]

@@ -1,0 +1,67 @@
+"""From the columns of many encounters to the figures of a cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from ..statistics import CONFIDENCE
+from .tally import Columns
+
+
+def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
+    """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
+    if trials == 0 or events >= trials:
+        return 1.0
+    return float(stats.beta.ppf(confidence, events + 1, trials - events))
+
+
+def summarise(columns: Columns) -> dict[str, Any]:
+    """Figures over encounters.
+
+    Returns:
+        JSON-ready; `SUMMARY_KEYS` describes them.
+    """
+    n = len(columns["closest_m"])
+    breached = (columns["breaches_teammate"] + columns["breaches_opponent"]) > 0
+    avoidable, unavoidable = columns["avoidable"] > 0, columns["unavoidable"] > 0
+    goal, bare = columns["goal_s"].sum(), columns["unshielded_goal_s"].sum()
+    return {
+        "encounters": n,
+        "breached": int(breached.sum()),
+        "breached_upper": upper_bound(int(breached.sum()), n),
+        "unshielded_breached": int(
+            (columns["unshielded_breaches_teammate"] + columns["unshielded_breaches_opponent"] > 0).sum()
+        ),
+        "avoidable": int(avoidable.sum()),
+        "avoidable_upper": upper_bound(int(avoidable.sum()), n),
+        "unavoidable": int((unavoidable & ~avoidable).sum()),
+        "started_inside": int((breached & (columns["started_inside"] > 0) & ~avoidable & ~unavoidable).sum()),
+        "not_judged": int((breached & (columns["not_judged"] > 0) & ~avoidable & ~unavoidable).sum()),
+        "breaches_teammate": int(columns["breaches_teammate"].sum()),
+        "breaches_opponent": int(columns["breaches_opponent"].sum()),
+        "closest_m": float(columns["closest_m"].min()),
+        "closest_quantiles_m": np.quantile(columns["closest_m"], QUANTILES).tolist(),
+        "changed_percent": 100.0 * float(columns["changed_share"].mean()),
+        "heading_change_deg": _mean(columns["heading_change_deg"], columns["changed_share"]),
+        "speed_change_mps": _mean(columns["speed_change_mps"], columns["changed_share"]),
+        "goal_time_ratio": float(goal / bare) if bare > 0 else None,
+        "reached_percent": 100.0 * float(columns["reached"].mean()),
+        "deadlocked": int((columns["deadlocks"] > 0).sum()),
+        "reversals_per_min": float(columns["reversals_per_min"].mean()),
+        "unshielded_reversals_per_min": float(columns["unshielded_reversals_per_min"].mean()),
+        "outside_m": float(columns["outside_m"].max()),
+        "decision_us": float(np.median(columns["decision_us"])),
+        "decision_p999_us": float(columns["decision_p999_us"].max()),
+    }
+
+
+QUANTILES = np.linspace(0.0, 1.0, 101)
+
+
+def _mean(values: np.ndarray, weights: np.ndarray) -> float | None:
+    """Mean over the changed steps of all encounters; None without any."""
+    chosen = weights > 0.0
+    return float(np.average(values[chosen], weights=weights[chosen])) if chosen.any() else None
