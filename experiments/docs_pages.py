@@ -9,13 +9,14 @@ from typing import Any
 from steerclear.shield.exceptions import ConfigError
 
 from .bench.report import bench_tables
+from .comparison_page import STEM, write_comparison
 from .docs_plots import plot_off_on
 from .keys import KEYS
+from .markdown import MADE, table
 from .tables import interval_text, number_text
 from .tally import RADII_M, breach_column
 from .verdicts import HEADS, verdict_rows
 
-MADE = "<!-- made by `steerclear docs`; do not edit -->"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -23,7 +24,8 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
     """Write the pages that results give, and the page of JSON keys.
 
     Args:
-        results: contents of JSON files that ``ablate``, ``evaluate`` or ``bench`` wrote.
+        results: contents of JSON files that ``ablate``, ``evaluate``, ``bench`` or ``encounters`` wrote; all those of
+            ``encounters`` go into one comparison.
         folder: where to.
 
     Returns:
@@ -35,8 +37,11 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
     pages = {"json_keys.md": keys_page()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        pictures = []
-        for content in results:
+        pictures: list[Path] = []
+        encounters = [content for content in results if content.get("command") == "encounters"]
+        if encounters:
+            pages[f"{STEM}.md"], pictures = write_comparison(encounters, folder)
+        for content in (one for one in results if one.get("command") != "encounters"):
             name, text, picture = _page_of(content, folder)
             pages[name] = text
             pictures += picture
@@ -52,7 +57,8 @@ def _page_of(content: Mapping[str, Any], folder: Path) -> tuple[str, str, list[P
     if command == "bench":
         return "bench.md", bench_page(content), []
     if command not in ("ablate", "evaluate"):
-        raise ConfigError(f"no page can be made of results of {command!r}; give results of ablate, evaluate or bench")
+        known = "ablate, evaluate, bench or encounters"
+        raise ConfigError(f"no page can be made of results of {command!r}; give results of {known}")
     stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
     plots = _plots(content, folder, stem) if command == "ablate" and content["pairings"] else []
     return f"{stem}.md", runs_page(content, plots), plots
@@ -76,7 +82,7 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     for summary in content["pairings"]:
         lines += [f"## {summary['pairing']}", "", *_metrics_table(summary), ""]
         if summary.get("verdicts"):
-            lines += ["Breaches judged in hindsight:", "", *_markdown(HEADS, _verdicts(summary)), ""]
+            lines += ["Breaches judged in hindsight:", "", *table(HEADS, _verdicts(summary)), ""]
         if summary["reasons"]:
             lines += [_reasons_line(summary["reasons"]), ""]
     if content["bars"]:
@@ -87,8 +93,8 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
 def bench_page(content: Mapping[str, Any]) -> str:
     """Write the page of a benchmark."""
     lines = ["# Speed and memory", "", MADE, "", _machine_line(content), ""]
-    for table in bench_tables(content):
-        lines += [f"## {table.title}", "", *_markdown(table.heads, table.rows), ""]
+    for one in bench_tables(content):
+        lines += [f"## {one.title}", "", *table(one.heads, one.rows), ""]
     return "\n".join([*lines, "## Bars", "", *_bars_table(content["bars"]), ""])
 
 
@@ -97,7 +103,7 @@ def keys_page() -> str:
     lines = ["# JSON keys", "", MADE, "", "`*` stands for a name that depends on the run, `[]` for every entry.", ""]
     for command, keys in KEYS.items():
         rows = [(f"`{name}`", words) for name, words in keys.items()]
-        lines += [f"## `steerclear {command} --json`", "", *_markdown(["key", "meaning"], rows), ""]
+        lines += [f"## `steerclear {command} --json`", "", *table(["key", "meaning"], rows), ""]
     return "\n".join(lines)
 
 
@@ -126,7 +132,7 @@ def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
         [figures["label"], *(interval_text(figures.get(key)) for key, _ in present)]
         for figures in summary["metrics"].values()
     ]
-    return _markdown(["", *(head for _, head in present)], rows)
+    return table(["", *(head for _, head in present)], rows)
 
 
 def _verdicts(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -139,15 +145,10 @@ def _bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:
         [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
         for bar in bars
     ]
-    return _markdown(["", "measured", "bar", ""], rows)
+    return table(["", "measured", "bar", ""], rows)
 
 
 def _reasons_line(reasons: Mapping[str, int]) -> str:
     total = sum(reasons.values()) or 1
     parts = [f"{name} {100 * count / total:.2f} %" for name, count in reasons.items() if count]
     return f"Decisions: {', '.join(parts)} of {total:,} boat-steps."
-
-
-def _markdown(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
-    ruler = ["---", *("---:" for _ in heads[1:])]
-    return [f"| {' | '.join(str(cell) for cell in row)} |" for row in (heads, ruler, *rows)]

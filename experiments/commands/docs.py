@@ -13,7 +13,8 @@ from ..docs_pages import write_pages
 from ..results import NAMES
 from .console import command, out
 
-Sources = Annotated[list[Path] | None, typer.Argument(help="Results folders or JSON files of ablate, evaluate, bench.")]
+COMMANDS = "ablate, evaluate, bench or encounters"
+Sources = Annotated[list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {COMMANDS}.")]
 Folder = Annotated[Path, typer.Option("--out", help="Folder for the pages.")]
 
 
@@ -34,5 +35,5 @@ def _read(source: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot read results from {path} ({error}); give a results folder or a JSON file") from error
     if not isinstance(content, dict):
-        raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of ablate or bench")
+        raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {COMMANDS}")
     return content

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.textbook import NAMES, Gains, TextbookGuard, make_guard
-from steerclear.experiments.textbook.drill import FAMILIES, openings, run_drill
-from steerclear.experiments.textbook.sweep import candidates, cost, measure
+from steerclear.experiments.textbook import NAMES, Gains, TextbookGuard, make_guard, sweep
+from steerclear.experiments.textbook.parameters import TUNED
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
+from textbook_drill import FAMILIES, openings, run_drill
 
 CONFIG = ShieldConfig(edge_m=None)
 GAMES = 24
@@ -53,12 +53,12 @@ def test_a_unicycle_keeps_the_radius_while_its_program_has_an_answer(name, gains
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_heron_head_on_is_avoided_and_still_gets_on(name):
+def test_heron_head_on_is_avoided_and_commands_pass_again(name):
     assert play(None, "heron", "head_on").breached.all()
     outcome = play(name, "heron", "head_on")
     assert not outcome.breached.any()
     assert (outcome.changed > 0.0).all()
-    assert outcome.progress.mean() > 0.2
+    assert (outcome.changed < 1.0).all()
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -74,9 +74,21 @@ def test_unknown_encounters_are_refused():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_sweep_can_be_run_again(name):
-    tried = list(candidates(name))
-    assert len(tried) > 5
-    breaches, changed = cost(measure(name, "heron", tried[0], games=4, seed=1))
-    assert 0 <= breaches <= 4 * len(FAMILIES)
-    assert 0.0 < changed < len(FAMILIES)
+def test_the_sweep_takes_the_safest_then_the_gentlest(name, monkeypatch):
+    tried = list(sweep.candidates(name))
+    assert len(set(tried)) > 5
+    assert TUNED[name, "heron"] in tried
+    assert TUNED[name, "surveyor"] in tried
+    figures = {gains: {"head_on": {"breached": 1, "changed_percent": 0.0}} for gains in tried}
+    figures[tried[3]] = {"head_on": {"breached": 0, "changed_percent": 40.0}}
+    figures[tried[5]] = {"head_on": {"breached": 0, "changed_percent": 30.0}}
+    monkeypatch.setattr(sweep, "try_out", lambda name, platform, gains, encounters, seed: figures[gains])
+    assert sweep.best(name, "heron") == tried[5]
+
+
+def test_the_sweep_plays_encounters():
+    figures = sweep.try_out("collision_cone", "heron", Gains(3.0), encounters=3, seed=1)
+    assert list(figures) == list(sweep.FAMILIES)
+    assert figures["head_on"]["encounters"] == 3
+    assert 0.0 < sweep.cost(figures)[1] < 100.0 * len(figures)
+    assert figures["crossing_left"]["unshielded_breached"] > 0

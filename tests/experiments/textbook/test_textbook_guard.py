@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from steerclear.experiments.textbook import NAMES, TextbookGuard, make_guard
-from steerclear.experiments.textbook.drill import openings
+from steerclear.experiments.textbook.parameters import PUBLISHED
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.platforms import fresh_state
 from steerclear.shield.platforms import layout as L
+from textbook_drill import openings
 
 CONFIG = ShieldConfig(edge_m=None)
 FILTERS = pytest.mark.parametrize("name", NAMES)
@@ -34,8 +35,8 @@ def guard_for(name, state, team=None, platform="heron", gains=None):
 @FILTERS
 def test_safe_commands_pass_bit_for_bit(name):
     random = np.random.default_rng(1)
-    state = scene((0, 0, 0), (60, 5, 90), (-70, 0, -90))
-    guard = guard_for(name, state)
+    state = scene((0, 0, 0), (600, 5, 90), (-700, 0, -90))
+    guard = guard_for(name, state, gains=PUBLISHED[name])
     for _ in range(50):
         wanted = np.stack([random.uniform(0, 2, (1, 3)), random.uniform(-40, 40, (1, 3))], axis=2)
         sent = guard.decide(state, wanted, np.array([[True, True, True]]))

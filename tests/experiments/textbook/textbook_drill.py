@@ -1,4 +1,4 @@
-"""A few small encounters of two boats of one platform in open water: what the gains are tuned on."""
+"""Small encounters of two boats in open water, for platforms without a name too."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from steerclear.experiments.textbook.jit import kernel
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
@@ -14,8 +15,6 @@ from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.limits import cruise
 from steerclear.shield.platforms.usv import wrap_degrees
-
-from .jit import kernel
 
 FAMILIES = ("head_on", "crossing", "rammer")
 LEAD_S = 12.0

@@ -1,0 +1,140 @@
+"""Text and plot of the comparison page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+from .comparison import NO_GUARD, Contest, cells_of, contests_of
+from .markdown import MADE, table
+
+STEM = "comparison"
+COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
+OTHERS = ("#b5532a", "#6a4c93", "#2e7d32", "#c99700", "#ad1457", "#37474f")
+
+
+def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, list[Path]]:
+    """Make the page of results of ``encounters``, and draw its plot into the folder.
+
+    Args:
+        results: contents of their JSON files; guards may be spread over several.
+        folder: which exists.
+
+    Returns:
+        The text, and the pictures written.
+
+    Raises:
+        ConfigError: no cell to compare.
+    """
+    contests = [contest for contest in contests_of(c for content in results for c in cells_of(content))
+                if contest.families]  # fmt: skip
+    if not contests:
+        raise ConfigError("the encounter results have no family that all guards met; run them with the same --families")
+    picture = plot_contests(contests, folder / f"{STEM}.png")
+    versions = sorted({str((content.get("versions") or {}).get("steerclear")) for content in results})
+    return comparison_page(contests, picture, versions), [picture]
+
+
+def comparison_page(contests: Sequence[Contest], picture: Path, versions: Sequence[str]) -> str:
+    """Write the page."""
+    lines = ["# Guards on the same encounters", "", MADE, "", _intro(versions), "", f"![plot]({picture.name})", ""]
+    for contest in contests:
+        lines += [f"## {contest.title}", "", _winner_line(contest), "", *_totals_table(contest), ""]
+        lines += ["Encounters breached, and share of commands changed:", "", *_families_table(contest), ""]
+    return "\n".join(lines)
+
+
+def _intro(versions: Sequence[str]) -> str:
+    return (
+        f"Results of `steerclear encounters`, steerclear {', '.join(versions)}. All guards of a section met the same "
+        "encounters. *Breached* counts encounters in which an own boat came within the radius of another boat, "
+        "*avoidable* those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % "
+        "upper limit of the probability. *Time to goal* is that without a guard times the number. The filters of the "
+        "literature are [`experiments/textbook`](../experiments/textbook/__init__.py), with gains chosen by "
+        "their own sweep on these platforms."
+    )
+
+
+def _winner_line(contest: Contest) -> str:
+    families = f"Families: {', '.join(contest.families)}; seed {contest.seed}."
+    if contest.left_out:
+        families += f" Not met equally by all guards and left out: {', '.join(contest.left_out)}."
+    if contest.winner is None:
+        return families
+    rule = "fewest avoidable or unjudged, then fewest breached, then fewest commands changed"
+    return f"Best ({rule}): **{contest.winner}**. {families}"
+
+
+def _totals_table(contest: Contest) -> list[str]:
+    heads = ["guard", "encounters", "avoidable", "unavoidable", "not judged", "breached", "commands changed",
+             "time to goal", "deadlocked", "reversals / min", "µs per decision"]  # fmt: skip
+    rows = []
+    for guard, one in contest.totals.items():
+        name = f"**{guard}**" if guard == contest.winner else guard
+        rows.append([
+            name, f"{one['encounters']:,}", _bounded(one, "avoidable"), one["unavoidable"], one["not_judged"],
+            _bounded(one, "breached"), f"{one['changed_percent']:.1f} %", _number(one["goal_time_ratio"], 2),
+            one["deadlocked"], _number(one["reversals_per_min"], 1), _number(one["decision_us"], 1),
+        ])  # fmt: skip
+    return table(heads, rows)
+
+
+def _families_table(contest: Contest) -> list[str]:
+    rows = [
+        [
+            family,
+            *(
+                f"{cells[family]['breached']}, {cells[family]['changed_percent']:.0f} %"
+                for cells in contest.cells.values()
+            ),
+        ]
+        for family in contest.families
+    ]
+    return table(["", *contest.cells], rows)
+
+
+def _bounded(figures: Mapping[str, Any], key: str) -> str:
+    return f"{figures[key]} [{100.0 * figures[f'{key}_upper']:.2g} %]"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
+    """Draw share of encounters breached, with its upper limit, over share of commands changed: one panel each."""
+    from matplotlib.figure import Figure  # without pyplot: no window system is touched
+
+    across = min(len(contests), 3)
+    down = math.ceil(len(contests) / across)
+    canvas = Figure(figsize=(4.4 * across, 3.6 * down), layout="constrained", dpi=150)
+    axes = canvas.subplots(down, across, squeeze=False).ravel()
+    names = list(dict.fromkeys(guard for contest in contests for guard in contest.cells))
+    spare = iter(OTHERS * (1 + len(names) // len(OTHERS)))
+    colours = {name: COLOURS[name] if name in COLOURS else next(spare) for name in names}
+    for axis, contest in zip(axes, contests, strict=False):
+        _draw(axis, contest, colours)
+    for axis in axes[len(contests) :]:
+        axis.set_visible(False)
+    handles, labels = axes[0].get_legend_handles_labels()
+    canvas.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    canvas.savefig(path)
+    return path
+
+
+def _draw(axis: Any, contest: Contest, colours: Mapping[str, str]) -> None:
+    for guard, one in contest.totals.items():
+        share = 100.0 * one["breached"] / one["encounters"]
+        above = [[0.0], [100.0 * one["breached_upper"] - share]]
+        axis.errorbar(one["changed_percent"], share, above, fmt="o", capsize=3, color=colours[guard], label=guard)
+    axis.set_yscale("symlog", linthresh=0.1)
+    axis.set_ylim(bottom=-0.02)
+    axis.set_title(contest.title, fontsize=9)
+    axis.set_xlabel("commands changed, %", fontsize=8)
+    axis.set_ylabel("encounters breached, %", fontsize=8)
+    axis.tick_params(labelsize=8)
+    axis.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,114 @@
+"""The comparison of guards: who met the same encounters, figures over families, the page."""
+
+import pytest
+from steerclear.experiments.comparison import cells_of, contests_of
+from steerclear.experiments.docs_pages import write_pages
+from steerclear.shield.exceptions import ConfigError
+
+SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}
+
+
+def cell(guard, family, breached=0, avoidable=0, changed=5.0, n=100, own="heron", **more):
+    return {
+        "guard": guard, "family": family, "own": own, "other": "heron", "encounters": n, "breached": breached,
+        "avoidable": avoidable, "unavoidable": breached - avoidable, "not_judged": 0, "deadlocked": 0,
+        "changed_percent": changed, "goal_time_ratio": 1.1, "reversals_per_min": 2.0, "decision_us": 9.0, **more,
+    }  # fmt: skip
+
+
+def content(*cells, **settings):
+    return {
+        "command": "encounters", "settings": SETTINGS | settings, "versions": {"steerclear": "9.9"}, "cells": [*cells],
+    }  # fmt: skip
+
+
+def both(first="head_on", second="rammer_1"):
+    """A cautious guard that changes much, a bold one that fails once, none."""
+    return content(
+        *(cell("none", family, breached=60, changed=0.0, goal_time_ratio=1.0) for family in (first, second)),
+        cell("cautious", first, changed=40.0), cell("cautious", second, changed=60.0, n=100),
+        cell("bold", first, changed=1.0), cell("bold", second, breached=1, avoidable=1, changed=3.0),
+    )  # fmt: skip
+
+
+def one_contest(*contents):
+    (contest,) = contests_of(each for one in contents for each in cells_of(one))
+    return contest
+
+
+def test_counts_add_up_and_means_are_weighted():
+    contest = one_contest(
+        content(
+            cell("a", "head_on", breached=3, avoidable=1, changed=10.0, n=100),
+            cell("a", "rammer_1", breached=2, changed=40.0, n=300, goal_time_ratio=None),
+        )
+    )
+    figures = contest.totals["a"]
+    assert (figures["encounters"], figures["breached"], figures["avoidable"]) == (400, 5, 1)
+    assert figures["changed_percent"] == pytest.approx((10 * 100 + 40 * 300) / 400)
+    assert figures["goal_time_ratio"] == pytest.approx(1.1)
+    assert figures["breached_upper"] > 5 / 400
+
+
+def test_best_is_safe_first_then_gentle():
+    assert one_contest(both()).winner == "cautious"
+    gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "rammer_1", changed=50.0))
+    assert one_contest(both(), gentle).winner == "gentle"
+    assert one_contest(content(cell("none", "head_on"))).winner is None
+
+
+def test_breaches_nobody_judged_are_not_taken_for_unavoidable():
+    unjudged = cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0)
+    assert one_contest(content(unjudged, cell("open", "head_on", changed=90.0))).winner == "open"
+
+
+def test_only_families_that_all_met_count():
+    extra = content(cell("bold", "crossing_left", breached=50), cell("late", "head_on", changed=2.0))
+    contest = one_contest(both(), extra)
+    assert contest.families == ("head_on",)
+    assert set(contest.left_out) == {"rammer_1", "crossing_left"}
+    assert contest.totals["bold"]["encounters"] == 100
+    fewer = content(cell("late", "head_on", n=50))
+    assert one_contest(both(), fewer).families == ()
+
+
+def test_other_scenes_are_another_section():
+    titles = [
+        contest.title
+        for contest in contests_of(
+            each
+            for one in (both(), content(cell("a", "head_on"), seed=8), content(cell("a", "head_on"), delay_s=0.3))
+            for each in cells_of(one)
+        )
+    ]
+    assert titles == ["heron meets heron, 2.5 m"] * 2 + ["heron meets heron, 2.5 m, 0.3 s delay"]
+
+
+def test_conditions_and_figures_may_stand_in_their_own_mappings():
+    flat = cell("a", "head_on")
+    figures = {key: flat.pop(key) for key in list(flat) if key not in ("guard", "family", "own", "other")}
+    nested = {**flat, "summary": figures, "conditions": {"radius_m": 4.0}}
+    assert one_contest(content(nested)).title == "heron meets heron, 4 m"
+
+
+def test_the_page_shows_what_the_results_say(tmp_path):
+    page, picture = (
+        path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")
+    )
+    text = page.read_text()
+    assert (
+        "Best (fewest avoidable or unjudged, then fewest breached, then fewest commands changed): **cautious**" in text
+    )
+    assert "| **cautious** | 200 | 0 [1.5 %] | 0 | 0 | 0 [1.5 %] | 50.0 % |" in text
+    assert "| rammer_1 | 60, 0 % | 0, 60 % | 1, 3 % |" in text
+    assert "steerclear 9.9" in text
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_bad_results_are_refused(tmp_path):
+    broken = cell("a", "head_on")
+    del broken["avoidable"]
+    with pytest.raises(ConfigError, match="has no avoidable; run `encounters` again"):
+        write_pages([content(broken)], tmp_path)
+    with pytest.raises(ConfigError, match="no family that all guards met"):
+        write_pages([content()], tmp_path)
