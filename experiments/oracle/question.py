@@ -58,9 +58,18 @@ class Question:
             return True
         if (begin, level) in self.failures:
             return False
-        self.searches += 1
         start, others = self.rows[begin].copy(), self._reachable(begin)
-        lengths = _lengths(level.first_s, self.end - begin, self.dt_s)
+        whole = [self._search(begin, start, others, level, first_s) for first_s in level.schedules]
+        if begin not in self.plans:
+            self.failures[begin, level] = all(whole)
+        return begin in self.plans
+
+    def _search(self, begin: int, start: Array, others: Array, level: Level, first_s: tuple[float, ...]) -> bool:
+        """Search with one schedule unless a plan is known; returns whether no state was dropped."""
+        if begin in self.plans:
+            return True
+        self.searches += 1
+        lengths = _lengths(first_s, self.end - begin, self.dt_s)
         rudders, actions = np.array(sorted(level.rudders)), np.zeros(lengths.size, dtype=np.int64)
         sizes = np.array([level.position_m, level.position_m, level.heading_deg, level.speed_mps, level.thrust])
         limit_m = self.radius_m + ROUNDING_M
@@ -68,8 +77,7 @@ class Question:
             self.numbers, start, others, limit_m, self.dt_s, lengths, rudders, sizes, level.width, actions
         )
         if not found:
-            self.failures[begin, level] = whole
-            return False
+            return whole
         commands = np.empty((self.end - begin, 2))
         commands_of(self.numbers, start, actions, lengths, rudders, self.dt_s, commands)
         self._prove(begin, commands)

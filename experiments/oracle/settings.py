@@ -10,7 +10,7 @@ from .errors import OracleError
 
 @dataclass(frozen=True)
 class Level:
-    """Fineness of one search.
+    """Fineness of a search.
 
     Attributes:
         width: most states kept per layer.
@@ -19,7 +19,7 @@ class Level:
         speed_mps: see ``position_m``.
         thrust: see ``position_m``, percent.
         rudders: rudder choices, shares of full rudder.
-        first_s: lengths of the first choices, s; later ones are as the last.
+        schedules: each a search of its own: lengths of the first choices, s; later ones are as the last.
     """
 
     width: int
@@ -28,11 +28,13 @@ class Level:
     speed_mps: float
     thrust: float
     rudders: tuple[float, ...]
-    first_s: tuple[float, ...]
+    schedules: tuple[tuple[float, ...], ...]
 
 
-QUICK = Level(150, 0.5, 10.0, 0.25, 15.0, (-1.0, 0.0, 1.0), (0.5, 0.5, 0.5, 1.0))
-FULL = Level(2000, 0.05, 2.0, 0.03, 3.0, (-1.0, -0.5, 0.0, 0.5, 1.0), (0.1, 0.1, 0.1, 0.2, 0.2, 0.3))
+QUICK = Level(150, 0.5, 10.0, 0.25, 15.0, (-1.0, 0.0, 1.0), ((0.5, 0.5, 0.5, 1.0),))
+SCHEDULES = ((0.5,), (0.1, 0.1, 0.1, 0.2, 0.2, 0.3), (*(0.1,) * 15, *(0.2,) * 5, 0.3))
+"""Short choices catch the last moment, but differ by less than a cell on a slow boat; longer ones do not."""
+FULL = Level(2000, 0.05, 2.0, 0.03, 3.0, (-1.0, -0.5, 0.0, 0.5, 1.0), SCHEDULES)
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,13 @@ class Settings:
 
 
 def _check(level: Level) -> None:
-    numbers = [getattr(level, field.name) for field in fields(level) if field.name not in ("rudders", "first_s")]
-    sound = all(value > 0 for value in (*numbers, *level.first_s))
-    if not (sound and level.first_s and level.rudders and all(-1 <= value <= 1 for value in level.rudders)):
+    numbers = [getattr(level, field.name) for field in fields(level) if field.name not in ("rudders", "schedules")]
+    sound = all(value > 0 for value in (*numbers, *(length_s for first_s in level.schedules for length_s in first_s)))
+    if not (
+        sound
+        and level.schedules
+        and all(level.schedules)
+        and level.rudders
+        and all(-1 <= value <= 1 for value in level.rudders)
+    ):
         raise OracleError(f"a search level needs positive sizes and rudders within [-1, 1]; got {level}")

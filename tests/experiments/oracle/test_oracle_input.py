@@ -104,9 +104,18 @@ def test_too_little_to_look_back_at():
 
 
 @pytest.mark.parametrize(
-    "change", [{"width": 0}, {"thrust": -1.0}, {"rudders": (2.0,)}, {"rudders": ()}, {"first_s": ()}]
+    "change",
+    [
+        {"width": 0},
+        {"thrust": -1.0},
+        {"rudders": (2.0,)},
+        {"rudders": ()},
+        {"schedules": ()},
+        {"schedules": ((),)},
+        {"schedules": ((0.0,),)},
+    ],
 )
 def test_levels_that_cannot_search(change):
     level = {"width": 5, "position_m": 1.0, "heading_deg": 1.0, "speed_mps": 1.0, "thrust": 1.0, "rudders": (0.0,)}
     with pytest.raises(OracleError, match="search level needs"):
-        Settings(quick=Level(**{**level, "first_s": (0.5,), **change}))
+        Settings(quick=Level(**{**level, "schedules": ((0.5,),), **change}))

@@ -1,10 +1,14 @@
 """What a verdict means: where the search may begin and end, third boats, and both sides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracle_runs import DT_S, driven_track, first_breach, random_run, straight_track
 from steerclear.env.record import find_breaches
 from steerclear.experiments.oracle import Outcome, Responsible, Settings, judge, judge_breach, judge_breaches
+from steerclear.experiments.oracle.judge import _runs
+from steerclear.experiments.oracle.sides import _responsible
 from steerclear.shield.platforms import fresh_state, get_platform
 
 RADIUS_M = 2.5
@@ -30,7 +34,7 @@ def test_facts_of_a_verdict():
     assert verdict.plan.closest_m > RADIUS_M
     gap_m = np.hypot(*(states[:, 0, :2] - states[:, 1, :2]).T)
     assert verdict.end_step == step + int(np.argmax(gap_m[step:] > RADIUS_M)) + 50
-    assert 0 < verdict.searches < 40
+    assert 0 < verdict.searches < 80
 
 
 def test_avoidable_from_every_earlier_step():
@@ -116,8 +120,46 @@ def test_same_verdict_in_another_frame():
     assert abs(here.last_step - there.last_step) <= 1
 
 
+def test_stretches_end_where_the_pair_meets_or_any_boat_enters():
+    # from before an entry of a third boat more has to be avoided than from after it
+    inside = np.zeros((12, 2), dtype=bool)
+    inside[3:5, 0] = True
+    inside[8:10, 1] = True
+    assert _runs(inside, 0, 100) == [(100, 102), (105, 107), (108, 111)]
+
+
+def test_a_chance_after_an_earlier_contact_counts_alone():
+    # a boat that cannot be escaped touches at the start; the stopped boat further on can still be avoided
+    chaser = straight_track((0.0, -4.0), (0.0, 3.0), 200)
+    chaser[40:, 1] = chaser[40, 1] - 3.0 * DT_S * np.arange(len(chaser) - 40)
+    states, rows = heron_towards([straight_track((0.0, 30.0), (0.0, 0.0), 200), chaser])
+    assert first_breach(states, RADIUS_M, (0, 2)) < 20
+    step = first_breach(states, RADIUS_M)
+    assert judge(states, rows, 0, step, RADIUS_M, other=1).outcome is Outcome.AVOIDABLE
+
+
 class TestSides:
     """Who is responsible."""
+
+    @pytest.mark.parametrize(
+        ("first", "second", "expected"),
+        [
+            (20, 20, Responsible.BOTH),
+            (20, 21, Responsible.BOTH),
+            (20, 22, Responsible.SECOND),
+            (21, 20, Responsible.BOTH),
+            (22, 20, Responsible.FIRST),
+            (None, 0, Responsible.SECOND),
+            (0, None, Responsible.FIRST),
+            (None, None, Responsible.NEITHER),
+        ],
+    )
+    def test_the_later_last_chance_with_a_step_to_spare(self, first, second, expected):
+        states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
+        step = first_breach(states, RADIUS_M)
+        one = judge(states, rows, 0, step, RADIUS_M)
+        one, other = replace(one, last_step=first), replace(one, own=1, other=0, last_step=second)
+        assert _responsible(one, other, np.zeros((200, 2), dtype=bool)) is expected
 
     def test_the_one_with_the_last_chance(self):
         # the other cannot turn or brake: a point on a rail, so its last chance is none
