@@ -9,6 +9,7 @@ import typer
 from .commands.ablate import ablate
 from .commands.bench import bench
 from .commands.docs import docs
+from .commands.encounters import encounters
 from .commands.evaluate import evaluate
 from .commands.parity import parity
 from .commands.play import play
@@ -23,7 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, parity, bench, render, docs):
+for function in (play, evaluate, ablate, encounters, parity, bench, render, docs):
     app.command()(function)
 
 

@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
+
 BREACH = {
     "step": "first step inside the radius",
     "time_s": "the same as game time, s",
@@ -190,6 +192,8 @@ BENCH = {
     **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 
+ENCOUNTERS = {**_PROVENANCE, **_ENCOUNTERS, **{f"bars[].{k}": v for k, v in _BAR.items()}}
+
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
 KEYS = {
@@ -198,6 +202,7 @@ KEYS = {
     "play": PLAY,
     "parity": PARITY,
     "bench": BENCH,
+    "encounters": ENCOUNTERS,
     "render": RENDER,
 }
 

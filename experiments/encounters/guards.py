@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -142,8 +142,3 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
     from ..textbook import make_guard
 
     return make_guard(base, *fleet)
-
-
-def describe(names: Sequence[str]) -> str:
-    """Names as words."""
-    return ", ".join(names)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +19,12 @@ from .verdicts import VERDICT_COLUMNS, judge_game
 
 CHUNK_MIB = 96.0
 """Memory of a chunk's films, MiB."""
-BASE = ("goal_s", "closest_m", "breaches_teammate", "breaches_opponent", "reversals_per_min")
-"""Columns that are kept of the same scene without a guard, with ``unshielded_`` before the name."""
-logger = logging.getLogger(__name__)
+MOST_PER_CHUNK = 100
+"""Encounters of a chunk: what an interrupted run may lose."""
+BARE_SAME = ("goal_s", "reversals_per_min")
+"""Columns kept of the same variant without a guard, with ``unshielded_`` before the name."""
+BARE_WORST = ("closest_m", "breaches_teammate", "breaches_opponent")
+"""Columns kept of the variant that is worst without a guard."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def chunks(
 def chunk_size(sample: Scenes) -> int:
     """Encounters per chunk: their films, with a guard and without, take about `CHUNK_MIB`."""
     per_game = 2 * 8 * sample.steps * len(sample.team) * (sample.state.shape[2] + 5)
-    return max(1, min(500, int(CHUNK_MIB * 2**20 / (per_game * sample.games))))
+    return max(1, min(MOST_PER_CHUNK, int(CHUNK_MIB * 2**20 / (per_game * sample.games))))
 
 
 def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Conditions, judge: bool = True) -> Columns:
@@ -97,7 +99,7 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
 
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
-        those of `tally.tally`, ``unshielded_*`` of `BASE`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
+        those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
         game and step), and the verdicts.
     """
     film = play(scenes, guard, conditions)
@@ -107,7 +109,9 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
     columns = {"number": scenes.number[worst].astype(np.float64), "game": worst.astype(np.float64)}
     columns["variant"] = np.array([game - np.argmax(scenes.number == scenes.number[game]) for game in worst], float)
     columns |= {name: values[worst] for name, values in counted.items()}
-    columns |= {f"unshielded_{name}": bare[name][worst] for name in BASE}
+    columns |= {f"unshielded_{name}": bare[name][worst] for name in BARE_SAME}
+    worst_bare = worst_games(scenes, bare["closest_m"])
+    columns |= {f"unshielded_{name}": bare[name][worst_bare] for name in BARE_WORST}
     columns["decision_us"] = np.full(len(worst), float(np.median(film.decision_us)))
     columns["decision_p999_us"] = np.full(len(worst), float(np.quantile(film.decision_us, 0.999)))
     return columns | _verdicts(film, worst, counted, judge)
@@ -130,6 +134,3 @@ def _verdicts(film: Film, worst: np.ndarray, counted: Columns, judge: bool) -> C
             for name, value in found.items():
                 columns[name][k] = value
     return columns
-
-
-Notice = Callable[[int], None]

@@ -44,6 +44,7 @@ def summarise(columns: Columns) -> dict[str, Any]:
         "breaches_opponent": int(columns["breaches_opponent"].sum()),
         "closest_m": float(columns["closest_m"].min()),
         "closest_quantiles_m": np.quantile(columns["closest_m"], QUANTILES).tolist(),
+        "unshielded_closest_quantiles_m": np.quantile(columns["unshielded_closest_m"], QUANTILES).tolist(),
         "changed_percent": 100.0 * float(columns["changed_share"].mean()),
         "heading_change_deg": _mean(columns["heading_change_deg"], columns["changed_share"]),
         "speed_change_mps": _mean(columns["speed_change_mps"], columns["changed_share"]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import logging
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from .scenes import DT_S
 MOST_JUDGED = 5
 """Breaches of one game that are judged; a crowd without a guard has hundreds."""
 VERDICT_COLUMNS = ("avoidable", "unavoidable", "started_inside", "not_judged", "last_preventable_s")
-logger = logging.getLogger(__name__)
 
 
 def judge_game(film: Film, game: int) -> dict[str, float]:

@@ -1,0 +1,153 @@
+"""``steerclear encounters``: thousands of boats that meet, with any guard, counted and judged."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear.shield.exceptions import ConfigError
+
+from ..encounters.campaign import Campaign, Pair, Settings
+from ..encounters.families import FAMILIES
+from ..encounters.guards import parse_guards
+from ..encounters.results import cells_table, results_of, write_all
+from ..encounters.scenes import Conditions
+from ..pool import check_jobs
+from ..store import LINES_FILE, ResultStore, write_json
+from ..tables import bars_table
+from . import options as o
+from .console import Interrupted, command, finish, out, progress
+from .games import default_folder
+from .scenes import play_scene_files
+
+Platform = Annotated[
+    str, typer.Option(metavar="A,B/C", help="Platforms: heron, or own/other as heron/surveyor, separated by commas.")
+]
+Family = Annotated[str, typer.Option(metavar="A,B", help="Families of encounters, or all.")]
+Number = Annotated[int, typer.Option("--n", metavar="N", help="Encounters per family, platforms and guard.")]
+GuardNames = Annotated[
+    list[str] | None,
+    typer.Option("--guard", metavar="A,B", help="none, shield, shield:KEY=VALUE,..., or a filter of the literature."),
+]
+Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.")]
+Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]
+Noise = Annotated[float, typer.Option(metavar="M", help="Bound on the error of positions seen, m.")]
+Current = Annotated[float, typer.Option(metavar="M/S", help="Speed of a current that the guard is not told of.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
+NoJudge = Annotated[bool, typer.Option("--no-judge", help="Do not ask the oracle about breaches.")]
+SceneFiles = Annotated[
+    list[Path] | None, typer.Option("--scene", metavar="FILE", help="Play scenes of a file instead.")
+]
+Folder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder.", show_default="results/...")]
+
+
+@command
+def encounters(
+    platform: Platform = "heron,surveyor",
+    family: Family = "all",
+    n: Number = 1000,
+    guard: GuardNames = None,
+    radius: Radius = 2.5,
+    delay: Delay = 0.0,
+    noise: Noise = 0.0,
+    current: Current = 0.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the scenes, the same for every guard.")] = 0,
+    folder: Folder = None,
+    workers: Workers = None,
+    resume: o.Resume = False,
+    no_judge: NoJudge = False,
+    scene: SceneFiles = None,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Let boats meet in every way there is; count breaches, judge them, write table, report and replays.
+
+    Exit status: 0 done, 1 an avoidable breach with the shield on, 2 bad input, 130 interrupted.
+    """
+    guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_guards(text)))
+    if scene:
+        finish(play_scene_files(scene, guards, folder, not no_judge))
+        return
+    settings = Settings(
+        platforms=platform_pairs(platform),
+        families=family_names(family),
+        guards=guards,
+        n=n,
+        seed=seed,
+        conditions=Conditions(radius, delay, noise, current),
+        judge=not no_judge,
+    )
+    results = _run(settings, folder, workers, resume)
+    if json_file is not None:
+        write_json(json_file, results)
+    if results["failed"]:
+        raise ConfigError(f"{len(results['failed'])} chunks could not be played (see above); mend it, then --resume")
+    finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
+
+
+def platform_pairs(text: str) -> tuple[Pair, ...]:
+    """Read ``heron,heron/surveyor`` as pairs of own and other platform.
+
+    Raises:
+        ConfigError: no name, or more than two in a pair.
+    """
+    pairs = []
+    for piece in filter(None, (part.strip() for part in text.split(","))):
+        own, _, other = piece.partition("/")
+        if not own or "/" in other or piece.endswith("/"):
+            raise ConfigError(f"--platform holds {piece!r}; write a name, or own/other")
+        pairs.append((own, other or own))
+    if not pairs:
+        raise ConfigError("--platform names no platform; write e.g. heron,surveyor")
+    return tuple(dict.fromkeys(pairs))
+
+
+def family_names(text: str) -> tuple[str, ...]:
+    """Read names of families; ``all`` is every one.
+
+    Raises:
+        ConfigError: no name.
+    """
+    names = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+    if not names:
+        raise ConfigError(f"--family names none; write all, or some of {', '.join(FAMILIES)}")
+    return tuple(FAMILIES) if names == ("all",) else names
+
+
+def _run(settings: Settings, folder: Path | None, workers: int | None, resume: bool) -> dict[str, Any]:
+    if resume and folder is None:
+        raise ConfigError("--resume needs the --out folder of the run to go on with")
+    folder = folder or default_folder("encounters")
+    processes = check_jobs(workers)
+    campaign = Campaign(settings, ResultStore(folder, resume), processes)
+    started = time.perf_counter()
+    try:
+        with progress("encounters", campaign.encounters) as notice:
+            campaign.run(notice)
+    except KeyboardInterrupt:
+        results = results_of(campaign, time.perf_counter() - started)
+        if results["cells"]:
+            write_all(folder, results, campaign, replays=False)
+        kept = f"{results['encounters_played']} of {campaign.encounters} encounters kept in {folder / LINES_FILE}"
+        again = f"the same command with --out {folder} --resume goes on from there"
+        raise Interrupted(f"interrupted: {kept}; {again}") from None
+    results = results_of(campaign, time.perf_counter() - started)
+    if results["cells"]:
+        write_all(folder, results, campaign)
+    _show(results, folder)
+    return results
+
+
+def _show(results: dict[str, Any], folder: Path) -> None:
+    console = out()
+    for table in cells_table(results):
+        console.print(table)
+        console.print()
+    if results["bars"]:
+        console.print(bars_table(results["bars"]))
+        console.print()
+    for failed in results["failed"]:
+        console.print(f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", soft_wrap=True)
+    for name in results["files"].values():
+        console.print(f"{folder / name}", soft_wrap=True)

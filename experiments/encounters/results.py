@@ -1,0 +1,119 @@
+"""Putting together what a run of encounters gave: results.json, report, replay, the table of the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group
+from rich.text import Text
+
+from ..provenance import machine, versions
+from ..store import LINES_FILE, write_json
+from ..tables import number_text, titled
+from .campaign import Campaign, cell_summaries
+from .families import FAMILIES
+from .guards import SHIELD
+from .replays import replay_worst, worst_encounters
+from .report import write_encounter_report
+
+UNAVOIDABLE_PERCENT = 1.0
+"""Most encounters with several others that may be breached unavoidably, %."""
+
+
+def results_of(campaign: Campaign, wall_s: float) -> dict[str, Any]:
+    """Content of results.json, of what is on disk."""
+    columns = campaign.columns()
+    cells = cell_summaries(columns)
+    played = sum(cell["encounters"] for cell in cells)
+    return {
+        "command": "encounters",
+        "complete": played == campaign.encounters,
+        "settings": campaign.settings.as_dict(),
+        "versions": versions(),
+        "machine": machine(),
+        "wall_s": wall_s,
+        "encounters_played": played,
+        "encounters_resumed": campaign.resumed,
+        "failed": campaign.failed,
+        "cells": cells,
+        "bars": bars_of(cells),
+        "worst": worst_encounters(columns),
+        "files": {"games": LINES_FILE},
+    }
+
+
+def bars_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Bars of every shield: no avoidable breach, few unavoidable ones among several others.
+
+    A count that the oracle was not asked about leaves the bar without data.
+    """
+    bars = []
+    for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
+        own = [cell for cell in cells if cell["guard"] == guard]
+        many = [cell for cell in own if FAMILIES[cell["family"]].others > 1]
+        bars.append(_bar(f"{guard}: encounters with avoidable breaches", _total(own, "avoidable"), 0.0, own))
+        if many:
+            share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
+            bars.append(_bar(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
+    return bars
+
+
+def is_shield(guard: str) -> bool:
+    """Whether a guard is the shield, with whatever settings."""
+    return guard.partition(":")[0] == SHIELD
+
+
+def _total(cells: Sequence[Mapping[str, Any]], name: str) -> float:
+    return float(sum(cell[name] for cell in cells))
+
+
+def _bar(name: str, value: float, limit: float, cells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    met: bool | None = value <= limit
+    if met and any(cell["not_judged"] for cell in cells):
+        met = None
+    return {"name": name, "value": value, "low": None, "high": None, "sense": "<=", "limit": limit, "met": met}
+
+
+def write_all(folder: Path, results: dict[str, Any], campaign: Campaign, replays: bool = True) -> Path:
+    """Write replay, report and results.json into the folder; names are noted under ``files``."""
+    settings = campaign.settings
+    results["files"] |= {"report": "report.html", "results": "results.json"}
+    if replays and results["worst"]:
+        replay_worst(results["worst"], settings.conditions, settings.seed, folder / "replay.html")
+        results["files"]["replay"] = "replay.html"
+    write_encounter_report(results, folder / "report.html")
+    write_json(folder / "results.json", results)
+    return folder / "results.json"
+
+
+def cells_table(results: Mapping[str, Any]) -> list[Group]:
+    """Tables for the terminal, one per pair of platforms and guard."""
+    cells = results["cells"]
+    groups = dict.fromkeys((cell["own"], cell["other"], cell["guard"]) for cell in cells)
+    return [_table(*group, [c for c in cells if (c["own"], c["other"], c["guard"]) == group]) for group in groups]
+
+
+def _table(own: str, other: str, guard: str, cells: Sequence[Mapping[str, Any]]) -> Group:
+    heads = ["", "n", "bare", "hit", "<=%", "avoid.", "unav.", "closest", "chg%", "time", "dead", "rev/m", "us"]
+    rows: list[list[str | Text]] = [[cell["family"], *_figures(cell)] for cell in cells]
+    return titled(f"{own} meets {other}, guard {guard}", heads, rows)
+
+
+def _figures(cell: Mapping[str, Any]) -> list[str | Text]:
+    avoidable = f"{cell['avoidable']}" + (f"+{cell['not_judged']}?" if cell["not_judged"] else "")
+    return [
+        f"{cell['encounters']}",
+        f"{cell['unshielded_breached']}",
+        f"{cell['breached']}",
+        number_text(100.0 * cell["breached_upper"]),
+        Text(avoidable, "red" if cell["avoidable"] and is_shield(cell["guard"]) else ""),
+        f"{cell['unavoidable'] + cell['started_inside']}",
+        number_text(cell["closest_m"]),
+        number_text(cell["changed_percent"]),
+        number_text(cell["goal_time_ratio"]),
+        f"{cell['deadlocked']}",
+        number_text(cell["reversals_per_min"]),
+        number_text(cell["decision_us"]),
+    ]
