@@ -104,14 +104,14 @@ def _contest(
 
 
 def _pool(cells: Sequence[Cell]) -> dict[str, Any]:
-    """Counts added up, means weighted with encounters; None where there is nothing to take a mean of."""
+    """Counts added up, means weighted with encounters (None without any); what nobody judged may be avoidable."""
     pooled: dict[str, Any] = {key: sum(cell[key] for cell in cells) for key in COUNTS}
     for key in MEANS:
         parts = [(cell[key], cell["encounters"]) for cell in cells if cell[key] is not None]
         weight = sum(count for _, count in parts)
         pooled[key] = sum(value * count for value, count in parts) / weight if weight else None
-    for key in ("breached", "avoidable"):
-        pooled[f"{key}_upper"] = upper_bound(pooled[key], pooled["encounters"])
+    pooled["breached_upper"] = upper_bound(pooled["breached"], pooled["encounters"])
+    pooled["avoidable_upper"] = upper_bound(pooled["avoidable"] + pooled["not_judged"], pooled["encounters"])
     return pooled
 
 

@@ -98,7 +98,10 @@ def _families_table(contest: Contest) -> list[str]:
 
 
 def _bounded(figures: Mapping[str, Any], key: str) -> str:
-    return f"{figures[key]} [{100.0 * figures[f'{key}_upper']:.2g} %]"
+    count = str(figures[key])
+    if key == "avoidable" and figures["not_judged"]:
+        count += f" to {figures[key] + figures['not_judged']}"
+    return f"{count} [{100.0 * figures[f'{key}_upper']:.2g} %]"
 
 
 def _number(value: float | None, digits: int) -> str:

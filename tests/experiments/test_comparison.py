@@ -1,7 +1,10 @@
 """The comparison of guards: who met the same encounters, figures over families, the page."""
 
+from pathlib import Path
+
 import pytest
 from steerclear.experiments.comparison import cells_of, contests_of
+from steerclear.experiments.comparison_page import comparison_page
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError
 
@@ -59,7 +62,10 @@ def test_best_is_safe_first_then_gentle():
 
 def test_breaches_nobody_judged_are_not_taken_for_unavoidable():
     unjudged = cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0)
-    assert one_contest(content(unjudged, cell("open", "head_on", changed=90.0))).winner == "open"
+    contest = one_contest(content(unjudged, cell("open", "head_on", changed=90.0)))
+    assert contest.winner == "open"
+    assert contest.totals["hidden"]["avoidable_upper"] == contest.totals["hidden"]["breached_upper"]
+    assert "| hidden | 100 | 0 to 1 [" in comparison_page([contest], Path("plot.png"), ["9.9"])
 
 
 def test_only_families_that_all_met_count():
