@@ -33,3 +33,7 @@ class TraceError(SteerclearError, ValueError):
 
 class SolverError(SteerclearError, RuntimeError):
     """A QP backend is missing or cannot be used."""
+
+
+class TableError(SteerclearError, ValueError):
+    """A reachability value table is missing, damaged, made for other boats, or cannot be solved."""

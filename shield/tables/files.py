@@ -1,0 +1,205 @@
+"""Value tables on disk: shipped with the package or made on demand, checked whenever they are read."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import sys
+import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..exceptions import TableError
+from ..platforms.platform import Platform
+from ..platforms.registry import get_platform
+from .card import Card, platform_digest
+from .lookup import STEPS, Tables, no_tables
+from .settings import OtherMay, Problem, read_other_may, table_name
+from .solve import Progress
+
+CACHE_VARIABLE = "STEERCLEAR_TABLES"
+"""Environment variable that names the folder of tables made on demand."""
+SHIPPED = Path(__file__).parent / "shipped"
+
+
+@dataclass(frozen=True)
+class ValueTable:
+    """A packed table and its card.
+
+    Attributes:
+        card: what it is.
+        values: uint8 over the grid, in steps of cap / 255, rounded down.
+    """
+
+    card: Card
+    values: NDArray[np.uint8]
+
+    def values_m(self) -> NDArray[np.float64]:
+        """Values in m, over the grid."""
+        return self.values * (self.card.make_grid().cap_m / STEPS)
+
+
+def pack_values(problem: Problem, state: Progress) -> ValueTable:
+    """Pack a solved table, values rounded down; its card has no figures yet."""
+    grid = problem.grid
+    steps = np.floor(state.values.astype(np.float64) * (STEPS / grid.cap_m) + 1e-6)
+    values = np.clip(steps, 0, STEPS).astype(np.uint8).reshape(grid.shape)
+    card = Card(
+        own=problem.own.name,
+        other=problem.other.name,
+        own_parameters=platform_digest(problem.own),
+        other_parameters=platform_digest(problem.other),
+        other_may=problem.other_may.value,
+        grid=asdict(grid),
+        dt_s=problem.dt_s,
+        horizon_s=problem.horizon_s,
+        iterations=state.iterations,
+        residual_m=round(float(state.residual_m), 6),
+        version=_version(),
+        payload_sha256=_digest(values),
+    )
+    return ValueTable(card, values)
+
+
+def _version() -> str:
+    try:
+        return version("steerclear")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _digest(values: NDArray[np.uint8]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+
+
+def cache_folder() -> Path:
+    """Folder of tables made on demand: `CACHE_VARIABLE`, else the platform's cache folder."""
+    named = os.environ.get(CACHE_VARIABLE)
+    if named:
+        return Path(named)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "steerclear" / "tables"
+
+
+def save_table(table: ValueTable, path: Path) -> None:
+    """Write a table; never leaves a half-written file under its name.
+
+    Raises:
+        TableError: the file cannot be written.
+    """
+    shape = table.values.shape
+    lines = table.values.reshape(*shape[:3], -1)
+    steps = np.diff(lines, axis=2, prepend=np.uint8(0))
+    memory = io.BytesIO()
+    np.savez_compressed(memory, card=np.array(table.card.to_json()), steps=np.moveaxis(steps, 3, 0))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(path.name + ".part")
+        part.write_bytes(memory.getvalue())
+        part.replace(path)
+    except OSError as error:
+        raise TableError(f"table {path} cannot be written ({error}); choose another place with --out") from error
+
+
+def read_table(path: Path) -> ValueTable:
+    """Read a table file and check that it is whole.
+
+    Raises:
+        TableError: the file is missing, cut short, altered or of another format.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            text, steps = str(file["card"]), file["steps"]
+    except FileNotFoundError as error:
+        raise TableError(f"there is no table file {path}") from error
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        raise TableError(f"table file {path} is damaged ({error})") from error
+    card = Card.of_json(text)
+    shape = card.make_grid().shape
+    if steps.dtype != np.uint8 or steps.shape != (shape[3] * shape[4], *shape[:3]):
+        raise TableError(f"table file {path} is damaged (its values do not fit its grid)")
+    lines = np.add.accumulate(np.moveaxis(steps, 0, 3), axis=2, dtype=np.uint8)
+    values = np.ascontiguousarray(lines).reshape(shape)
+    if _digest(values) != card.payload_sha256:
+        raise TableError(f"table file {path} is damaged (checksum differs)")
+    return ValueTable(card, values)
+
+
+def remedy(own: str, other: str, other_may: OtherMay) -> str:
+    """The command that makes a table."""
+    return f"steerclear reach solve --own {own} --other {other} --other-may {other_may.value}"
+
+
+def find_table(own: str, other: str, other_may: OtherMay) -> Path | None:
+    """File of a table: one made on demand goes before the shipped one; None when there is neither."""
+    name = f"{table_name(own, other, other_may)}.npz"
+    return next((folder / name for folder in (cache_folder(), SHIPPED) if (folder / name).is_file()), None)
+
+
+def load_table(
+    own: str | Platform, other: str | Platform, other_may: str | OtherMay = OtherMay.WORST_CASE
+) -> ValueTable:
+    """The table of a pair, checked against the boats' parameters.
+
+    Raises:
+        TableError: it is missing, damaged or made for other parameters; the message names the command to make it.
+    """
+    boats, mode = (get_platform(own), get_platform(other)), read_other_may(other_may)
+    return _load(*boats, mode, str(cache_folder()))
+
+
+@lru_cache(maxsize=32)
+def _load(own: Platform, other: Platform, mode: OtherMay, folder: str) -> ValueTable:
+    command = remedy(own.name, other.name, mode)
+    path = find_table(own.name, other.name, mode)
+    if path is None:
+        raise TableError(
+            f"no {mode.value} value table for {own.name} with {other.name}, neither shipped nor in {folder}; "
+            f"make it with: {command}"
+        )
+    try:
+        table = read_table(path)
+        check_parameters(table.card, own, other, mode)
+    except TableError as error:
+        raise TableError(f"{error} [{path}]; make it anew with: {command}") from error
+    return table
+
+
+def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay) -> None:
+    """Raise unless the card is for these boats and this mode.
+
+    Raises:
+        TableError: it is for others.
+    """
+    if card.other_may != mode.value:
+        raise TableError(f"the table is {card.other_may}, wanted {mode.value}")
+    for role, platform, digest in (("own", own, card.own_parameters), ("other", other, card.other_parameters)):
+        if digest != platform_digest(platform):
+            raise TableError(f"the table was made for other parameters of the {role} boat {platform.name!r}")
+
+
+def stack_tables(tables: Sequence[ValueTable]) -> Tables:
+    """Put tables behind one another for compiled code; table i of the result is ``tables[i]``."""
+    if not tables:
+        return no_tables()
+    sizes = [table.values.size for table in tables]
+    offset = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+    data = np.concatenate([table.values.ravel() for table in tables])
+    return Tables(data, offset, np.stack([table.card.make_grid().pack() for table in tables]))
+
+
+def with_figures(table: ValueTable, **figures: object) -> ValueTable:
+    """The table with figures added to its card."""
+    return replace(table, card=replace(table.card, **figures))  # type: ignore[arg-type]

@@ -1,0 +1,202 @@
+"""Looking a value up, compiled: distance two boats can be kept apart, and its gradient."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..jit import Array, IntArray, kernel
+from .grid import (
+    CAP,
+    N_AXES,
+    N_BETA,
+    N_OTHER,
+    N_OWN,
+    N_PSI,
+    N_RHO,
+    OTHER_TOP,
+    OWN_TOP,
+    RHO_FIRST,
+    RHO_GROWTH,
+    RHO_STEP,
+    blend,
+    even_place,
+    rho_node,
+    rho_place,
+)
+
+STEPS = 255
+"""Values are kept as whole steps of cap / 255, rounded down."""
+NO_TABLE = -1
+
+
+class Tables(NamedTuple):
+    """Several value tables behind one another, for compiled code.
+
+    Attributes:
+        data: all values, uint8, in steps of cap / 255.
+        offset: where each table begins, shape ``(n_tables,)``.
+        axes: each table's grid, shape ``(n_tables, N_AXES)``.
+    """
+
+    data: NDArray[np.uint8]
+    offset: IntArray
+    axes: Array
+
+
+class Gradient(NamedTuple):
+    """A value, m, and its derivatives; positions in m, headings in rad clockwise, speeds in m/s.
+
+    The derivatives with respect to the other's position are those of the own position with opposite signs.
+    """
+
+    value_m: float
+    own_x: float
+    own_y: float
+    own_heading: float
+    own_speed: float
+    other_heading: float
+    other_speed: float
+
+
+def no_tables() -> Tables:
+    """An empty set, for code that takes tables but has none."""
+    return Tables(np.zeros(0, np.uint8), np.zeros(0, np.int64), np.zeros((0, N_AXES)))
+
+
+@kernel
+def table_range_m(tables: Tables, table: int) -> float:
+    """Largest range of a table, m; farther boats are looked up as if they were there."""
+    axes = tables.axes[table]
+    return rho_node(axes, int(axes[N_RHO]) - 1)
+
+
+@kernel
+def _speed_places(axes: Array, own_mps: float, other_mps: float) -> tuple[tuple[int, float], tuple[int, float]]:
+    n_own, n_other = int(axes[N_OWN]) - 1, int(axes[N_OTHER]) - 1
+    return even_place(own_mps / axes[OWN_TOP] * n_own, n_own), even_place(
+        other_mps / axes[OTHER_TOP] * n_other, n_other
+    )
+
+
+@kernel
+def _angle_places(
+    axes: Array, bearing_rad: float, own_rad: float, other_rad: float
+) -> tuple[tuple[int, float], tuple[int, float], float]:
+    """Places of relative heading and bearing, and the side: 1 starboard, -1 port (mirrored)."""
+    half_turns = (bearing_rad - own_rad) / math.pi
+    half_turns -= 2.0 * math.floor(0.5 * half_turns + 0.5)
+    side = 1.0
+    if half_turns < 0.0:
+        side = -1.0
+    turns = side * (other_rad - own_rad) / (2.0 * math.pi)
+    n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA]) - 1
+    return even_place((turns - math.floor(turns)) * n_psi, n_psi), even_place(side * half_turns * n_beta, n_beta), side
+
+
+@kernel
+def table_value(
+    tables: Tables,
+    table: int,
+    dx_m: float,
+    dy_m: float,
+    own_heading_rad: float,
+    other_heading_rad: float,
+    own_speed_mps: float,
+    other_speed_mps: float,
+) -> float:
+    """Distance, m, that the own boat can keep from now on, at most the cap; NaN when an input is not finite.
+
+    Args:
+        tables: the tables.
+        table: which one.
+        dx_m, dy_m: the other's position minus the own one, east and north, m.
+        own_heading_rad, other_heading_rad: headings, rad, clockwise from north.
+        own_speed_mps, other_speed_mps: stored speeds, m/s; outside the table they are clamped.
+    """
+    if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
+        return math.nan
+    axes = tables.axes[table]
+    rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
+    if rho < axes[RHO_FIRST]:
+        return rho
+    psi, beta, _ = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
+    own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
+    steps = blend(tables.data, tables.offset[table], axes, rho_place(axes, rho), psi, beta, own, other)
+    return steps * axes[CAP] / STEPS
+
+
+@kernel
+def table_gradient(
+    tables: Tables,
+    table: int,
+    dx_m: float,
+    dy_m: float,
+    own_heading_rad: float,
+    other_heading_rad: float,
+    own_speed_mps: float,
+    other_speed_mps: float,
+) -> Gradient:
+    """Value and derivatives, exact for the interpolated value; arguments as of `table_value`.
+
+    Where an input is clamped the derivative with respect to it is 0; on a cell's edge it is that of one side.
+    """
+    total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps
+    if not math.isfinite(total):
+        return Gradient(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+    axes = tables.axes[table]
+    rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
+    if rho < axes[RHO_FIRST]:
+        scale = 1.0 / max(rho, 1e-9)
+        return Gradient(rho, -dx_m * scale, -dy_m * scale, 0.0, 0.0, 0.0, 0.0)
+    psi, beta, side = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
+    own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
+    range_place = rho_place(axes, rho)
+    at = tables.offset[table]
+    n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
+    n_own, n_other = int(axes[N_OWN]), int(axes[N_OTHER])
+    value = d_rho = d_psi = d_beta = d_own = d_other = 0.0
+    for di in range(2):
+        w_rho = range_place[1] if di == 1 else 1.0 - range_place[1]
+        for dj in range(2):
+            w_psi = psi[1] if dj == 1 else 1.0 - psi[1]
+            j = (psi[0] + dj) % n_psi
+            for dk in range(2):
+                w_beta = beta[1] if dk == 1 else 1.0 - beta[1]
+                node = ((range_place[0] + di) * n_psi + j) * n_beta + beta[0] + dk
+                corner = at + (node * n_own + own[0]) * n_other + other[0]
+                low, high = float(tables.data[corner]), float(tables.data[corner + n_other])
+                low_step = float(tables.data[corner + 1]) - low
+                high_step = float(tables.data[corner + n_other + 1]) - high
+                low += other[1] * low_step
+                high += other[1] * high_step
+                here = low + own[1] * (high - low)
+                weight = w_rho * w_psi * w_beta
+                value += weight * here
+                d_own += weight * (high - low)
+                d_other += weight * (low_step + own[1] * (high_step - low_step))
+                d_rho += (2 * di - 1) * w_psi * w_beta * here
+                d_psi += (2 * dj - 1) * w_rho * w_beta * here
+                d_beta += (2 * dk - 1) * w_rho * w_psi * here
+    unit = axes[CAP] / STEPS
+    d_rho *= unit / (axes[RHO_STEP] + axes[RHO_GROWTH] * range_place[0])
+    if rho > rho_node(axes, int(axes[N_RHO]) - 1):
+        d_rho = 0.0
+    d_psi *= unit * side * n_psi / (2.0 * math.pi)
+    d_beta *= unit * side * (n_beta - 1) / math.pi
+    d_own *= unit * _clamped(own_speed_mps, axes[OWN_TOP]) * (n_own - 1) / axes[OWN_TOP]
+    d_other *= unit * _clamped(other_speed_mps, axes[OTHER_TOP]) * (n_other - 1) / axes[OTHER_TOP]
+    own_x = -d_rho * dx_m / rho - d_beta * dy_m / (rho * rho)
+    own_y = -d_rho * dy_m / rho + d_beta * dx_m / (rho * rho)
+    return Gradient(value * unit, own_x, own_y, -d_beta - d_psi, d_own, d_psi, d_other)
+
+
+@kernel
+def _clamped(speed_mps: float, top_mps: float) -> float:
+    """1 within the speed axis, 0 outside it."""
+    if speed_mps < 0.0 or speed_mps > top_mps:
+        return 0.0
+    return 1.0

@@ -1,0 +1,194 @@
+"""Solving a value table: value iteration from V = min(range, cap) down, over threads, with checkpoints."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..exceptions import TableError
+from ..jit import Array, BoolArray
+from .moves import Moves, moves_of
+from .settings import RUDDERS, OtherMay, Problem, places
+from .sweep import sweep, widen
+
+TOLERANCE_M = 5e-4
+"""Smaller changes of a value within one step are left out."""
+CONVERGED_M = 5e-3
+"""A solve ends when no value changed more than this in a step."""
+SAVE_EVERY = 20
+"""Steps between two checkpoints."""
+
+Notice = Callable[[int, int, float], None]
+
+
+@dataclass
+class Progress:
+    """A solve under way: what a checkpoint keeps.
+
+    Attributes:
+        values: flat values, m, float32.
+        hints: best rudders of each cell (own * 8 + other), uint8.
+        active: rows (range, relative heading) that may still change.
+        iterations: steps done.
+        residual_m: largest change of the last step, m.
+    """
+
+    values: NDArray[np.float32]
+    hints: NDArray[np.uint8]
+    active: BoolArray
+    iterations: int = 0
+    residual_m: float = float("inf")
+
+
+def start(problem: Problem) -> Progress:
+    """Values before any play: the distance itself, capped."""
+    grid = problem.grid
+    ranges = np.minimum(grid.ranges_m(), grid.cap_m).astype(np.float32)
+    values = np.repeat(ranges, grid.size // grid.n_rho)
+    active = np.ones((grid.n_rho, grid.n_psi), bool)
+    return Progress(values, np.full(grid.size, 2 * 8 + 2, np.uint8), active)
+
+
+def steps_of(problem: Problem) -> int:
+    """Steps to the horizon."""
+    return max(1, round(problem.horizon_s / problem.dt_s))
+
+
+def solve(
+    problem: Problem,
+    *,
+    threads: int | None = None,
+    notice: Notice | None = None,
+    checkpoint: Path | None = None,
+) -> Progress:
+    """Solve the game by value iteration.
+
+    V starts at min(range, cap) and is lowered to max over own rudders, min over the other's (max over both when
+    it cooperates), of min(closest distance in the step, V after it), until nothing changes or the horizon is
+    reached. The result does not depend on the number of threads.
+
+    Args:
+        problem: boats, mode, grid, step and horizon.
+        threads: threads to use; by default all cores.
+        notice: called with (steps done, steps at most, largest change in m) after each step.
+        checkpoint: file that keeps the state of an unfinished solve. When it exists and belongs to the same
+            problem, the solve goes on from it; when interrupted (Ctrl-C), the state is kept there.
+
+    Raises:
+        TableError: the checkpoint belongs to another problem.
+    """
+    solver = _Solver(problem)
+    state = _resume(problem, checkpoint) or start(problem)
+    count = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            while state.iterations < steps_of(problem) and state.residual_m > CONVERGED_M:
+                solver.step(state, pool, count)
+                if notice is not None:
+                    notice(state.iterations, steps_of(problem), state.residual_m)
+                if checkpoint is not None and state.iterations % SAVE_EVERY == 0:
+                    _keep(problem, state, checkpoint)
+        except KeyboardInterrupt:
+            if checkpoint is not None:
+                _keep(problem, state, checkpoint)
+            raise
+    if checkpoint is not None:
+        checkpoint.unlink(missing_ok=True)
+    return state
+
+
+class _Solver:
+    """The arrays of a problem that stay the same from step to step."""
+
+    def __init__(self, problem: Problem) -> None:
+        grid = problem.grid
+        rudders = np.array(RUDDERS)
+        self.axes = grid.pack()
+        own = moves_of(problem.own, grid.own_speeds_mps(), rudders, problem.dt_s)
+        other = moves_of(problem.other, grid.other_speeds_mps(), rudders, problem.dt_s)
+        own_speed = places(own.speed_mps, grid.own_top_mps, grid.n_own)
+        other_speed = places(other.speed_mps, grid.other_top_mps, grid.n_other)
+        self.moves = (own.place_m, own.turn_rad, own_speed, other.place_m, other.turn_rad, other_speed)
+        self.cooperative = problem.other_may is OtherMay.COOPERATIVE
+        self.reach_m = _reach(own) + _reach(other)
+        turn = float(np.abs(own.turn_rad).max() + np.abs(other.turn_rad).max())
+        self.psi_cells = min(int(np.ceil(turn / grid.psi_step_rad - 1e-6)), grid.n_psi // 2)
+        self.n_rho = grid.n_rho
+
+    def step(self, state: Progress, pool: ThreadPoolExecutor, threads: int) -> None:
+        """One value iteration; the state changes only when it is complete."""
+        values, changed = state.values.copy(), np.zeros_like(state.active)
+        pieces = _pieces(state.active, 8 * threads)
+
+        def piece(bounds: tuple[int, int]) -> float:
+            return sweep(
+                state.values,
+                values,
+                state.hints,
+                state.active,
+                changed,
+                self.axes,
+                *self.moves,
+                self.cooperative,
+                self.reach_m,
+                TOLERANCE_M,
+                *bounds,
+            )
+
+        residual = max(pool.map(piece, pieces))
+        state.values, state.residual_m = values, residual
+        state.iterations += 1
+        widen(changed, state.active, self.axes, self.reach_m, self.psi_cells)
+
+
+def _reach(moves: Moves) -> float:
+    return float(np.linalg.norm(moves.place_m, axis=-1).max())
+
+
+def _pieces(active: BoolArray, count: int) -> list[tuple[int, int]]:
+    """Cut the ranges into pieces of about equal work."""
+    work = np.cumsum(active.sum(axis=1) + 0.01)
+    cuts = np.searchsorted(work, np.linspace(0.0, work[-1], count + 1)[1:-1])
+    edges = np.unique(np.concatenate([[0], cuts, [len(work)]]))
+    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def _signature(problem: Problem) -> str:
+    return repr(problem)
+
+
+def _keep(problem: Problem, state: Progress, path: Path) -> None:
+    """Write a checkpoint so that no half-written one is ever found."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    with part.open("wb") as file:
+        np.savez(
+            file,
+            problem=np.array(_signature(problem)),
+            values=state.values,
+            hints=state.hints,
+            active=state.active,
+            iterations=state.iterations,
+            residual_m=state.residual_m,
+        )
+    part.replace(path)
+
+
+def _resume(problem: Problem, path: Path | None) -> Progress | None:
+    if path is None or not path.exists():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            kept = {name: file[name] for name in file.files}
+        same = str(kept["problem"]) == _signature(problem)
+    except (OSError, ValueError, KeyError) as error:
+        raise TableError(f"checkpoint {path} cannot be read ({error}); delete it to start afresh") from error
+    if not same:
+        raise TableError(f"checkpoint {path} belongs to another problem; delete it or name another with --checkpoint")
+    return Progress(kept["values"], kept["hints"], kept["active"], int(kept["iterations"]), float(kept["residual_m"]))
