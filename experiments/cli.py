@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from .commands.ablate import ablate
+from .commands.attack import attack
 from .commands.bench import bench
 from .commands.docs import docs
 from .commands.encounters import encounters
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, encounters, parity, bench, render, docs):
+for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, docs):
     app.command()(function)
 
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from .attack.keys import ATTACK as _ATTACK
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
 
 BREACH = {
@@ -194,6 +195,8 @@ BENCH = {
 
 ENCOUNTERS = {**_PROVENANCE, **_ENCOUNTERS, **{f"bars[].{k}": v for k, v in _BAR.items()}}
 
+ATTACK = {**_PROVENANCE, **_ATTACK}
+
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
 KEYS = {
@@ -203,6 +206,7 @@ KEYS = {
     "parity": PARITY,
     "bench": BENCH,
     "encounters": ENCOUNTERS,
+    "attack": ATTACK,
     "render": RENDER,
 }
 

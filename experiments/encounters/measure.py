@@ -99,8 +99,8 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
 
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
-        those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
-        game and step), and the verdicts.
+        those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and
+        ``decision_p999_us`` (of the chunk, per game and step), and the verdicts.
     """
     film = play(scenes, guard, conditions)
     counted = tally(film)

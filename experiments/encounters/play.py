@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.exceptions import FleetError
-from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
@@ -127,17 +127,9 @@ def _check(sent: Array, step: int) -> None:
         raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {sent[b, i]}")
 
 
-def positions(film: Film, game: int) -> Array:
-    """(T+1, n, 2) places of the boats of a game, m."""
-    return film.state[:, game, :, :2]
-
-
 def water_states(film: Film, game: int) -> Array:
     """(T+1, n, N_STATE) of a game as seen from the water: the way of the current is taken off, distances stay."""
     states = film.state[:, game].copy()
     drift = film.scenes.current[game] * film.conditions.current_mps
     states[:, :, :2] -= (np.arange(len(states)) * DT_S)[:, None, None] * drift
     return states
-
-
-__all__ = ["Film", "Guard", "IntArray", "play", "positions", "water_states"]

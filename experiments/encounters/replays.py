@@ -14,7 +14,7 @@ from steerclear.shield.platforms import layout as L
 from ..replay_html import write_replay
 from .campaign import Cell
 from .families import draw
-from .guards import NONE
+from .guards import NONE, SHIELD
 from .play import Film, play
 from .scenes import DT_S, Conditions
 from .tally import Columns
@@ -22,6 +22,8 @@ from .tally import Columns
 MOST_WORST = 10
 EDGE_M = 5.0
 """Water around open-water encounters, m."""
+SHAPE = 1.6
+"""Width over height of its picture."""
 
 
 def record_of(film: Film, game: int, title: str, guarded: bool) -> Record:
@@ -67,13 +69,14 @@ def _own_breaches(position: np.ndarray, own: np.ndarray, radius_m: float) -> np.
 
 
 def _placed(film: Film, position: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
-    """Positions within (0, 0) .. bounds: open water gets edges around what happens."""
+    """Positions within (0, 0) .. bounds: open water gets edges around what happens, wider than high."""
     field = film.scenes.field
     if field is not None:
         return position - np.array(field[:2]), (field[2] - field[0], field[3] - field[1])
     low, high = position.min(axis=(0, 1)) - EDGE_M, position.max(axis=(0, 1)) + EDGE_M
-    size = high - low
-    return position - low, (float(size[0]), float(size[1]))
+    size, middle = high - low, 0.5 * (low + high)
+    size = np.maximum(size, [SHAPE * size[1], size[0] / SHAPE])
+    return position - middle + 0.5 * size, (float(size[0]), float(size[1]))
 
 
 def _absolute(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
@@ -107,11 +110,12 @@ def _meta(film: Film, bounds: tuple[float, float], title: str, guarded: bool) ->
 
 
 def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) -> list[dict[str, Any]]:
-    """The worst encounters of all cells with a guard: avoidable breaches first, then the closest.
+    """The worst encounters of all cells with a shield: avoidable breaches first, then the closest.
 
-    Without such a cell, those of the unguarded ones.
+    Without such a cell, those with another guard, or with none.
     """
-    cells = [cell for cell in columns if cell.guard != NONE] or list(columns)
+    shields = [cell for cell in columns if cell.guard.partition(":")[0] == SHIELD]
+    cells = shields or [cell for cell in columns if cell.guard != NONE] or list(columns)
     found = []
     for cell in cells:
         values = columns[cell]

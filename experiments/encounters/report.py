@@ -41,6 +41,7 @@ svg .curve { fill: none !important; stroke-width: 2; stroke-linejoin: round; }
 .small { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 300px), 1fr)); gap: 12px;
   margin: 12px 0; }
 td.first, th.first { text-align: left; white-space: nowrap; }
+th.number { white-space: normal; vertical-align: bottom; }
 tr.family td { padding-top: 10px; color: var(--muted); border-bottom: none; }
 """
 

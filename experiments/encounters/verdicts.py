@@ -34,8 +34,11 @@ def judge_game(film: Film, game: int) -> dict[str, float]:
     counts = dict.fromkeys(VERDICT_COLUMNS, 0.0) | {"last_preventable_s": np.nan}
     counts["not_judged"] = float(max(0, len(ours) - MOST_JUDGED))
     for step, a, b, _ in ours[:MOST_JUDGED]:
-        sides = [_side(states, film.scenes.platforms, int(i), int(j), int(step), radius_m)
-                 for i, j in ((a, b), (b, a)) if team[int(i)] == 0]  # fmt: skip
+        sides = [
+            _side(states, film.scenes.platforms, int(i), int(j), int(step), radius_m)
+            for i, j in ((a, b), (b, a))
+            if team[int(i)] == 0
+        ]
         names = [name for name, _ in sides]
         name = next(n for n in ("avoidable", "started_inside", "unavoidable") if n in names)
         counts[name] += 1.0

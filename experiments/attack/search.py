@@ -1,0 +1,155 @@
+"""Searching for an opponent that gets within the radius: differential evolution over the opponents' numbers.
+
+Differential evolution (Storn and Price 1997) as SciPy has it, rather than CMA-ES: it comes with what is installed
+already, takes a whole generation as one batch, and keeps a spread population in a landscape of many separate basins
+(each side to feint to, each moment to strike) that is flat wherever the guard holds. Attackers may start close to
+each other but never close to an own boat, so that what is found is not the start's doing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array
+
+from ..encounters.guards import check_guard
+from ..encounters.play import Film, play
+from ..encounters.scene_file import scene_content
+from ..encounters.scenes import Conditions
+from ..encounters.tally import Columns, tally
+from ..encounters.verdicts import judge_game
+from ..store import key_of
+from .opponents import Duel
+
+MOST_JUDGED = 6
+"""Breaches judged in one search: it ends with the first avoidable one."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """One search.
+
+    Attributes:
+        own: platform of the own boats.
+        other: platform of the attackers.
+        attackers: how many.
+        own_boats: how many.
+        guard: name of what is attacked.
+        conditions: of the encounters.
+        seed: of waypoints and search.
+        restart: number of the search.
+        population: opponents per generation.
+        generations: at most.
+
+    Raises:
+        SteerclearError: an unknown name or a number out of range.
+    """
+
+    own: str = "heron"
+    other: str = "heron"
+    attackers: int = 1
+    own_boats: int = 1
+    guard: str = "shield"
+    conditions: Conditions = field(default_factory=Conditions)
+    seed: int = 0
+    restart: int = 0
+    population: int = 64
+    generations: int = 30
+
+    def __post_init__(self) -> None:
+        check_guard(self.guard)
+        if self.population < 8:
+            raise ConfigError(f"--population must be at least 8; got {self.population}")
+        if self.generations < 1 or self.seed < 0:
+            raise ConfigError(f"--generations must be >= 1 and --seed >= 0; got {self.generations} and {self.seed}")
+
+    def duel(self) -> Duel:
+        """The own boats that are attacked."""
+        return Duel(self.own, self.other, self.attackers, self.own_boats, self.conditions, self.seed, self.restart)
+
+    @property
+    def key(self) -> str:
+        """Name under which the result is kept."""
+        return key_of(asdict(self))
+
+
+class _Hunt:
+    """A search under way: what was tried, the best of it, the breaches that were judged."""
+
+    def __init__(self, search: Search) -> None:
+        self.search, self.duel = search, search.duel()
+        self.best_m, self.point = np.inf, np.zeros(self.duel.genes)
+        self.history: list[float] = []
+        self.tried = self.breached = 0
+        self.judged: list[dict[str, Any]] = []
+        self.avoidable: dict[str, Any] | None = None
+
+    def closest(self, points: Array) -> Array:
+        """Closest distances, m, of a generation (genes, S): what is minimised."""
+        scenes = self.duel.scenes(points.T)
+        film = play(scenes, self.search.guard, self.search.conditions)
+        columns = tally(film)
+        closest = np.minimum(columns["closest_m"], columns["closest_opponent_m"])
+        best = int(closest.argmin())
+        if closest[best] < self.best_m:
+            self.best_m, self.point = float(closest[best]), points.T[best].copy()
+        self.history.append(self.best_m)
+        self.tried += scenes.games
+        self._judge(film, columns, closest)
+        return closest
+
+    def _judge(self, film: Film, columns: Columns, closest: Array) -> None:
+        hits = columns["breaches_teammate"] + columns["breaches_opponent"]
+        self.breached += int((hits > 0).sum())
+        for game in np.argsort(closest):
+            if hits[game] == 0 or len(self.judged) >= MOST_JUDGED or self.avoidable is not None:
+                return
+            found = judge_game(film, int(game))
+            entry = {"closest_m": float(closest[game]), "breaches": int(hits[game]), **found}
+            self.judged.append(entry)
+            if found["avoidable"]:
+                scene = scene_content(film.scenes.take([int(game)]), film.conditions, guard=self.search.guard, **entry)
+                self.avoidable = scene
+
+
+def run_search(search: Search) -> dict[str, Any]:
+    """Search for an avoidable breach.
+
+    Returns:
+        JSON-ready: ``closest_m`` (least distance of all), ``history`` (best so far per generation), ``tried`` and
+        ``breached`` opponents, ``judged`` breaches, ``scene`` (the one with an avoidable breach, else None) and
+        ``closest_scene``.
+    """
+    hunt = _Hunt(search)
+    random = np.random.default_rng([search.seed, search.restart, 7])
+    start = qmc.LatinHypercube(hunt.duel.genes, rng=random).random(search.population)
+    differential_evolution(
+        hunt.closest,
+        [(0.0, 1.0)] * hunt.duel.genes,
+        strategy="rand1bin",
+        init=start,
+        maxiter=search.generations - 1,
+        mutation=(0.4, 0.9),
+        recombination=0.8,
+        tol=0.0,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        rng=random,
+        callback=lambda intermediate_result: hunt.avoidable is not None,
+    )
+    return {
+        "restart": search.restart,
+        "closest_m": hunt.best_m,
+        "history": hunt.history,
+        "tried": hunt.tried,
+        "breached": hunt.breached,
+        "judged": hunt.judged,
+        "scene": hunt.avoidable,
+        "closest_scene": scene_content(hunt.duel.scenes(hunt.point[None]), search.conditions, guard=search.guard),
+    }

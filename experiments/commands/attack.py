@@ -1,0 +1,87 @@
+"""``steerclear attack``: a search for opponents that make the shield breach."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear.shield.exceptions import ConfigError
+
+from ..attack.campaign import passed, run_searches, searches_of, searches_table, write_all
+from ..attack.search import Search
+from ..encounters.guards import parse_guards
+from ..encounters.scenes import Conditions
+from ..pool import check_jobs
+from ..store import LINES_FILE, ResultStore, write_json
+from . import options as o
+from .console import Interrupted, command, finish, out, progress
+from .encounters import Current, Delay, Noise, Radius, Workers, platform_pairs
+from .games import default_folder
+from .scenes import play_scene_files
+
+
+@command
+def attack(
+    platform: Annotated[str, typer.Option(metavar="A[/B]", help="Own platform, or own/attackers'.")] = "heron",
+    attackers: Annotated[int, typer.Option(metavar="N", help="Attackers, 1 to 3.")] = 1,
+    own: Annotated[int, typer.Option(metavar="N", help="Own boats, 1 to 6.")] = 1,
+    guard: Annotated[str, typer.Option(metavar="NAME", help="What is attacked, as in encounters.")] = "shield",
+    restarts: Annotated[int, typer.Option(metavar="N", help="Searches, each from its own start.")] = 8,
+    population: Annotated[int, typer.Option(metavar="N", help="Opponents per generation.")] = 64,
+    generations: Annotated[int, typer.Option(metavar="N", help="Generations per search, at most.")] = 30,
+    radius: Radius = 2.5,
+    delay: Delay = 0.0,
+    noise: Noise = 0.0,
+    current: Current = 0.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the searches.")] = 0,
+    folder: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder.")] = None,
+    workers: Workers = None,
+    resume: o.Resume = False,
+    replay: Annotated[
+        list[Path] | None, typer.Option("--replay", metavar="FILE", help="Play found scenes again instead.")
+    ] = None,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Search for opponents that get within the radius although it could be kept; keep what is found as scenes.
+
+    Exit status: 0 done, 1 an avoidable breach with the shield on, 2 bad input, 130 interrupted.
+    """
+    guards = parse_guards(guard)
+    if len(guards) != 1:
+        raise ConfigError(f"--guard names {len(guards)} guards; attack one at a time")
+    if replay:
+        finish(play_scene_files(replay, guards, folder))
+        return
+    pairs = platform_pairs(platform)
+    if len(pairs) != 1 or restarts < 1:
+        raise ConfigError("attack takes one --platform (own or own/attackers') and at least 1 of --restarts")
+    conditions = Conditions(radius, delay, noise, current)
+    first = Search(*pairs[0], attackers, own, guards[0], conditions, seed, 0, population, generations)
+    first.duel()
+    results = _run(searches_of(first, restarts), folder, workers, resume)
+    if json_file is not None:
+        write_json(json_file, results)
+    if results["failed"]:
+        raise ConfigError(f"{len(results['failed'])} searches failed: {results['failed'][0]['error']}")
+    finish(passed(results))
+
+
+def _run(searches: list[Search], folder: Path | None, workers: int | None, resume: bool) -> dict[str, Any]:
+    if resume and folder is None:
+        raise ConfigError("--resume needs the --out folder of the run to go on with")
+    folder = folder or default_folder("attack")
+    processes, store, started = check_jobs(workers), ResultStore(folder, resume), time.perf_counter()
+    try:
+        with progress("searches", len(searches)) as notice:
+            failed = run_searches(searches, store, processes, notice)
+    except KeyboardInterrupt:
+        results = write_all(folder, searches, store, [], time.perf_counter() - started)
+        kept = f"{len(results['searches'])} of {len(searches)} searches kept in {folder / LINES_FILE}"
+        raise Interrupted(f"interrupted: {kept}; the same command with --out {folder} --resume goes on") from None
+    results = write_all(folder, searches, store, failed, time.perf_counter() - started)
+    out().print(searches_table(results))
+    for name in results["files"].values():
+        out().print(f"{folder / name}", soft_wrap=True)
+    return results
