@@ -167,9 +167,11 @@ def clear_of_course(
 
 
 @kernel
-def _aim(rx: float, ry: float, vx: float, vy: float, way: float) -> tuple[float, float]:
-    """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity, else at the boat.
+def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -> tuple[float, float]:
+    """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity.
 
+    Where there is none, it steers ``ahead`` samples ahead of the boat: one as fast as the boat and on its quarter
+    comes nearest by closing in slowly on an all but parallel course, not by heading for the boat.
     (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
     """
     a = vx * vx + vy * vy - way * way
@@ -177,7 +179,7 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float) -> tuple[float,
     c = rx * rx + ry * ry
     root = b * b - a * c
     if root <= 0.0:
-        return rx, ry
+        return rx + ahead * vx, ry + ahead * vy
     root = math.sqrt(root)
     time = -1.0
     if abs(a) < 1e-9:
@@ -188,7 +190,7 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float) -> tuple[float,
             early, late = late, early
         time = early if early > 0.0 else late
     if time <= 0.0:
-        return rx, ry
+        return rx + ahead * vx, ry + ahead * vy
     return rx + time * vx, ry + time * vy
 
 
@@ -204,6 +206,7 @@ def clear_of_pursuer(
     acc_mps2: float,
     turn_rad: float,
     lead: bool,
+    ahead: float,
     sample_s: float,
     samples: int,
     closing_m: float,
@@ -229,6 +232,7 @@ def clear_of_pursuer(
         acc_mps2: acceleration granted to it, m/s^2.
         turn_rad: granted turn per sample, rad.
         lead: steer for the meeting point instead of the boat itself.
+        ahead: samples by which it leads the boat where they cannot meet.
         sample_s: time between samples, s.
         samples: last sample.
         closing_m: most the distance can shrink per sample, m.
@@ -262,7 +266,7 @@ def clear_of_pursuer(
         if lead:
             before = k - stride
             vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
-            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s)
+            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
         along, across = ux * ax + uy * ay, ux * ay - uy * ax
         if along > 0.0 and abs(across) * c <= along * s:
             norm = math.sqrt(ax * ax + ay * ay)

@@ -15,7 +15,7 @@ from ..platforms import Platform
 from ..platforms.limits import Limits, limits_of
 from .assign import COMMANDED
 
-TURNS_DEG = (30.0, 60.0, 90.0, 120.0, 150.0, 180.0)
+TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
 
 REACTION_S = 4.0
 """Time beyond a half turn over which a turning escape is followed, s."""

@@ -40,7 +40,10 @@ RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
 SLOWEST = 0.3
-"""Opponents are granted the turn rate of at least this fraction of top speed: thrust comes before way."""
+"""Opponents are granted the turn rate of at least this fraction of full thrust: thrust comes before way."""
+
+LEAD_SHARE = 0.15
+"""Share of the time it is followed by which a hunter that cannot meet the boat leads it."""
 
 
 @kernel
@@ -140,7 +143,8 @@ def clear_of_hunter(
     sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
     course = work.course[j]
-    turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, SLOWEST))
+    thrust = state[j, L.THRUST] / boats.params[j, L.MAX_THRUST]
+    turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, thrust, SLOWEST))
     work.out[MARGIN] = FAR
     for lead in range(2):
         clear_of_pursuer(
@@ -154,6 +158,7 @@ def clear_of_hunter(
             boats.granted_acc_mps2[j],
             turn,
             lead == 1,
+            LEAD_SHARE * boats.hunt_samples[i],
             sample_s,
             boats.hunt_samples[i],
             closing(i, j, state, boats, tuning),
