@@ -13,6 +13,7 @@ from .field import field_of
 TURN_MOMENTS = (0.0, 0.3, 0.5, 0.65, 0.78, 0.9)
 """Moments of a sudden turn that are tried, as shares of the time until the boats would be closest."""
 TURN_SIDES = (-1.0, 1.0)
+MOST_TRIES = 200
 
 
 def hold(cast: Cast, heading_deg: float, share: float) -> Array:
@@ -67,17 +68,21 @@ def overtaking(cast: Cast) -> None:
 
 
 def corner(cast: Cast) -> None:
-    """The own boat goes into a corner of the field and out again; the other comes in after it, straight."""
+    """The own boat goes into a corner of the field and out again; the other comes to the same place, straight."""
     _, _, width, height = field_of(cast)
     inset = cast.uniform(2.0, 5.0) * cast.scale
     place = (width - inset, height - inset)
     start = (width - cast.uniform(10.0, 30.0) * cast.scale, height - cast.uniform(5.0, 30.0) * cast.scale)
     cast.add_own(*start, bearing(start, place), cast.uniform(0.5, 1.0), place, (0.4 * width, 0.4 * height))
-    box = (width - 45.0 * cast.scale, 2.0, width - 2.0, height - 2.0)
-    begin = cast.free_place(box, cast.nearest_m)
-    aim = (width - cast.uniform(1.0, 5.0) * cast.scale, height - cast.uniform(1.0, 5.0) * cast.scale)
-    row = S.to_goals(cast.uniform(0.6, 1.0) * cast.top(cast.other), 2.0 * cast.scale)
-    cast.add_other(*begin, bearing(begin, aim), 0.6, row, aim, (0.3 * width, aim[1]))
+    share, offset = cast.uniform(0.6, 1.0), cast.radius_m
+    aim = (place[0] + cast.uniform(-offset, offset), place[1] + cast.uniform(-offset, offset))
+    arrives_s = math.dist(start, place) / cast.top(cast.own) + cast.uniform(-1.0, 5.0) * cast.scale
+    way_m = max(cast.nearest_m, arrives_s * share * cast.top(cast.other))
+    begin, tries = ahead(*aim, cast.uniform(180.0, 270.0), way_m), 0
+    while not (cast.is_clear(*begin, cast.nearest_m) and begin[0] > 1.0 and begin[1] > 1.0) and tries < MOST_TRIES:
+        begin, tries = ahead(*aim, cast.uniform(180.0, 270.0), cast.uniform(0.8, 1.2) * way_m), tries + 1
+    row = S.to_goals(share * cast.top(cast.other), 2.0 * cast.scale)
+    cast.add_other(*begin, bearing(begin, aim), share, row, aim, (0.3 * width, aim[1]))
 
 
 def sudden_turn(cast: Cast) -> None:

@@ -112,18 +112,24 @@ def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, f
 
 
 def _one(kind: Family, own: str, other: str, conditions: Conditions, seed: int, number: int) -> Cast:
-    """Draw until no two boats start too close."""
+    """Draw until no two boats start too close, and none outside the field."""
     cast = Cast(own, other, conditions, seed, kind.name, number)
     gap = 1.1 * conditions.radius_m + 2.0 * conditions.noise_m
     for _ in range(MOST_DRAWS):
         cast.clear()
         kind.build(cast)
-        if cast.closest_m() > gap:
+        if cast.closest_m() > gap and _is_inside(kind, cast):
             if kind.field_for == 0:
                 cast.turn(cast.uniform(-180.0, 180.0))
             cast.settle()
             return cast
     raise ConfigError(f"no encounter of {kind.name} fits a radius of {conditions.radius_m:g} m; choose a smaller one")
+
+
+def _is_inside(kind: Family, cast: Cast) -> bool:
+    """Whether every boat starts inside the field, where there is one."""
+    box = _field(kind, cast)
+    return box is None or all(box[0] <= x <= box[2] and box[1] <= y <= box[3] for x, y, *_ in cast.state)
 
 
 def _field(kind: Family, cast: Cast) -> Box | None:

@@ -1,0 +1,113 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.experiments import cli, keys
+from steerclear.experiments.attack.opponents import N_GENES, Duel
+from steerclear.experiments.attack.search import Search, run_search
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.encounters import Conditions, play
+from steerclear.experiments.encounters.measure import measure_chunk
+from steerclear.experiments.encounters.scene_file import read_scene, scenes_of
+from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
+
+FOUND = sorted((Path(__file__).parents[2] / "data" / "encounters").glob("*.json"))
+OPEN: set[str] = {"heron_rammer_b"}
+"""Found scenes that the shield does not hold yet; a fix takes its scene out of here."""
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize(("own", "attackers", "own_boats"), [("heron", 1, 1), ("surveyor", 3, 2)])
+def test_no_attacker_starts_near_an_own_boat(own, attackers, own_boats):
+    duel = Duel(own, own, attackers, own_boats, Conditions(), 0, 0)
+    scenes = duel.scenes(np.random.default_rng(0).random((200, duel.genes)))
+    assert duel.genes == attackers * N_GENES
+    places = scenes.state[:, :, :2]
+    gaps = np.linalg.norm(places[:, :own_boats, None] - places[:, None, own_boats:], axis=-1)
+    assert gaps.min() > duel.cast.nearest_m - 1e-9
+
+
+def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_again():
+    search = Search(guard="none", population=8, generations=2)
+    answer = run_search(search)
+    assert answer["breached"] > 0
+    assert answer["judged"][-1]["avoidable"] > 0
+    scenes, conditions = scenes_of(json.loads(json.dumps(answer["scene"])))
+    columns = measure_chunk(scenes, "none", conditions, judge=False)
+    assert columns["closest_m"][0] == answer["judged"][-1]["closest_m"]
+    assert run_search(search) == answer
+
+
+def test_a_search_goes_on_while_nothing_is_found(monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.attack.search.judge_game", lambda film, game: {"avoidable": 0.0})
+    answer = run_search(Search(guard="none", population=8, generations=3))
+    assert (answer["tried"], len(answer["history"]), answer["scene"]) == (24, 3, None)
+    assert len(answer["judged"]) == 6
+    assert answer["history"] == sorted(answer["history"], reverse=True)
+
+
+def test_an_attack_from_end_to_end_and_its_replay():
+    arguments = ["attack", "--guard", "none", "--restarts", "2", "--population", "8", "--generations", "1"]
+    arguments += ["--workers", "1", "--out", "out"]
+    done = run(*arguments, "--json", "copy.json")
+    assert done.exit_code == ExitCode.OK, done.output  # only a shield is held to the bar
+    content = json.loads(Path("copy.json").read_text())
+    assert keys.undocumented(content, keys.ATTACK) == []
+    assert content["found"] == 2
+    scene = Path("out") / content["searches"][0]["scene"]
+    assert run("attack", "--guard", "none", "--replay", scene).exit_code == ExitCode.OK
+    resumed = run(*arguments, "--resume", "--json", "again.json")
+    assert resumed.exit_code == ExitCode.OK
+    assert json.loads(Path("again.json").read_text())["searches"] == content["searches"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--attackers", "4"], "--attackers must be from 1 to 3"),
+        (["--own", "0"], "--own must be from 1 to 6"),
+        (["--population", "3"], "--population must be at least 8"),
+        (["--platform", "canoe"], "unknown platform"),
+        (["--platform", "heron,surveyor"], "one --platform"),
+        (["--guard", "none,shield"], "one at a time"),
+        (["--replay", "missing.json"], "cannot read"),
+        (["--resume"], "--resume needs"),
+    ],
+)
+def test_bad_input(arguments, words):
+    done = run("attack", *arguments)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in done.output
+
+
+def test_numbers_out_of_range_are_refused():
+    with pytest.raises(ConfigError, match="--generations must be >= 1"):
+        Search(generations=0)
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_what_was_found_once_hits_a_boat_without_a_shield(path):
+    scenes, conditions = read_scene(path)
+    film = play(scenes, "none", conditions)
+    own, others = film.state[:, :, scenes.own, :2], film.state[:, :, ~scenes.own, :2]
+    assert np.linalg.norm(own - others, axis=-1).min() < conditions.radius_m
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_the_shield_keeps_clear_of_what_was_found_once(path, request):
+    if path.stem in OPEN:
+        request.applymarker(pytest.mark.xfail(reason="found by the search, not yet held", strict=True))
+    scenes, conditions = read_scene(path)
+    columns = measure_chunk(scenes, "shield", conditions, judge=False)
+    assert columns["closest_m"].min() > conditions.radius_m

@@ -1,0 +1,164 @@
+import json
+from dataclasses import asdict
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.env.record import read_meta, validate
+from steerclear.experiments import cli, keys
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.encounters import Conditions, campaign, draw, play
+from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
+from steerclear.experiments.encounters.replays import record_of, worst_encounters
+from steerclear.experiments.encounters.results import bars_of
+from steerclear.experiments.encounters.scene_file import write_scene
+from typer.testing import CliRunner
+
+USUAL = Conditions()
+SMALL = ["encounters", "--platform", "heron", "--family", "head_on,doorway", "--n", "3", "--workers", "1"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def test_a_small_run_from_end_to_end_and_again():
+    done = run(*SMALL, "--guard", "none", "--out", "out", "--json", "copy.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("copy.json").read_text())
+    assert keys.undocumented(content, keys.ENCOUNTERS) == []
+    assert (content["complete"], content["encounters_played"], content["encounters_resumed"]) == (True, 6, 0)
+    assert [cell["family"] for cell in content["cells"]] == ["head_on", "doorway"]
+    assert content["bars"] == []
+    assert "head_on" in Path("out/report.html").read_text()
+    assert Path("out/replay.html").stat().st_size > 0
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    again = run(*SMALL, "--guard", "none", "--out", "out")
+    assert again.exit_code == ExitCode.BAD_INPUT
+    assert "add --resume" in again.output
+    resumed = run(*SMALL, "--guard", "none", "--out", "out", "--resume", "--json", "copy.json")
+    assert resumed.exit_code == ExitCode.OK
+    second = json.loads(Path("copy.json").read_text())
+    assert second["encounters_resumed"] == 6
+    assert second["cells"] == content["cells"]
+
+
+def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
+    whole, played = campaign.play_job, []
+
+    def stop_at_the_second(job):
+        if played:
+            raise KeyboardInterrupt
+        played.append(job)
+        return whole(job)
+
+    monkeypatch.setattr(campaign, "play_job", stop_at_the_second)
+    done = run(*SMALL, "--guard", "none", "--no-judge", "--out", "out")
+    assert done.exit_code == ExitCode.INTERRUPTED
+    assert "3 of 6 encounters kept" in done.output
+    content = json.loads(Path("out/results.json").read_text())
+    assert not content["complete"]
+    monkeypatch.setattr(campaign, "play_job", whole)
+    assert run(*SMALL, "--guard", "none", "--no-judge", "--out", "out", "--resume").exit_code == ExitCode.OK
+
+
+def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):
+    monkeypatch.setattr(campaign, "measure_chunk", _breaching(campaign.measure_chunk))
+    done = run(*SMALL, "--guard", "none,shield", "--no-judge", "--out", "out")
+    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    cells = json.loads(Path("out/results.json").read_text())["cells"]
+    bare = {(cell["guard"], cell["family"]): cell["unshielded_breached"] for cell in cells}
+    assert bare["none", "head_on"] == bare["shield", "head_on"]
+
+
+def _breaching(measure_chunk):
+    def measured(scenes, guard, conditions, judge):
+        columns = measure_chunk(scenes, guard, conditions, judge)
+        columns["avoidable"] = np.ones_like(columns["avoidable"])
+        return columns
+
+    return measured
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--platform", "canoe"], "unknown platform"),
+        (["--platform", "a/b/c"], "own/other"),
+        (["--platform", ","], "names no platform"),
+        (["--family", "headon"], "did you mean 'head_on'"),
+        (["--guard", "wall"], "unknown guard"),
+        (["--n", "0"], "--n must be at least 1"),
+        (["--seed", "-1"], "--seed must be 0 or more"),
+        (["--noise", "9"], "noise_m is 9.0"),
+        (["--workers", "0"], "at least 1"),
+        (["--resume"], "--resume needs the --out"),
+        (["--scene", "missing.json"], "cannot read missing.json"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_two(arguments, words):
+    done = run("encounters", *arguments)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in done.output
+    assert "Traceback" not in done.output
+
+
+def test_a_scene_file_is_played_again():
+    write_scene(Path("scene.json"), draw("head_on", "heron", "heron", USUAL, 0, 0, 1), USUAL)
+    done = run("encounters", "--scene", "scene.json", "--guard", "none", "--out", "out")
+    assert done.exit_code == ExitCode.OK, done.output
+    assert "scene.json  none" in done.stdout
+    assert Path("out/replay.html").stat().st_size > 0
+
+
+@pytest.mark.parametrize("family", ["rammer_2", "corner"])
+def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
+    film = play(draw(family, "heron", "heron", USUAL, 0, 0, 2), "none", USUAL)
+    record = record_of(film, 1, "a name", guarded=True)
+    validate(record)
+    meta = read_meta(record)
+    assert meta["shielded"] == ["agent_0"]
+    if family == "rammer_2":
+        assert (record["position"] > 0.0).all()
+        assert (record["position"] < np.array(meta["env_bounds_m"])).all()
+    shift = record["position"] - film.state[:, 1, :, :2]
+    np.testing.assert_allclose(shift, np.broadcast_to(shift[0, 0], shift.shape), atol=1e-9)
+    assert (record["breaches"][:, 1] == 0).all()
+
+
+def cell_columns(closest, avoidable):
+    zeros = np.zeros(len(closest))
+    names = ("number", "variant", "breaches_teammate", "breaches_opponent")
+    return {"closest_m": np.array(closest), "avoidable": np.array(avoidable)} | dict.fromkeys(names, zeros)
+
+
+def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
+    shield, none = (campaign.Cell(guard, "heron", "heron", "head_on") for guard in ("shield", "none"))
+    columns = {shield: cell_columns([2.0, 1.0, 3.0], [1.0, 0.0, 0.0]), none: cell_columns([0.0], [1.0])}
+    assert [entry["closest_m"] for entry in worst_encounters(columns)] == [2.0, 1.0, 3.0]
+    assert [entry["closest_m"] for entry in worst_encounters({none: columns[none]})] == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("avoidable", "unavoidable", "not_judged", "expected"),
+    [(0, 0, 0, [True, True]), (1, 0, 0, [False, True]), (0, 2, 0, [True, False]), (0, 0, 1, [None, None])],
+)
+def test_bars_of_the_shield(avoidable, unavoidable, not_judged, expected):
+    counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
+    cell = asdict(campaign.Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
+    assert [bar["met"] for bar in bars_of([cell])] == expected
+    assert bars_of([cell | {"guard": "parabolic"}]) == []
+
+
+def test_a_distribution_ends_at_the_edge_and_never_falls():
+    svg = distribution_plot([("on", "shield", [2.0, 3.0, 40.0])], "m", 2.5)
+    points = [tuple(map(float, p.split(","))) for p in svg.split('points="')[1].split('"')[0].split()]
+    assert all(a[0] <= b[0] and a[1] >= b[1] for a, b in pairwise(points))
+    assert f">{MOST_M:g}<" in svg

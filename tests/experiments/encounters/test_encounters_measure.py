@@ -1,0 +1,166 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+from steerclear.env.record import find_breaches
+from steerclear.experiments.encounters import Conditions, draw, measure, play
+from steerclear.experiments.encounters.measure import chunks, measure_chunk, worst_games
+from steerclear.experiments.encounters.scene_file import read_scene, write_scene
+from steerclear.experiments.encounters.summary import summarise, upper_bound
+from steerclear.experiments.encounters.tally import deadlocks, tally
+from steerclear.experiments.encounters.verdicts import VERDICT_COLUMNS, judge_game
+from steerclear.experiments.reversals import count_reversals
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import layout as L
+
+USUAL = Conditions()
+
+
+@pytest.fixture(scope="module")
+def crowd_film():
+    return play(draw("crowd_6", "heron", "heron", USUAL, 2, 0, 3), "none", USUAL)
+
+
+def test_breaches_are_those_of_the_record(crowd_film):
+    counted = tally(crowd_film)
+    for game in range(3):
+        places = crowd_film.state[:, game, :, :2]
+        found = find_breaches(places, 2.5)
+        own = (found[:, 1] < 3).astype(int) + (found[:, 2] < 3)
+        assert counted["breaches_teammate"][game] == (own == 2).sum()
+        assert counted["breaches_opponent"][game] == (own == 1).sum()
+        gaps = np.linalg.norm(places[1:, :3, None] - places[1:, None, 3:], axis=-1)
+        assert counted["closest_opponent_m"][game] == pytest.approx(gaps.min())
+    assert counted["breaches_opponent"].sum() > 0
+
+
+def test_reversals_are_those_of_the_games(crowd_film):
+    counted = tally(crowd_film)["reversals_per_min"] * 45.0 / 60.0 * 3
+    for game in range(3):
+        heading = crowd_film.state[:-1, game, :3, L.HEADING]
+        command = heading + crowd_film.sent[:, game, :3, 1]
+        assert counted[game] == pytest.approx(count_reversals(command, heading))
+
+
+def test_changes_are_counted_and_averaged_over_changed_steps():
+    scenes = dataclasses.replace(draw("head_on", "heron", "heron", USUAL, 0, 0, 1), length_s=2.0)
+    film = play(scenes, "none", USUAL)
+    film.sent[:5, 0, 0, 1] += 355.0
+    film.sent[5:10, 0, 0, 0] -= 0.5
+    counted = tally(film)
+    assert counted["changed_share"][0] == pytest.approx(0.5)
+    assert counted["heading_change_deg"][0] == pytest.approx(2.5)
+    assert counted["speed_change_mps"][0] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("steps", "speed", "wish", "expected"),
+    [(101, 0.1, 1.0, 1), (100, 0.1, 1.0, 0), (101, 0.3, 1.0, 0), (101, 0.1, 0.0, 0)],
+)
+def test_a_deadlock_is_two_mates_that_want_to_move_and_do_not_for_ten_seconds(steps, speed, wish, expected):
+    state, wanted = np.zeros((steps + 1, 1, 3, L.N_STATE)), np.zeros((steps, 1, 3, 2))
+    state[:, :, :2, L.SPEED], state[:, :, 2, L.SPEED], wanted[..., 0] = speed, 0.0, wish
+    out = np.zeros(1)
+    deadlocks(state, wanted, np.array([0, 0, 1]), 100, out)
+    assert out[0] == expected
+
+
+def test_the_worst_variant_of_each_encounter_counts():
+    scenes = draw("sudden_turn", "heron", "heron", USUAL, 0, 4, 2)
+    closest = np.full(24, 5.0)
+    closest[[3, 20]] = 1.0, 2.0
+    assert worst_games(scenes, closest).tolist() == [3, 20]
+    columns = measure_chunk(scenes, "none", USUAL, judge=False)
+    assert columns["number"].tolist() == [4.0, 5.0]
+    every = tally(play(scenes, "none", USUAL))["closest_m"].reshape(2, 12)
+    np.testing.assert_array_equal(columns["closest_m"], every.min(axis=1))
+    np.testing.assert_array_equal(columns["variant"], every.argmin(axis=1))
+
+
+def test_encounters_are_split_into_chunks_without_loss():
+    parts = list(chunks("rammer_1", "heron", "heron", USUAL, 0, 10, 230))
+    assert np.concatenate([part.number for part in parts]).tolist() == list(range(10, 240))
+    with pytest.raises(ConfigError, match="at least 1"):
+        next(chunks("rammer_1", "heron", "heron", USUAL, 0, 0, 0))
+
+
+def test_an_unguarded_head_on_breach_is_judged_avoidable():
+    outcome = measure("head_on", "none", n=6, seed=0)
+    figures = outcome.summary
+    assert figures["breached"] == figures["unshielded_breached"] == figures["avoidable"] > 0
+    assert figures["not_judged"] == figures["unavoidable"] == 0
+    assert (outcome.columns["last_preventable_s"][outcome.columns["avoidable"] > 0] > 0.0).all()
+    assert figures["goal_time_ratio"] == 1.0
+    unjudged = measure("head_on", "none", n=6, seed=0, judge=False).summary
+    assert (unjudged["avoidable"], unjudged["not_judged"]) == (0, figures["breached"])
+
+
+def test_a_current_does_not_change_the_verdict():
+    scenes = draw("head_on", "heron", "heron", USUAL, 0, 0, 4)
+    fast = Conditions(current_mps=0.5)
+    film = play(scenes, "none", fast)
+    game = int(tally(film)["closest_m"].argmin())
+    verdict = judge_game(film, game)
+    assert verdict["avoidable"] == 1.0
+    assert set(verdict) == set(VERDICT_COLUMNS)
+
+
+@pytest.mark.parametrize(("events", "trials"), [(0, 1000), (3, 50), (7, 7)])
+def test_the_upper_bound_is_the_one_with_five_percent_left(events, trials):
+    bound = upper_bound(events, trials)
+    if events == trials:
+        assert bound == 1.0
+    else:
+        assert stats.binom.cdf(events, trials, bound) == pytest.approx(0.05)
+
+
+def test_figures_of_made_up_encounters():
+    columns = measure("head_on", "none", n=4, seed=0, judge=False).columns
+    columns["avoidable"], columns["unavoidable"] = np.array([1.0, 0, 0, 0]), np.array([1.0, 1.0, 0, 0])
+    columns["breaches_opponent"], columns["not_judged"] = np.array([2.0, 1.0, 0, 0]), np.zeros(4)
+    columns["goal_s"] = 1.5 * columns["unshielded_goal_s"]
+    figures = summarise(columns)
+    assert (figures["breached"], figures["avoidable"], figures["unavoidable"]) == (2, 1, 1)
+    assert figures["goal_time_ratio"] == pytest.approx(1.5)
+    assert len(figures["closest_quantiles_m"]) == 101
+
+
+def test_a_scene_file_plays_exactly_again(tmp_path):
+    conditions = Conditions(3.0, 0.2, 0.4, 0.1)
+    scenes = draw("sudden_turn", "surveyor", "heron", conditions, 8, 2, 1)
+    path = write_scene(tmp_path / "scene.json", scenes, conditions, note="kept")
+    again, same = read_scene(path)
+    assert same == conditions
+    assert json.loads(path.read_text())["note"] == "kept"
+    np.testing.assert_array_equal(play(scenes, "none", conditions).state, play(again, "none", conditions).state)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda c: c.update(format=9), "format 9"),
+        (lambda c: c.pop("goals"), "KeyError: 'goals'"),
+        (lambda c: c["state"][0].pop(), "state of the scene has shape"),
+        (lambda c: c["state"][0][0].__setitem__(0, None), "not finite"),
+        (lambda c: c.update(length_s=0.0), "lasts 0.0 s"),
+        (lambda c: c.update(platforms=["canoe", "heron"]), "unknown platform"),
+    ],
+)
+def test_a_damaged_scene_is_refused(tmp_path, change, words):
+    path = write_scene(tmp_path / "scene.json", draw("head_on", "heron", "heron", USUAL, 0, 0, 1), USUAL)
+    content = json.loads(path.read_text())
+    change(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(Exception, match=words) as caught:
+        read_scene(path)
+    assert type(caught.value).__name__ in ("ConfigError", "PlatformError")
+
+
+def test_a_file_that_is_no_scene_is_refused(tmp_path):
+    (tmp_path / "a.json").write_text("[1")
+    with pytest.raises(ConfigError, match="cannot read"):
+        read_scene(tmp_path / "a.json")
+    with pytest.raises(ConfigError, match="cannot read"):
+        read_scene(tmp_path / "missing.json")
