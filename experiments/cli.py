@@ -14,6 +14,7 @@ from .commands.encounters import encounters
 from .commands.evaluate import evaluate
 from .commands.parity import parity
 from .commands.play import play
+from .commands.reach import app as reach_app
 from .commands.render import render
 from .provenance import package_version
 
@@ -27,6 +28,7 @@ app = typer.Typer(
 )
 for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, docs):
     app.command()(function)
+app.add_typer(reach_app, name="reach")
 
 
 def _show_version(wanted: bool) -> None:

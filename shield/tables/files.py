@@ -7,6 +7,7 @@ import io
 import os
 import sys
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -124,7 +125,7 @@ def read_table(path: Path) -> ValueTable:
             text, steps = str(file["card"]), file["steps"]
     except FileNotFoundError as error:
         raise TableError(f"there is no table file {path}") from error
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise TableError(f"table file {path} is damaged ({error})") from error
     card = Card.of_json(text)
     shape = card.make_grid().shape

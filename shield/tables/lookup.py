@@ -113,9 +113,12 @@ def table_value(
     Args:
         tables: the tables.
         table: which one.
-        dx_m, dy_m: the other's position minus the own one, east and north, m.
-        own_heading_rad, other_heading_rad: headings, rad, clockwise from north.
-        own_speed_mps, other_speed_mps: stored speeds, m/s; outside the table they are clamped.
+        dx_m: the other's position minus the own one, east, m.
+        dy_m: the same, north, m.
+        own_heading_rad: own heading, rad, clockwise from north.
+        other_heading_rad: the other's heading, rad, clockwise from north.
+        own_speed_mps: own stored speed, m/s; outside the table it is clamped.
+        other_speed_mps: the other's stored speed, m/s, likewise.
     """
     if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
         return math.nan

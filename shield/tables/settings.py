@@ -16,6 +16,8 @@ from ..platforms.registry import get_platform
 from .grid import Grid
 from .moves import moves_of, sub_steps
 
+FAR_M = 30.0
+"""Tables that go farther than this get finer bearings and nearer nodes at short range."""
 RUDDERS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Rudders both boats choose among, shares of full."""
 
@@ -85,20 +87,19 @@ def problem_of(
     other: str | Platform,
     other_may: str | OtherMay = OtherMay.WORST_CASE,
     *,
-    coarser: float = 1.0,
     dt_s: float | None = None,
     horizon_s: float | None = None,
 ) -> Problem:
     """The problem of a pair with a grid fitted to its boats.
 
-    The step is the longest in which neither boat turns more than about 24 deg at full rudder; relative headings
-    are spaced by half the smaller full turn, so that the common moves land on nodes; the range covers what the
-    boats close in a half turn of the slower turner.
+    A step is about as long as a turn of 24 deg takes (between unlike boats, the geometric mean); headings are
+    spaced by whole parts of the full turns of a step and bearings by whole parts of that, so that common moves
+    land on nodes and cause no blur; ranges go as far as the boats close in a half turn of the slower turner.
 
     Args:
-        own, other: platforms or their names.
+        own: platform of the own boat, or its name.
+        other: platform of the other boat, or its name.
         other_may: what the other boat is granted.
-        coarser: factor on all spacings, for convergence checks and quick looks.
         dt_s: step, s, instead of the fitted one.
         horizon_s: longest play, s, instead of the fitted one.
 
@@ -107,42 +108,50 @@ def problem_of(
     """
     boats = get_platform(own), get_platform(other)
     mode = read_other_may(other_may)
-    dt_s = dt_s or _fitted_step(boats)
-    turns = [
-        float(abs(moves_of(boat, np.array([boat.max_speed_mps]), np.ones(1), dt_s).turn_rad[0, 0])) for boat in boats
-    ]
+    dt_s = _fitted_step(boats) if dt_s is None else dt_s
+    spacing_deg = _fitted_spacing_deg(boats, dt_s)
     half_turn_s = max(limits_of(boat).half_turn_s for boat in boats)
-    psi_step = min(max(min(turns) / 2.0, math.radians(7.5)), math.radians(12.0))
-    n_psi = 2 * round(math.pi / psi_step / coarser)
-    closing = boats[0].max_speed_mps + boats[1].max_speed_mps
+    rho_last_m = 6.0 + 1.3 * (boats[0].max_speed_mps + boats[1].max_speed_mps) * half_turn_s
+    far = rho_last_m > FAR_M
     grid = Grid(
-        rho_last_m=round(6.0 + 1.7 * closing * half_turn_s, 1),
-        n_rho=round(64 / coarser),
-        n_psi=n_psi,
-        n_beta=n_psi + 1,
-        n_own=_speed_nodes(boats[0], coarser),
-        n_other=_speed_nodes(boats[1], coarser),
+        rho_last_m=round(rho_last_m, 1),
+        n_rho=56 if far else 64,
+        n_psi=round(360.0 / spacing_deg),
+        n_beta=1 + round((3 if far else 2) * 180.0 / spacing_deg),
+        n_own=_speed_nodes(boats[0]),
+        n_other=_speed_nodes(boats[1]),
         own_top_mps=boats[0].max_speed_mps,
         other_top_mps=boats[1].max_speed_mps,
+        rho_ratio=8.0 if far else 5.0,
     )
-    return Problem(*boats, mode, grid, dt_s, horizon_s or _fitted_horizon(boats))
+    return Problem(*boats, mode, grid, dt_s, _fitted_horizon(half_turn_s) if horizon_s is None else horizon_s)
 
 
 def _fitted_step(boats: tuple[Platform, Platform]) -> float:
-    rates = [boat.max_turn_rate_at(boat.max_speed_mps) for boat in boats]
-    return max(0.1, round(math.floor(10.0 * 24.1 / max(*rates, 24.1)) / 10.0, 1))
+    steps = [min(max(24.1 / max(boat.max_turn_rate_at(boat.max_speed_mps), 1e-6), 0.1), 1.0) for boat in boats]
+    tenths = [math.floor(10.0 * step) for step in steps]
+    return math.ceil(math.sqrt(tenths[0] * tenths[1]) - 1e-9) / 10.0
 
 
-def _fitted_horizon(boats: tuple[Platform, Platform]) -> float:
-    """Long enough for two half turns and the return to top speed, 20 to 60 s."""
-    slow = max(limits_of(boat).half_turn_s for boat in boats)
-    return min(max(20.0, 6.0 * slow), 60.0)
+def _fitted_spacing_deg(boats: tuple[Platform, Platform], dt_s: float) -> float:
+    turn = max(min(_full_turn_deg(boat, dt_s) for boat in boats), 8.0)
+    return turn / max(1, round(turn / 11.0))
 
 
-def _speed_nodes(boat: Platform, coarser: float) -> int:
-    """More nodes for boats that gain speed slowly: for those the speed is worth something."""
-    slow = 0.0 < boat.max_acc < boat.max_speed_mps
-    return max(3, round((7 if slow else 5) / coarser))
+def _full_turn_deg(boat: Platform, dt_s: float) -> float:
+    """Turn of one step at top speed and full rudder, deg."""
+    moves = moves_of(boat, np.array([boat.max_speed_mps]), np.ones(1), dt_s)
+    return math.degrees(abs(moves.turn_rad[0, 0]))
+
+
+def _fitted_horizon(half_turn_s: float) -> float:
+    """Long enough for several half turns and the return to top speed, 20 to 60 s."""
+    return min(max(20.0, 7.0 * half_turn_s), 60.0)
+
+
+def _speed_nodes(boat: Platform) -> int:
+    """More nodes for boats that gain speed slowly: for those the speed is worth more."""
+    return 7 if 0.0 < boat.max_acc < boat.max_speed_mps / 4.0 else 5
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:

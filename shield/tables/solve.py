@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import TableError
-from ..jit import Array, BoolArray
+from ..jit import BoolArray
 from .moves import Moves, moves_of
 from .settings import RUDDERS, OtherMay, Problem, places
 from .sweep import sweep, widen
@@ -156,7 +157,7 @@ def _pieces(active: BoolArray, count: int) -> list[tuple[int, int]]:
     work = np.cumsum(active.sum(axis=1) + 0.01)
     cuts = np.searchsorted(work, np.linspace(0.0, work[-1], count + 1)[1:-1])
     edges = np.unique(np.concatenate([[0], cuts, [len(work)]]))
-    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def _signature(problem: Problem) -> str:

@@ -194,11 +194,23 @@ def sweep(
     """One value iteration over ranges ``first`` to ``last`` (exclusive): reads ``values``, lowers ``out``.
 
     Args:
-        values, out, hints: flat arrays over the grid.
+        values: flat values over the grid, m.
+        out: a copy of them, lowered in place.
+        hints: best rudders of each cell, kept between sweeps.
         active: rows (range, relative heading) that may change; others are skipped.
         changed: set to True for the rows that did change.
+        axes: description of the grid.
+        own_place: own `Moves.place_m`.
+        own_turn: own `Moves.turn_rad`.
+        own_speed: speed cell and place in it after each own move, shape ``(speeds, rudders, 2)``.
+        other_place: the same of the other boat.
+        other_turn: the same of the other boat.
+        other_speed: the same of the other boat.
+        cooperative: whether the other boat helps.
         reach_m: how far the two boats together can move in one step, m.
         tolerance_m: smaller changes are left out, m.
+        first: first range index.
+        last: range index after the last.
 
     Returns:
         The largest change, m.

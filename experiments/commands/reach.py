@@ -1,0 +1,171 @@
+"""``steerclear reach``: reachability value tables, solved, shown and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from steerclear.shield.exceptions import TableError
+from steerclear.shield.platforms.registry import get_platform
+from steerclear.shield.tables.files import (
+    SHIPPED,
+    ValueTable,
+    cache_folder,
+    check_parameters,
+    load_table,
+    read_table,
+    save_table,
+)
+from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, coarser, make_table
+from steerclear.shield.tables.settings import problem_of, read_other_may
+from steerclear.shield.tables.solve import Notice
+
+from ..reach_show import draw_sets, show_card
+from ..tables import titled
+from . import options as o
+from .console import Interrupted, command, err, finish, out
+
+app = typer.Typer(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
+
+OwnBoat = Annotated[str, typer.Option("--own", metavar="NAME", help="Platform of the own boat.")]
+OtherBoat = Annotated[str, typer.Option("--other", metavar="NAME", help="Platform of the other boat.")]
+OtherMay = Annotated[str, typer.Option(metavar="MODE", help="What the other boat may do: worst-case or cooperative.")]
+Radius = Annotated[
+    list[float] | None,
+    typer.Option(
+        metavar="M", help="Separation radius to check the table for, m; may be repeated.", show_default="2.5, 4"
+    ),
+]
+OutFile = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="File to write.", show_default="the user's cache folder")
+]
+Horizon = Annotated[
+    float | None, typer.Option(metavar="S", help="Longest play looked ahead, s.", show_default="fitted to the boats")
+]
+CoarseGrid = Annotated[bool, typer.Option("--quick", help="A coarse grid and few runs: for a first look only.")]
+Checkpoint = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Where an interrupted solve is kept.", show_default="beside --out")
+]
+Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Also draw the sets, as PNG or SVG.")]
+TableFiles = Annotated[
+    list[Path] | None, typer.Argument(help="Table files.", show_default="all shipped and cached ones")
+]
+CONVERGED_SHARE = 0.1
+"""Largest mean change of area from the coarser grid that `check` lets pass."""
+
+
+@app.command()
+@command
+def solve(
+    own: OwnBoat,
+    other: OtherBoat,
+    other_may: OtherMay = "worst-case",
+    radius: Radius = None,
+    out_file: OutFile = None,
+    horizon: Horizon = None,
+    jobs: o.Jobs = None,
+    quick: CoarseGrid = False,
+    checkpoint: Checkpoint = None,
+) -> None:
+    """Solve the game of two boats and write its value table.
+
+    One table serves every separation radius; --radius says for which its grid and its promise are checked.
+    Ctrl-C keeps the state: the same command then goes on from there.
+    """
+    problem = problem_of(own, other, other_may, horizon_s=horizon)
+    if quick:
+        problem = coarser(problem, 2.0)
+    target = out_file or cache_folder() / f"{problem.name}.npz"
+    kept = checkpoint or target.with_name(target.name + ".checkpoint")
+    try:
+        with _stages() as stage:
+            radii = tuple(radius) if radius else RADII_M
+            table = make_table(
+                problem, radii, threads=jobs, checkpoint=kept, runs=RUNS // 20 if quick else RUNS, stage=stage
+            )
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted; what was solved is kept in {kept}: the same command goes on") from None
+    save_table(table, target)
+    show_card(out(), table.card)
+    out().print(f"written to {target}, {target.stat().st_size / 1e6:.2f} MB", soft_wrap=True)
+
+
+@contextmanager
+def _stages() -> Iterator[Stage]:
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[change]}"), console=err(), transient=True) as bar:
+
+        def stage(name: str) -> Notice:
+            task = bar.add_task(name, total=None, change="")
+
+            def notice(done: int, total: int, residual_m: float) -> None:
+                change = f"largest change {residual_m:.3f} m" if residual_m else ""
+                bar.update(task, completed=done, total=total, change=change)
+
+            return notice
+
+        yield stage
+
+
+@app.command()
+@command
+def show(
+    own: OwnBoat,
+    other: OtherBoat,
+    other_may: OtherMay = "worst-case",
+    radius: Radius = None,
+    file: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A table file instead of the installed one.")
+    ] = None,
+    picture: Picture = None,
+) -> None:
+    """Show a table's card and the sets in which a radius cannot be kept."""
+    table = _open(own, other, other_may, file)
+    show_card(out(), table.card)
+    if picture is not None:
+        draw_sets(table, tuple(radius) if radius else RADII_M, picture)
+        out().print(f"picture: {picture}", soft_wrap=True)
+
+
+def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable:
+    if file is None:
+        return load_table(own, other, other_may)
+    table = read_table(file)
+    check_parameters(table.card, get_platform(own), get_platform(other), read_other_may(other_may))
+    return table
+
+
+@app.command()
+@command
+def check(files: TableFiles = None) -> None:
+    """Check tables: checksum, boats' parameters, convergence.
+
+    Exit status: 0 all in order, 1 one is damaged, made for other parameters or not converged, 2 no table found.
+    """
+    paths = list(files or [])
+    if not paths:
+        paths = [path for folder in (SHIPPED, cache_folder()) for path in sorted(folder.glob("*.npz"))]
+    if not paths:
+        raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
+    faults = [_fault(path) for path in paths]
+    rows = [[path.name, fault or "in order"] for path, fault in zip(paths, faults, strict=True)]
+    out().print(titled("Value tables", ["file", "state"], rows))
+    finish(not any(faults))
+
+
+def _fault(path: Path) -> str:
+    """What is wrong with a table file; empty when nothing is."""
+    try:
+        card = read_table(path).card
+        check_parameters(card, get_platform(card.own), get_platform(card.other), read_other_may(card.other_may))
+    except TableError as error:
+        return str(error)
+    for radius, change in card.convergence.items():
+        if change["mean"] > CONVERGED_SHARE:
+            share = f"{100 * change['mean']:.0f} %"
+            return f"not converged at {radius} m: areas differ by {share} on a grid {COARSER:g} times coarser"
+    return "" if card.convergence else "convergence was never checked"

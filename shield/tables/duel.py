@@ -1,0 +1,141 @@
+"""Two boats of the full model, the own one steered by the table, compiled: what the table's promise is worth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..jit import Array, kernel
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn
+from ..platforms.step import step_boat
+from ..platforms.usv import turn_of_rudder, wrap_degrees
+from .lookup import Tables, table_value
+from .moves import SUB_STEP_S, run_hull
+from .sweep import closest
+
+GREEDY, LEAD, PURE, WANDER = 0, 1, 2, 3
+"""What the other boat does: lower the value, steer at where we will be, steer at us, or steer at random."""
+N_RUDDERS = 5
+
+
+@kernel
+def look_ahead(params: Array, state: Array, trails: Array, ends: Array) -> None:
+    """Fill trails (rudders, sub-steps, 2) and ends (rudders, 2: turn in rad, speed) of one table step."""
+    start = np.zeros(L.N_STATE)
+    for r in range(N_RUDDERS):
+        start[:] = 0.0
+        start[L.SPEED] = state[L.SPEED]
+        rudder = (r - 2) * 0.5 * min(params[L.MAX_RUDDER], 100.0)
+        ends[r, 0] = math.radians(run_hull(params, start, rudder, trails.shape[1], SUB_STEP_S, trails[r]))
+        ends[r, 1] = start[L.SPEED]
+
+
+@kernel
+def pair_value(
+    tables: Tables, table: int, own: Array, other: Array, own_trail: Array, own_end: Array, trail: Array, end: Array
+) -> float:
+    """Value after one table step of both boats, closest approach within it included."""
+    dx, dy = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
+    heading, theirs = math.radians(own[L.HEADING]), math.radians(other[L.HEADING])
+    sin, cos = math.sin(heading), math.cos(heading)
+    x, y = dx * cos - dy * sin, dx * sin + dy * cos
+    psi = theirs - heading
+    s, c = math.sin(psi), math.cos(psi)
+    last = own_trail.shape[0] - 1
+    x1 = x + trail[last, 0] * c + trail[last, 1] * s - own_trail[last, 0]
+    y1 = y - trail[last, 0] * s + trail[last, 1] * c - own_trail[last, 1]
+    later = table_value(tables, table, x1, y1, own_end[0], psi + end[0], own_end[1], end[1])
+    return min(later, closest(x, y, s, c, own_trail, trail))
+
+
+@kernel
+def best_rudders(
+    tables: Tables, table: int, params: Array, own: Array, other: Array, cooperative: bool, steps: int
+) -> tuple[float, float, float]:
+    """Value of the best own rudder against the other's answer, and both rudders (share of full).
+
+    Args:
+        tables: the tables.
+        table: which one.
+        params: parameter rows of the own boat and the other, shape ``(2, N_PARAM)``.
+        own: own state row.
+        other: the other's state row.
+        cooperative: whether the other helps.
+        steps: sub-steps of a table step.
+    """
+    own_trails, own_ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
+    trails, ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
+    look_ahead(params[0], own, own_trails, own_ends)
+    look_ahead(params[1], other, trails, ends)
+    best, ours, theirs = -1.0, 2, 2
+    for turn in range(N_RUDDERS):
+        r = (2 + turn) % N_RUDDERS
+        low, answer = (-1.0 if cooperative else 1e9), 2
+        for after in range(N_RUDDERS):
+            s = (2 + after) % N_RUDDERS
+            value = pair_value(tables, table, own, other, own_trails[r], own_ends[r], trails[s], ends[s])
+            if (value > low) == cooperative and value != low:
+                low, answer = value, s
+        if low > best:
+            best, ours, theirs = low, r, answer
+    return best, (ours - 2) * 0.5, (theirs - 2) * 0.5
+
+
+@kernel
+def steer(params: Array, state: Array, rudder: float) -> None:
+    """One step of the full model through its autopilot: top speed commanded, rudder (share of full) asked for."""
+    top = params[L.MAX_SPEED]
+    turn = rudder * abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
+    step_boat(params, state, top, command_for_turn(params, state, top, turn, SUB_STEP_S), SUB_STEP_S)
+
+
+@kernel
+def chase(params: Array, hunter: Array, prey: Array, lead: bool) -> float:
+    """Rudder that turns the hunter onto the prey, or onto where the prey will be when reached."""
+    dx, dy = prey[L.X] - hunter[L.X], prey[L.Y] - hunter[L.Y]
+    if lead:
+        time = math.sqrt(dx * dx + dy * dy) / max(hunter[L.SPEED] + 0.5 * prey[L.SPEED], 0.5)
+        heading = math.radians(prey[L.HEADING])
+        dx += math.sin(heading) * prey[L.SPEED] * time
+        dy += math.cos(heading) * prey[L.SPEED] * time
+    error = wrap_degrees(math.degrees(math.atan2(dx, dy)) - hunter[L.HEADING])
+    full = abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
+    return min(max(error / full, -1.0), 1.0)
+
+
+@kernel
+def duel(
+    tables: Tables,
+    table: int,
+    params: Array,
+    own: Array,
+    other: Array,
+    manner: int,
+    cooperative: bool,
+    table_steps: int,
+    steps: int,
+) -> float:
+    """Closest distance, m, over a run of the full model; changes both state rows.
+
+    Args:
+        tables: the tables.
+        table: which one.
+        params: parameter rows of the own boat and the other, shape ``(2, N_PARAM)``.
+        own: own state row.
+        other: the other's state row.
+        manner: what the other boat does.
+        cooperative: whether both play the table's joint best.
+        table_steps: sub-steps of a table step.
+        steps: steps of the run.
+    """
+    nearest = math.sqrt((own[L.X] - other[L.X]) ** 2 + (own[L.Y] - other[L.Y]) ** 2)
+    for _ in range(steps):
+        _, ours, theirs = best_rudders(tables, table, params, own, other, cooperative, table_steps)
+        if not cooperative and manner != GREEDY:
+            theirs = chase(params[1], other, own, manner == LEAD)
+        steer(params[0], own, ours)
+        steer(params[1], other, theirs)
+        nearest = min(nearest, math.sqrt((own[L.X] - other[L.X]) ** 2 + (own[L.Y] - other[L.Y]) ** 2))
+    return nearest

@@ -1,0 +1,112 @@
+"""From a problem to a table with a complete card: solve, solve coarser, compare, run the full model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..exceptions import TableError
+from .areas import HEADINGS_DEG, SPEED_SHARES, area_m2, area_table, reach_ahead_m
+from .files import ValueTable, pack_values, with_figures
+from .margin import model_error, value_loss
+from .settings import Problem
+from .solve import Notice, solve
+
+RADII_M = (2.5, 4.0)
+"""Separation radii for which tables are checked unless others are asked for, m."""
+COARSER = 1.5
+"""Factor on all spacings of the grid that a table is compared with."""
+RUNS = 1000
+
+Stage = Callable[[str], Notice]
+
+
+def make_table(
+    problem: Problem,
+    radii_m: tuple[float, ...] = RADII_M,
+    *,
+    threads: int | None = None,
+    checkpoint: Path | None = None,
+    runs: int = RUNS,
+    stage: Stage | None = None,
+) -> ValueTable:
+    """Solve a problem and fill in its table's card.
+
+    Args:
+        problem: what to solve.
+        radii_m: separation radii to check convergence and margin for, m.
+        threads: threads to use; by default all cores.
+        checkpoint: file that keeps an interrupted solve.
+        runs: closed-loop runs of the full model per radius.
+        stage: called with the name of each part; returns what to call with its progress.
+
+    Raises:
+        TableError: a radius is outside the table, or the checkpoint belongs to another problem.
+    """
+    check_radii(problem, radii_m)
+    begin = stage or (lambda name: lambda done, total, residual: None)
+    table = pack_values(problem, solve(problem, threads=threads, notice=begin("solve"), checkpoint=checkpoint))
+    coarse_problem = coarser(problem, COARSER)
+    coarse = pack_values(coarse_problem, solve(coarse_problem, threads=threads, notice=begin("coarser grid")))
+    return with_figures(table, **figures(table, coarse, radii_m, runs, begin("runs")))
+
+
+def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:
+    """Raise unless the radii lie well inside the table's values.
+
+    Raises:
+        TableError: one does not.
+    """
+    low, high = problem.grid.rho_first_m, 0.8 * problem.grid.cap_m
+    for radius in radii_m:
+        if not low < radius <= high:
+            raise TableError(f"radius {radius:g} m is outside the table's {low:g} to {high:g} m; choose one within")
+
+
+def coarser(problem: Problem, factor: float) -> Problem:
+    """The same problem with all spacings of the grid wider by a factor (speeds keep at least 3 nodes)."""
+    grid = problem.grid
+    fewer = {
+        name: max(3, 1 + round((getattr(grid, name) - 1) / factor)) for name in ("n_rho", "n_beta", "n_own", "n_other")
+    }
+    return replace(problem, grid=replace(grid, **fewer, n_psi=2 * round(grid.n_psi / factor / 2)))
+
+
+def figures(
+    table: ValueTable, coarse: ValueTable, radii_m: tuple[float, ...], runs: int, notice: Notice
+) -> dict[str, Any]:
+    """What a card says about a table: convergence, areas, model error and margin."""
+    problem_boats = {"own": table.card.own, "other": table.card.other}
+    margins = {}
+    for done, radius in enumerate(radii_m):
+        margins[f"{radius:g}"] = value_loss(table, radius, runs, min(table.card.horizon_s, 60.0))
+        notice(done + 1, len(radii_m), 0.0)
+    return {
+        "checked_radii_m": radii_m,
+        "convergence": {f"{radius:g}": convergence(table, coarse, radius) for radius in radii_m},
+        "areas_m2": area_table(table, radii_m) | {"reach_ahead_m": reaches(table, radii_m)},
+        "model_error": {role: model_error(name, table.card.dt_s, 500) for role, name in problem_boats.items()},
+        "margin": margins,
+    }
+
+
+def reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, float]:
+    """How far ahead the set reaches head-on at top speeds, m, by radius."""
+    grid = table.card.make_grid()
+    tops = grid.own_top_mps, grid.other_top_mps
+    return {f"{radius:g}": round(reach_ahead_m(table, radius, 180.0, *tops), 2) for radius in radii_m}
+
+
+def convergence(table: ValueTable, coarse: ValueTable, radius_m: float) -> dict[str, float]:
+    """Change of the sets' areas from a coarser grid, shares of the finer: mean and largest over headings and speeds."""
+    grid, changes = table.card.make_grid(), []
+    for own, other in SPEED_SHARES:
+        for heading in HEADINGS_DEG:
+            place = radius_m, heading, own * grid.own_top_mps, other * grid.other_top_mps
+            fine = area_m2(table, *place)
+            changes.append(abs(area_m2(coarse, *place) - fine) / fine)
+    return {"mean": round(float(np.mean(changes)), 4), "largest": round(float(np.max(changes)), 4)}
