@@ -44,7 +44,7 @@ class ValueTable:
 
     def values_m(self) -> NDArray[np.float64]:
         """Values in m, over the grid."""
-        return self.values * (self.card.make_grid().cap_m / STEPS)
+        return self.values.astype(np.float64) * (self.card.make_grid().cap_m / STEPS)
 
 
 def pack_values(problem: Problem, state: Progress) -> ValueTable:

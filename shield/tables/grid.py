@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..exceptions import TableError
 from ..jit import Array, kernel
@@ -51,7 +53,7 @@ def even_place(value: float, n_cells: int) -> tuple[int, float]:
 
 @kernel
 def blend(
-    data: Array,
+    data: NDArray[Any],
     offset: int,
     axes: Array,
     rho: tuple[int, float],
@@ -85,7 +87,7 @@ def blend(
 
 
 @kernel
-def _speeds(data: Array, at: int, n_other: int, own: float, other: float) -> float:
+def _speeds(data: NDArray[Any], at: int, n_other: int, own: float, other: float) -> float:
     """Interpolation over the two speeds at one corner of position and heading."""
     low = float(data[at])
     if other != 0.0:

@@ -89,6 +89,6 @@ def moves_of(platform: Platform, speeds_mps: Array, rudders: Array, dt_s: float)
     for i, j in np.ndindex(shape):
         state = np.zeros(L.N_STATE)
         state[L.SPEED] = speeds_mps[i]
-        turn[i, j] = math.radians(run_hull(params, state, full * rudders[j], count, SUB_STEP_S, place[i, j]))
+        turn[i, j] = math.radians(run_hull(params, state, float(full * rudders[j]), count, SUB_STEP_S, place[i, j]))
         speed[i, j] = state[L.SPEED]
     return Moves(place, turn, speed)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from ..jit import Array, kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from ..jit import Array, BoolArray, kernel
 from .grid import N_BETA, N_OTHER, N_OWN, N_PSI, blend, even_place, rho_node, rho_place
 
 TWO_PI = 2.0 * math.pi
@@ -24,7 +28,7 @@ def snapped(place: tuple[int, float]) -> tuple[int, float]:
 
 @kernel
 def value_at(
-    values: Array,
+    values: NDArray[Any],
     offset: int,
     axes: Array,
     rho_m: float,
@@ -74,7 +78,7 @@ def closest(x: float, y: float, sin: float, cos: float, own: Array, other: Array
 
 @kernel
 def outcome(
-    values: Array,
+    values: NDArray[Any],
     axes: Array,
     x: float,
     y: float,
@@ -104,7 +108,7 @@ def outcome(
 
 @kernel
 def cell_value(
-    values: Array,
+    values: NDArray[Any],
     axes: Array,
     x: float,
     y: float,
@@ -173,11 +177,11 @@ def cell_value(
 
 @kernel
 def sweep(
-    values: Array,
-    out: Array,
-    hints: Array,
-    active: Array,
-    changed: Array,
+    values: NDArray[Any],
+    out: NDArray[Any],
+    hints: NDArray[np.uint8],
+    active: BoolArray,
+    changed: BoolArray,
     axes: Array,
     own_place: Array,
     own_turn: Array,
@@ -260,7 +264,7 @@ def sweep(
 
 
 @kernel
-def widen(changed: Array, active: Array, axes: Array, reach_m: float, psi_cells: int) -> int:
+def widen(changed: BoolArray, active: BoolArray, axes: Array, reach_m: float, psi_cells: int) -> int:
     """Mark the rows from which a changed row (or its mirror image) can be reached in one step; returns their number."""
     n_rho, n_psi = changed.shape
     count = 0
