@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,11 @@ from steerclear.shield.exceptions import TableError
 from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES, unsafe
 from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.files import ValueTable
+from steerclear.shield.tables.make import COARSER
 
 from .tables import titled
 
-COLOURS = ("#b5532a", "#1f6f8b", "#7a8b1f", "#6f1f8b")
+COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
 SHOWN_DEG = (0.0, 90.0, 180.0)
 
 
@@ -28,25 +30,33 @@ def show_card(console: Console, card: Card) -> None:
     console.print(f"{steps}; values up to {grid.cap_m:g} m")
     console.print("valid for an own boat at full thrust; at most this far apart under optimal play")
     heads = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
-    for radius in map(_text, card.checked_radii_m):
+    for radius in (f"{radius:g}" for radius in card.checked_radii_m):
         rows = [[name, *(f"{area:.1f}" for area in areas)] for name, areas in card.areas_m2[radius].items()]
         console.print()
         console.print(titled(f"Area, m², from which {radius} m cannot be kept, by relative heading", heads, rows))
-        console.print(_verdict(card, radius))
-
-
-def _text(radius_m: float) -> str:
-    return f"{radius_m:g}"
-
-
-def _verdict(card: Card, radius: str) -> str:
-    change, margin = card.convergence[radius], card.margin[radius]
-    ahead = card.areas_m2["reach_ahead_m"][radius]
-    return (
-        f"reaches {ahead:.1f} m ahead in a head-on; areas differ by {100 * change['mean']:.1f} % (at most "
-        f"{100 * change['largest']:.1f} %) on a coarser grid; {margin['breaches']} of {margin['runs']} runs of the "
-        f"full model breached, none begun {margin['margin_m']:.2f} m or more above the radius"
+    console.print()
+    console.print(
+        titled("What the table is worth", ["", *(f"{radius:g} m" for radius in card.checked_radii_m)], worth(card))
     )
+
+
+def worth(card: Card) -> list[list[str]]:
+    """Rows of a card's figures: reach, convergence, margin by radius, then the error of the reduced model."""
+    columns = [_worth_of(card, f"{radius:g}") for radius in card.checked_radii_m]
+    return [[name, *(column[name] for column in columns)] for name in (columns[0] if columns else ())]
+
+
+def _worth_of(card: Card, radius: str) -> dict[str, str]:
+    change, margin = card.convergence[radius], card.margin[radius]
+    return {
+        "reach ahead in a head-on, m": f"{card.areas_m2['reach_ahead_m'][radius]:.1f}",
+        f"change of areas on a grid {COARSER:g} times coarser, mean": f"{100 * change['mean']:.1f} %",
+        "the same, largest": f"{100 * change['largest']:.1f} %",
+        "runs of the full model": f"{margin['runs']:,}",
+        "of these breached": f"{margin['breaches']:,}",
+        "deepest breach, m": f"{margin['depth_m']:.2f}",
+        "margin on the value from which none did, m": f"{margin['margin_m']:.2f}",
+    }
 
 
 def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path:
@@ -65,11 +75,16 @@ def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path
     grid = table.card.make_grid()
     canvas = Figure(figsize=(3.4 * len(SHOWN_DEG), 3.4 * len(SPEED_SHARES)), layout="constrained", dpi=120)
     panels = canvas.subplots(len(SPEED_SHARES), len(SHOWN_DEG), squeeze=False)
+    farthest = max(radii_m)
     for row, (own, other) in zip(panels, SPEED_SHARES, strict=True):
         for axis, heading in zip(row, SHOWN_DEG, strict=True):
             speeds = own * grid.own_top_mps, other * grid.other_top_mps
-            _draw_panel(axis, table, radii_m, heading, speeds)
-    canvas.suptitle(f"{table.card.own} (bow up) with {table.card.other}, {table.card.other_may}")
+            farthest = max(farthest, _draw_panel(axis, table, radii_m, heading, speeds))
+    for axis in panels.flat:
+        axis.set(xlim=(-1.1 * farthest, 1.1 * farthest), ylim=(-1.1 * farthest, 1.1 * farthest))
+    panels.flat[0].legend(fontsize=6, loc="upper left")
+    title = f"{table.card.own} (bow up) with {table.card.other}, {table.card.other_may}"
+    canvas.suptitle(f"{title}: where the other boat must not be, m")
     try:
         canvas.savefig(path)
     except (OSError, ValueError) as error:
@@ -79,16 +94,19 @@ def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path
 
 def _draw_panel(
     axis: Any, table: ValueTable, radii_m: tuple[float, ...], heading_deg: float, speeds: tuple[float, float]
-) -> None:
-    largest = max(radii_m)
-    for colour, radius in zip(COLOURS, sorted(radii_m, reverse=True), strict=False):
+) -> float:
+    """Draw one panel; returns how far its sets reach, m."""
+    ring, farthest = np.linspace(0.0, 2.0 * np.pi, 181), 0.0
+    for colour, radius in zip(itertools.cycle(COLOURS), sorted(radii_m, reverse=True)):
         ranges, bearings, inside = unsafe(table, radius, heading_deg, *speeds)
         x, y = ranges[:, None] * np.sin(bearings), ranges[:, None] * np.cos(bearings)
-        axis.contourf(x, y, inside.astype(float), [0.5, 1.5], colors=[colour], alpha=0.45)
-        ring = np.linspace(0.0, 2.0 * np.pi, 181)
-        axis.plot(radius * np.sin(ring), radius * np.cos(ring), color=colour, lw=0.8)
-        if inside.any():
-            largest = max(largest, float(ranges[inside.any(axis=1)].max()))
-    axis.set(xlim=(-1.05 * largest, 1.05 * largest), ylim=(-1.05 * largest, 1.05 * largest), aspect="equal")
-    axis.set_title(f"heading {heading_deg:g}°, {speeds[0]:g} / {speeds[1]:g} m/s", fontsize=9)
+        axis.contourf(x, y, inside.astype(float), [0.5, 1.5], colors=[colour])
+        axis.plot(radius * np.sin(ring), radius * np.cos(ring), color="black", lw=0.8, ls=":")
+        farthest = max(farthest, float(ranges[inside.any(axis=1)].max(initial=0.0)))
+        axis.fill([], [], color=colour, label=f"{radius:g} m cannot be kept")
+    axis.plot(0.0, 0.0, marker=(3, 0, 0.0), color="black", ms=7)
+    axis.plot(0.9, 0.1, marker=(3, 0, -heading_deg), color="black", mfc="white", ms=7, transform=axis.transAxes)
+    axis.set_aspect("equal")
+    axis.set_title(f"other heads {heading_deg:g}°, {speeds[0]:g} / {speeds[1]:g} m/s", fontsize=9)
     axis.tick_params(labelsize=7)
+    return farthest

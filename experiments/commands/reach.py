@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from steerclear.shield.exceptions import TableError
+from steerclear.shield.exceptions import SteerclearError, TableError
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.files import (
     SHIPPED,
@@ -18,6 +18,7 @@ from steerclear.shield.tables.files import (
     check_parameters,
     load_table,
     read_table,
+    remedy,
     save_table,
 )
 from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, coarser, make_table
@@ -134,8 +135,12 @@ def show(
 def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable:
     if file is None:
         return load_table(own, other, other_may)
-    table = read_table(file)
-    check_parameters(table.card, get_platform(own), get_platform(other), read_other_may(other_may))
+    mode = read_other_may(other_may)
+    try:
+        table = read_table(file)
+        check_parameters(table.card, get_platform(own), get_platform(other), mode)
+    except TableError as error:
+        raise TableError(f"{error}; make it with: {remedy(own, other, mode)} --out {file}") from error
     return table
 
 
@@ -162,7 +167,7 @@ def _fault(path: Path) -> str:
     try:
         card = read_table(path).card
         check_parameters(card, get_platform(card.own), get_platform(card.other), read_other_may(card.other_may))
-    except TableError as error:
+    except SteerclearError as error:
         return str(error)
     for radius, change in card.convergence.items():
         if change["mean"] > CONVERGED_SHARE:

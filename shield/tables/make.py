@@ -40,7 +40,7 @@ def make_table(
         problem: what to solve.
         radii_m: separation radii to check convergence and margin for, m.
         threads: threads to use; by default all cores.
-        checkpoint: file that keeps an interrupted solve.
+        checkpoint: file that keeps the solve until the table is complete; an interrupted one goes on from there.
         runs: closed-loop runs of the full model per radius.
         stage: called with the name of each part; returns what to call with its progress.
 
@@ -49,10 +49,21 @@ def make_table(
     """
     check_radii(problem, radii_m)
     begin = stage or (lambda name: lambda done, total, residual: None)
-    table = pack_values(problem, solve(problem, threads=threads, notice=begin("solve"), checkpoint=checkpoint))
-    coarse_problem = coarser(problem, COARSER)
-    coarse = pack_values(coarse_problem, solve(coarse_problem, threads=threads, notice=begin("coarser grid")))
-    return with_figures(table, **figures(table, coarse, radii_m, runs, begin("runs")))
+    parts = (("solve", problem, checkpoint), ("coarser grid", coarser(problem, COARSER), _second(checkpoint)))
+    table, coarse = (
+        pack_values(part, solve(part, threads=threads, notice=begin(name), checkpoint=kept))
+        for name, part, kept in parts
+    )
+    complete = with_figures(table, **figures(table, coarse, radii_m, runs, begin("runs")))
+    for _name, _part, kept in parts:
+        if kept is not None:
+            kept.unlink(missing_ok=True)
+    return complete
+
+
+def _second(checkpoint: Path | None) -> Path | None:
+    """Where the solve on the coarser grid is kept."""
+    return None if checkpoint is None else checkpoint.with_name(checkpoint.name + ".coarser")
 
 
 def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:

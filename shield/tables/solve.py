@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import zipfile
+import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -78,11 +80,11 @@ def solve(
         problem: boats, mode, grid, step and horizon.
         threads: threads to use; by default all cores.
         notice: called with (steps done, steps at most, largest change in m) after each step.
-        checkpoint: file that keeps the state of an unfinished solve. When it exists and belongs to the same
-            problem, the solve goes on from it; when interrupted (Ctrl-C), the state is kept there.
+        checkpoint: file that keeps the state, written now and then, when interrupted (Ctrl-C) and at the end.
+            When it exists and belongs to the same problem, the solve goes on from it.
 
     Raises:
-        TableError: the checkpoint belongs to another problem.
+        TableError: the checkpoint is damaged, belongs to another problem or cannot be written.
     """
     solver = _Solver(problem)
     state = _resume(problem, checkpoint) or start(problem)
@@ -95,12 +97,9 @@ def solve(
                     notice(state.iterations, steps_of(problem), state.residual_m)
                 if checkpoint is not None and state.iterations % SAVE_EVERY == 0:
                     _keep(problem, state, checkpoint)
-        except KeyboardInterrupt:
+        finally:
             if checkpoint is not None:
                 _keep(problem, state, checkpoint)
-            raise
-    if checkpoint is not None:
-        checkpoint.unlink(missing_ok=True)
     return state
 
 
@@ -143,9 +142,10 @@ class _Solver:
             )
 
         residual = max(pool.map(piece, pieces))
-        state.values, state.residual_m = values, residual
+        active = np.zeros_like(state.active)
+        widen(changed, active, self.axes, self.reach_m, self.psi_cells)
+        state.values, state.active, state.residual_m = values, active, residual
         state.iterations += 1
-        widen(changed, state.active, self.axes, self.reach_m, self.psi_cells)
 
 
 def _reach(moves: Moves) -> float:
@@ -160,25 +160,16 @@ def _pieces(active: BoolArray, count: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
-def _signature(problem: Problem) -> str:
-    return repr(problem)
-
-
 def _keep(problem: Problem, state: Progress, path: Path) -> None:
     """Write a checkpoint so that no half-written one is ever found."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        np.savez(
-            file,
-            problem=np.array(_signature(problem)),
-            values=state.values,
-            hints=state.hints,
-            active=state.active,
-            iterations=state.iterations,
-            residual_m=state.residual_m,
-        )
-    part.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            np.savez(file, problem=np.array(repr(problem)), **vars(state))
+        part.replace(path)
+    except OSError as error:
+        raise TableError(f"checkpoint {path} cannot be written ({error}); name another with --checkpoint") from error
 
 
 def _resume(problem: Problem, path: Path | None) -> Progress | None:
@@ -186,10 +177,11 @@ def _resume(problem: Problem, path: Path | None) -> Progress | None:
         return None
     try:
         with np.load(path, allow_pickle=False) as file:
-            kept = {name: file[name] for name in file.files}
-        same = str(kept["problem"]) == _signature(problem)
-    except (OSError, ValueError, KeyError) as error:
+            same = str(file["problem"]) == repr(problem)
+            values, hints, active = file["values"], file["hints"], file["active"]
+            state = Progress(values, hints, active, int(file["iterations"]), float(file["residual_m"]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise TableError(f"checkpoint {path} cannot be read ({error}); delete it to start afresh") from error
     if not same:
         raise TableError(f"checkpoint {path} belongs to another problem; delete it or name another with --checkpoint")
-    return Progress(kept["values"], kept["hints"], kept["active"], int(kept["iterations"]), float(kept["residual_m"]))
+    return state
