@@ -20,6 +20,8 @@ from .summary import summarise
 from .tally import Columns
 
 Pair = tuple[str, str]
+COLUMNS_VERSION = 2
+"""Goes up when columns change, so that results kept by an earlier version are played anew."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Job:
-    """Some encounters of a cell."""
+    """Some encounters of a cell; ``columns`` tells results of different versions apart."""
 
     cell: Cell
     conditions: Conditions
@@ -84,6 +86,7 @@ class Job:
     first: int
     count: int
     judge: bool
+    columns: int = COLUMNS_VERSION
 
     @property
     def key(self) -> str:

@@ -12,10 +12,14 @@ CELL_KEYS = {
     "breached_upper": "95 % upper limit of the probability of that (Clopper-Pearson, one-sided)",
     "unshielded_breached": "the same scenes without a guard: how many were breached",
     "avoidable": "encounters with a breach that an own boat could have avoided, by the oracle",
-    "avoidable_upper": "95 % upper limit of the probability of that",
+    "avoidable_upper": "95 % upper limit of the probability of that; what was not judged counts as avoidable",
     "unavoidable": "encounters with breaches of which none was avoidable",
     "started_inside": "encounters whose breaches were under way at the start",
-    "not_judged": "breached encounters that the oracle was not asked about",
+    "not_judged": "encounters with breaches that the oracle was not asked about, and no avoidable one",
+    "responsible.*": "encounters by whose command let the last chance pass: own, other, both, neither, start",
+    "started_outside": "encounters in which the shield's certificate at the first decision was at least 0",
+    "breaches_outside": "of those, how many were breached",
+    "breaches_outside_upper": "95 % upper limit of the probability of that",
     "breaches_teammate": "entries of two own boats into the radius, all encounters",
     "breaches_opponent": "entries of an own boat and another, all encounters",
     "closest_m": "least distance of all encounters, m",
@@ -44,6 +48,9 @@ WORST_KEYS = {
     "closest_m": "closest distance, m",
     "breaches": "entries into the radius",
     "avoidable": "of those judged, how many were avoidable",
+    "last_preventable_s": "how long before the breach an own boat could still avoid it, s; null when never",
+    "responsible": "whose command let the last chance pass; null when not judged",
+    "start_certificate_m": "the shield's certificate at the first decision, m; null when nobody was near",
 }
 
 ENCOUNTERS = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from steerclear.shield.exceptions import ConfigError
 from .families import draw
 from .guards import NONE, GuardMaker
 from .play import Film, play
-from .scenes import Conditions, Scenes
+from .scenes import DT_S, Conditions, Scenes
+from .start import start_certificate_m
 from .summary import summarise
 from .tally import Columns, tally
-from .verdicts import VERDICT_COLUMNS, judge_game
+from .verdicts import NO_VERDICT, VERDICT_COLUMNS, judge_worst
 
 CHUNK_MIB = 96.0
 """Memory of a chunk's films, MiB."""
@@ -99,22 +100,24 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
 
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
-        those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and
-        ``decision_p999_us`` (of the chunk, per game and step), and the verdicts.
+        ``start_certificate_m`` (see `start`), those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and
+        `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per game and step), and the verdicts.
     """
+    play(replace(scenes.take([0]), length_s=DT_S), guard, conditions)  # compiles, so that what is timed is deciding
     film = play(scenes, guard, conditions)
     counted = tally(film)
     bare = counted if guard == NONE else tally(play(scenes, NONE, conditions))
-    worst = worst_games(scenes, counted["closest_m"])
+    worst, verdicts = _verdicts(film, counted, judge)
     columns = {"number": scenes.number[worst].astype(np.float64), "game": worst.astype(np.float64)}
     columns["variant"] = np.array([game - np.argmax(scenes.number == scenes.number[game]) for game in worst], float)
+    columns["start_certificate_m"] = start_certificate_m(film)[worst]
     columns |= {name: values[worst] for name, values in counted.items()}
     columns |= {f"unshielded_{name}": bare[name][worst] for name in BARE_SAME}
     worst_bare = worst_games(scenes, bare["closest_m"])
     columns |= {f"unshielded_{name}": bare[name][worst_bare] for name in BARE_WORST}
     columns["decision_us"] = np.full(len(worst), float(np.median(film.decision_us)))
     columns["decision_p999_us"] = np.full(len(worst), float(np.quantile(film.decision_us, 0.999)))
-    return columns | _verdicts(film, worst, counted, judge)
+    return columns | verdicts
 
 
 def worst_games(scenes: Scenes, closest_m: np.ndarray) -> np.ndarray:
@@ -124,13 +127,12 @@ def worst_games(scenes: Scenes, closest_m: np.ndarray) -> np.ndarray:
     return np.asarray(order[firsts])
 
 
-def _verdicts(film: Film, worst: np.ndarray, counted: Columns, judge: bool) -> Columns:
-    columns = {name: np.zeros(len(worst)) for name in VERDICT_COLUMNS}
-    columns["last_preventable_s"] = np.full(len(worst), np.nan)
-    breaches = counted["breaches_teammate"] + counted["breaches_opponent"]
-    for k, game in enumerate(worst):
-        if breaches[game] > 0:
-            found = judge_game(film, int(game)) if judge else {"not_judged": breaches[game]}
-            for name, value in found.items():
-                columns[name][k] = value
-    return columns
+def _verdicts(film: Film, counted: Columns, judge: bool) -> tuple[np.ndarray, Columns]:
+    """The game of each encounter that counts, and the columns of its verdict."""
+    worst = worst_games(film.scenes, counted["closest_m"])
+    if judge:
+        worst, found = judge_worst(film, counted, worst)
+    else:
+        hits = (counted["breaches_teammate"] + counted["breaches_opponent"])[worst]
+        found = [NO_VERDICT | {"not_judged": float(count)} for count in hits]
+    return worst, {name: np.array([verdict[name] for verdict in found]) for name in VERDICT_COLUMNS}

@@ -18,10 +18,13 @@ from .guards import NONE, SHIELD
 from .play import Film, play
 from .scenes import DT_S, Conditions
 from .tally import Columns
+from .verdicts import SIDES
 
 MOST_WORST = 10
 EDGE_M = 5.0
 """Water around open-water encounters, m."""
+FAR_M = 1e4
+"""A certificate beyond this, m, says that nobody is near."""
 SHAPE = 1.6
 """Width over height of its picture."""
 
@@ -131,10 +134,17 @@ def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) ->
                 "closest_m": float(values["closest_m"][k]),
                 "breaches": int(values["breaches_teammate"][k] + values["breaches_opponent"][k]),
                 "avoidable": int(values["avoidable"][k]),
+                "last_preventable_s": _finite(values["last_preventable_s"][k]),
+                "responsible": None if np.isnan(values["responsible"][k]) else SIDES[int(values["responsible"][k])],
+                "start_certificate_m": _finite(values["start_certificate_m"][k]),
             }
             for k in order
         ]
     return sorted(found, key=lambda entry: (-entry["avoidable"], entry["closest_m"]))[:most]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if abs(value) < FAR_M else None
 
 
 def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:

@@ -19,9 +19,10 @@ COLUMNS = (
     ("guard", "guard"),
     ("encounters", "n"),
     ("breached", "breached"),
-    ("breached_upper", "≤ at 95 %, %"),
     ("avoidable", "avoidable"),
+    ("avoidable_upper", "≤ at 95 %, %"),
     ("unavoidable", "unavoidable"),
+    ("breaches_outside", "breached, started outside"),
     ("closest_m", "closest, m"),
     ("changed_percent", "changed, %"),
     ("heading_change_deg", "by, deg"),
@@ -32,7 +33,21 @@ COLUMNS = (
     ("reversals_per_min", "reversals/min"),
     ("decision_us", "decision, µs"),
 )
-PERCENT = ("breached_upper",)
+PERCENT = ("avoidable_upper",)
+WORST_COLUMNS = (
+    ("guard", "guard"),
+    ("own", "own"),
+    ("other", "other"),
+    ("family", "family"),
+    ("number", "number"),
+    ("variant", "variant"),
+    ("closest_m", "closest, m"),
+    ("breaches", "breaches"),
+    ("avoidable", "avoidable"),
+    ("last_preventable_s", "until, s before"),
+    ("responsible", "last chance let pass by"),
+    ("start_certificate_m", "certificate at the start, m"),
+)
 STYLE = """
 svg .curve { fill: none !important; stroke-width: 2; stroke-linejoin: round; }
 .curve.off { stroke: var(--off); } .curve.reason-0 { stroke: var(--r0); } .curve.reason-1 { stroke: var(--r1); }
@@ -155,18 +170,18 @@ def _cell(cell: Mapping[str, Any], name: str) -> str:
     text = str(value) if isinstance(value, int) else number_text(value)
     if name == "avoidable" and cell["not_judged"]:
         text += f" (+{cell['not_judged']} not judged)"
+    if name == "breaches_outside":
+        text += f" of {cell['started_outside']}"
     return f'<td class="number{bad}">{text}</td>'
 
 
 def _worst_table(worst: Cells) -> str:
-    names = ("guard", "own", "other", "family", "number", "variant", "closest_m", "breaches", "avoidable")
-    head = "".join(f"<th>{name.replace('_m', ', m')}</th>" for name in names)
+    head = "".join(f"<th>{as_text(text)}</th>" for _, text in WORST_COLUMNS)
     rows = "".join(
-        "<tr>"
-        + "".join(
-            f"<td>{as_text(f'{row[name]:.2f}' if isinstance(row[name], float) else row[name])}</td>" for name in names
-        )
-        + "</tr>"
-        for row in worst
+        "<tr>" + "".join(f"<td>{_plain(row[name])}</td>" for name, _ in WORST_COLUMNS) + "</tr>" for row in worst
     )
     return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def _plain(value: object) -> str:
+    return as_text("–" if value is None else f"{value:.2f}" if isinstance(value, float) else value)

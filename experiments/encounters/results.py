@@ -18,6 +18,7 @@ from .guards import SHIELD
 from .replays import replay_worst, worst_encounters
 from .report import write_encounter_report
 
+ONE_RAMMER = "rammer_1"
 UNAVOIDABLE_PERCENT = 1.0
 """Most encounters with several others that may be breached unavoidably, %."""
 
@@ -47,13 +48,19 @@ def results_of(campaign: Campaign, wall_s: float) -> dict[str, Any]:
 def bars_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Bars of every shield: no avoidable breach, few unavoidable ones among several others.
 
-    A count that the oracle was not asked about leaves the bar without data.
+    One rammer of the same platform must not breach at all where the start was outside the unavoidable set. A count
+    that the oracle was not asked about leaves the bar without data.
     """
     bars = []
     for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
         own = [cell for cell in cells if cell["guard"] == guard]
         many = [cell for cell in own if FAMILIES[cell["family"]].others > 1]
         bars.append(_bar(f"{guard}: encounters with avoidable breaches", _total(own, "avoidable"), 0.0, own))
+        same = [cell for cell in own if cell["family"] == ONE_RAMMER and cell["own"] == cell["other"]]
+        if same:
+            bars.append(
+                _bar(f"{guard}: started outside, breached by one rammer", _total(same, "breaches_outside"), 0.0)
+            )
         if many:
             share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
             bars.append(_bar(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
@@ -69,9 +76,10 @@ def _total(cells: Sequence[Mapping[str, Any]], name: str) -> float:
     return float(sum(cell[name] for cell in cells))
 
 
-def _bar(name: str, value: float, limit: float, cells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _bar(name: str, value: float, limit: float, judged: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """A bar; ``judged`` are the cells whose verdicts it hangs on."""
     met: bool | None = value <= limit
-    if met and any(cell["not_judged"] for cell in cells):
+    if met and any(cell["not_judged"] for cell in judged):
         met = None
     return {"name": name, "value": value, "low": None, "high": None, "sense": "<=", "limit": limit, "met": met}
 
@@ -96,20 +104,23 @@ def cells_table(results: Mapping[str, Any]) -> list[Group]:
 
 
 def _table(own: str, other: str, guard: str, cells: Sequence[Mapping[str, Any]]) -> Group:
-    heads = ["", "n", "bare", "hit", "<=%", "avoid.", "unav.", "closest", "chg%", "time", "dead", "rev/m", "us"]
+    heads = ["", "bare", "hit", "avoid.", "<=%", "unav.", "outside", "close", "chg%", "time", "dead", "rev", "us"]
     rows: list[list[str | Text]] = [[cell["family"], *_figures(cell)] for cell in cells]
-    return titled(f"{own} meets {other}, guard {guard}", heads, rows)
+    counts = sorted({cell["encounters"] for cell in cells})
+    title = f"{own} meets {other}, guard {guard}, {'-'.join(f'{n}' for n in (*counts[:1], *counts[1:][-1:]))} each"
+    return titled(title, heads, rows)
 
 
 def _figures(cell: Mapping[str, Any]) -> list[str | Text]:
+    """Cells of the terminal's table; "outside" is breached of those that started outside the unavoidable set."""
     avoidable = f"{cell['avoidable']}" + (f"+{cell['not_judged']}?" if cell["not_judged"] else "")
     return [
-        f"{cell['encounters']}",
         f"{cell['unshielded_breached']}",
         f"{cell['breached']}",
-        number_text(100.0 * cell["breached_upper"]),
         Text(avoidable, "red" if cell["avoidable"] and is_shield(cell["guard"]) else ""),
+        number_text(100.0 * cell["avoidable_upper"]),
         f"{cell['unavoidable'] + cell['started_inside']}",
+        f"{cell['breaches_outside']}/{cell['started_outside']}",
         number_text(cell["closest_m"]),
         number_text(cell["changed_percent"]),
         number_text(cell["goal_time_ratio"]),

@@ -9,6 +9,7 @@ from scipy import stats
 
 from ..statistics import CONFIDENCE
 from .tally import Columns
+from .verdicts import SIDES
 
 
 def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
@@ -22,11 +23,14 @@ def summarise(columns: Columns) -> dict[str, Any]:
     """Figures over encounters.
 
     Returns:
-        JSON-ready; `SUMMARY_KEYS` describes them.
+        JSON-ready; `keys.CELL_KEYS` describes them.
     """
     n = len(columns["closest_m"])
     breached = (columns["breaches_teammate"] + columns["breaches_opponent"]) > 0
-    avoidable, unavoidable = columns["avoidable"] > 0, columns["unavoidable"] > 0
+    avoidable, unjudged = columns["avoidable"] > 0, breached & (columns["not_judged"] > 0)
+    open_, outside = unjudged & ~avoidable, columns["start_certificate_m"] >= 0.0
+    settled = breached & ~avoidable & ~open_
+    unavoidable = settled & (columns["unavoidable"] > 0)
     goal, bare = columns["goal_s"].sum(), columns["unshielded_goal_s"].sum()
     return {
         "encounters": n,
@@ -36,10 +40,14 @@ def summarise(columns: Columns) -> dict[str, Any]:
             (columns["unshielded_breaches_teammate"] + columns["unshielded_breaches_opponent"] > 0).sum()
         ),
         "avoidable": int(avoidable.sum()),
-        "avoidable_upper": upper_bound(int(avoidable.sum()), n),
-        "unavoidable": int((unavoidable & ~avoidable).sum()),
-        "started_inside": int((breached & (columns["started_inside"] > 0) & ~avoidable & ~unavoidable).sum()),
-        "not_judged": int((breached & (columns["not_judged"] > 0) & ~avoidable & ~unavoidable).sum()),
+        "avoidable_upper": upper_bound(int((avoidable | open_).sum()), n),
+        "unavoidable": int(unavoidable.sum()),
+        "started_inside": int((settled & ~unavoidable).sum()),
+        "not_judged": int(open_.sum()),
+        "responsible": {name: int((columns["responsible"] == k).sum()) for k, name in enumerate(SIDES)},
+        "started_outside": int(outside.sum()),
+        "breaches_outside": int((breached & outside).sum()),
+        "breaches_outside_upper": upper_bound(int((breached & outside).sum()), int(outside.sum())),
         "breaches_teammate": int(columns["breaches_teammate"].sum()),
         "breaches_opponent": int(columns["breaches_opponent"].sum()),
         "closest_m": float(columns["closest_m"].min()),

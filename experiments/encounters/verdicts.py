@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,17 @@ from steerclear.shield.platforms import get_platform
 
 from .play import Film, water_states
 from .scenes import DT_S
+from .tally import Columns
 
 MOST_JUDGED = 5
 """Breaches of one game that are judged; a crowd without a guard has hundreds."""
-VERDICT_COLUMNS = ("avoidable", "unavoidable", "started_inside", "not_judged", "last_preventable_s")
+MOST_VARIANTS = 3
+"""Breached variants of one encounter that are judged while none of them is avoidable."""
+COUNTS = ("avoidable", "unavoidable", "started_inside", "not_judged")
+VERDICT_COLUMNS = (*COUNTS, "last_preventable_s", "responsible")
+SIDES = ("own", "other", "both", "neither", "start")
+"""Whose command let the last chance pass; the column ``responsible`` holds the index, NaN without a verdict."""
+NO_VERDICT: dict[str, float] = dict.fromkeys(COUNTS, 0.0) | {"last_preventable_s": np.nan, "responsible": np.nan}
 
 
 def judge_game(film: Film, game: int) -> dict[str, float]:
@@ -24,37 +32,64 @@ def judge_game(film: Film, game: int) -> dict[str, float]:
     A breach is avoidable when any own boat in it could have avoided it; of team-mates either may.
 
     Returns:
-        How many are ``avoidable``, ``unavoidable``, ``started_inside`` and ``not_judged``, and ``last_preventable_s``,
-        how long before the breach the first avoidable one could still be avoided.
+        How many are ``avoidable``, ``unavoidable``, ``started_inside`` and ``not_judged``; and of the breach that
+        counts (the first avoidable one, else the first) ``last_preventable_s``, how long before it an own boat could
+        still avoid it (NaN: never), and ``responsible``, the index in `SIDES`.
     """
-    states = water_states(film, game)
-    team, radius_m = film.scenes.team, film.conditions.radius_m
-    found = find_breaches(states[:, :, :2], radius_m)
+    states, team = water_states(film, game), film.scenes.team
+    found = find_breaches(states[:, :, :2], film.conditions.radius_m)
     ours = [row for row in found if team[int(row[1])] == 0 or team[int(row[2])] == 0]
-    counts = dict.fromkeys(VERDICT_COLUMNS, 0.0) | {"last_preventable_s": np.nan}
-    counts["not_judged"] = float(max(0, len(ours) - MOST_JUDGED))
-    for step, a, b, _ in ours[:MOST_JUDGED]:
-        sides = [
-            _side(states, film.scenes.platforms, int(i), int(j), int(step), radius_m)
-            for i, j in ((a, b), (b, a))
-            if team[int(i)] == 0
-        ]
-        names = [name for name, _ in sides]
-        name = next(n for n in ("avoidable", "started_inside", "unavoidable") if n in names)
-        counts[name] += 1.0
-        if name == "avoidable" and np.isnan(counts["last_preventable_s"]):
-            counts["last_preventable_s"] = min(late for n, late in sides if n == name)
+    params = np.array([get_platform(name).pack() for name in film.scenes.platforms])
+    judged = _oracle().judge_breaches(states, params, ours[:MOST_JUDGED], film.conditions.radius_m, DT_S)
+    entries = [_entry(verdict, team) for verdict in judged]
+    counts = NO_VERDICT | {name: float(sum(entry[0] == name for entry in entries)) for name in COUNTS}
+    counts["not_judged"] = float(len(ours) - len(judged))
+    chosen = next((entry for entry in entries if entry[0] == "avoidable"), entries[0] if entries else None)
+    if chosen is not None:
+        counts["last_preventable_s"], counts["responsible"] = chosen[1], float(SIDES.index(chosen[2]))
     return counts
 
 
-def _side(
-    states: np.ndarray, platforms: tuple[str, ...], own: int, other: int, step: int, radius_m: float
-) -> tuple[str, float]:
-    """Outcome for one boat, and how long before the breach it could still be avoided, s (NaN where never)."""
-    params = np.array([get_platform(name).pack() for name in platforms])
-    verdict = _oracle().judge(states, params, own=own, step=step, radius_m=radius_m, dt_s=DT_S, other=other)
-    late = verdict.last_preventable_s
-    return str(verdict.outcome), float("nan") if late is None else float(late)
+def judge_worst(film: Film, counted: Columns, worst: np.ndarray) -> tuple[np.ndarray, list[dict[str, float]]]:
+    """Judge encounters: the variant that came closest, or another breached one that is avoidable.
+
+    Args:
+        film: what was played.
+        counted: its columns, see `tally.tally`.
+        worst: the game of each encounter that came closest.
+
+    Returns:
+        The game of each encounter that counts, and what `judge_game` says about it.
+    """
+    hits = counted["breaches_teammate"] + counted["breaches_opponent"]
+    chosen, verdicts = worst.copy(), []
+    for k, first in enumerate(worst):
+        same = np.flatnonzero((film.scenes.number == film.scenes.number[first]) & (hits > 0))
+        order = same[np.argsort(counted["closest_m"][same], kind="stable")][:MOST_VARIANTS]
+        chosen[k], verdict = _first_avoidable(film, [int(game) for game in order], int(first))
+        verdicts.append(verdict)
+    return chosen, verdicts
+
+
+def _first_avoidable(film: Film, games: Sequence[int], otherwise: int) -> tuple[int, dict[str, float]]:
+    """The first of the games with an avoidable breach, else the first of all, and its verdict."""
+    kept: tuple[int, dict[str, float]] | None = None
+    for game in games:
+        verdict = judge_game(film, game)
+        if verdict["avoidable"]:
+            return game, verdict
+        kept = kept or (game, verdict)
+    return kept or (otherwise, dict(NO_VERDICT))
+
+
+def _entry(verdict: Any, team: np.ndarray) -> tuple[str, float, str]:
+    """Outcome for the own side of a breach, how long before it that side could avoid it, s, and who is responsible."""
+    ours = [side for side in (verdict.first, verdict.second) if team[side.own] == 0]
+    best = max(ours, key=lambda side: -1 if side.last_step is None else side.last_step)
+    late = float("nan") if best.last_preventable_s is None else float(best.last_preventable_s)
+    inside = [team[boat] == 0 for boat in verdict.responsible_boats()]
+    name = "own" if all(inside) else "both" if any(inside) else "other"
+    return str(best.outcome), late, name if inside else str(verdict.responsible)
 
 
 def _oracle() -> Any:

@@ -135,7 +135,8 @@ def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
 
 def cell_columns(closest, avoidable):
     zeros = np.zeros(len(closest))
-    names = ("number", "variant", "breaches_teammate", "breaches_opponent")
+    names = ("number", "variant", "breaches_teammate", "breaches_opponent", "responsible", "start_certificate_m")
+    names += ("last_preventable_s",)
     return {"closest_m": np.array(closest), "avoidable": np.array(avoidable)} | dict.fromkeys(names, zeros)
 
 
@@ -155,6 +156,14 @@ def test_bars_of_the_shield(avoidable, unavoidable, not_judged, expected):
     cell = asdict(campaign.Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
     assert [bar["met"] for bar in bars_of([cell])] == expected
     assert bars_of([cell | {"guard": "parabolic"}]) == []
+
+
+@pytest.mark.parametrize(("hits", "met"), [(0, True), (1, False)])
+def test_one_rammer_must_not_breach_what_started_outside(hits, met):
+    counts = {"avoidable": 0, "unavoidable": 0, "not_judged": 1, "encounters": 100, "breaches_outside": hits}
+    cell = asdict(campaign.Cell("shield", "heron", "heron", "rammer_1")) | counts
+    assert bars_of([cell])[1]["met"] is met
+    assert len(bars_of([cell | {"other": "surveyor"}])) == 1
 
 
 def test_a_distribution_ends_at_the_edge_and_never_falls():

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from scipy import stats
 from steerclear.env.record import find_breaches
-from steerclear.experiments.encounters import Conditions, draw, measure, play
+from steerclear.experiments.encounters import Conditions, draw, measure, play, verdicts
 from steerclear.experiments.encounters.measure import chunks, measure_chunk, worst_games
 from steerclear.experiments.encounters.scene_file import read_scene, write_scene
+from steerclear.experiments.encounters.start import start_certificate_m
 from steerclear.experiments.encounters.summary import summarise, upper_bound
 from steerclear.experiments.encounters.tally import deadlocks, tally
-from steerclear.experiments.encounters.verdicts import VERDICT_COLUMNS, judge_game
+from steerclear.experiments.encounters.verdicts import SIDES, VERDICT_COLUMNS, judge_game, judge_worst
 from steerclear.experiments.reversals import count_reversals
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
@@ -93,6 +94,8 @@ def test_an_unguarded_head_on_breach_is_judged_avoidable():
     assert figures["not_judged"] == figures["unavoidable"] == 0
     assert (outcome.columns["last_preventable_s"][outcome.columns["avoidable"] > 0] > 0.0).all()
     assert figures["goal_time_ratio"] == 1.0
+    assert sum(figures["responsible"].values()) == figures["breached"]
+    assert figures["responsible"]["own"] + figures["responsible"]["both"] > 0
     unjudged = measure("head_on", "none", n=6, seed=0, judge=False).summary
     assert (unjudged["avoidable"], unjudged["not_judged"]) == (0, figures["breached"])
 
@@ -102,9 +105,66 @@ def test_a_current_does_not_change_the_verdict():
     fast = Conditions(current_mps=0.5)
     film = play(scenes, "none", fast)
     game = int(tally(film)["closest_m"].argmin())
-    verdict = judge_game(film, game)
-    assert verdict["avoidable"] == 1.0
-    assert set(verdict) == set(VERDICT_COLUMNS)
+    found = judge_game(film, game)
+    assert found["avoidable"] == 1.0
+    assert set(found) == set(VERDICT_COLUMNS)
+    assert SIDES[int(found["responsible"])] in ("own", "both", "other")
+
+
+def verdict(**counts):
+    return verdicts.NO_VERDICT | counts
+
+
+def test_another_variant_counts_when_its_breach_was_avoidable(monkeypatch):
+    film = play(draw("sudden_turn", "heron", "heron", USUAL, 0, 4, 2), "none", USUAL)
+    counted = tally(film) | {"closest_m": np.linspace(2.0, 9.0, 24), "breaches_opponent": np.zeros(24)}
+    counted["breaches_opponent"][[0, 5, 7, 9]] = 1.0
+    asked = []
+
+    def judged(film, game):
+        asked.append(game)
+        return verdict(avoidable=float(game == 7), unavoidable=float(game != 7))
+
+    monkeypatch.setattr(verdicts, "judge_game", judged)
+    games, found = judge_worst(film, counted, np.array([0, 12]))
+    assert (asked, games.tolist()) == ([0, 5, 7], [7, 12])
+    assert [entry["avoidable"] for entry in found] == [1.0, 0.0]
+    monkeypatch.setattr(verdicts, "judge_game", lambda film, game: verdict(unavoidable=1.0))
+    games, found = judge_worst(film, counted, np.array([0, 12]))
+    assert games.tolist() == [0, 12]
+    assert [entry["unavoidable"] for entry in found] == [1.0, 0.0]
+
+
+def test_the_certificate_at_the_start_is_the_one_of_the_first_decision():
+    scenes = draw("rammer_1", "heron", "heron", USUAL, 0, 0, 6)
+    scenes.state[0, 1, [L.X, L.Y]] = scenes.state[0, 0, [L.X, L.Y]] + np.array([2.6, 0.0])
+    scenes = dataclasses.replace(scenes, length_s=0.1)
+    film = play(scenes, "shield", USUAL)
+    found = start_certificate_m(film)
+    np.testing.assert_array_equal(found.astype(np.float32), film.certificate_m[0, :, 0])
+    np.testing.assert_array_equal(found, start_certificate_m(play(scenes, "none", USUAL)))
+    assert found[0] < 0.0
+    assert (found[1:] > 0.0).all()
+
+
+def test_encounters_that_started_outside_are_counted_apart():
+    columns = measure("head_on", "none", n=4, seed=0, judge=False).columns
+    columns["start_certificate_m"] = np.array([-0.1, 0.0, np.inf, np.nan])
+    columns["breaches_opponent"] = np.array([1.0, 2.0, 0.0, 1.0])
+    figures = summarise(columns)
+    assert (figures["started_outside"], figures["breaches_outside"]) == (2, 1)
+    assert figures["breaches_outside_upper"] == upper_bound(1, 2)
+
+
+def test_breaches_that_nobody_judged_may_be_avoidable():
+    columns = measure("head_on", "none", n=4, seed=0, judge=False).columns
+    columns["breaches_opponent"] = np.array([9.0, 1.0, 1.0, 0.0])
+    columns |= {"unavoidable": np.array([5.0, 1, 0, 0]), "started_inside": np.array([0, 0, 1.0, 0])}
+    columns |= {"not_judged": np.array([4.0, 0, 0, 0]), "avoidable": np.zeros(4)}
+    figures = summarise(columns)
+    names = ("avoidable", "unavoidable", "started_inside", "not_judged")
+    assert [figures[name] for name in names] == [0, 1, 1, 1]
+    assert figures["avoidable_upper"] == upper_bound(1, 4)
 
 
 @pytest.mark.parametrize(("events", "trials"), [(0, 1000), (3, 50), (7, 7)])
