@@ -17,7 +17,8 @@ from .grid import Grid
 from .moves import moves_of, sub_steps
 
 FAR_M = 30.0
-"""Tables that go farther than this get finer bearings and nearer nodes at short range."""
+"""Tables that go farther than this get fewer ranges, the nearest of them closer together."""
+SPEED_NODES = 5
 RUDDERS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Rudders both boats choose among, shares of full."""
 
@@ -93,7 +94,7 @@ def problem_of(
     """The problem of a pair with a grid fitted to its boats.
 
     A step is about as long as a turn of 24 deg takes (between unlike boats, the geometric mean); headings are
-    spaced by whole parts of the full turns of a step and bearings by whole parts of that, so that common moves
+    spaced by whole parts of the full turns of a step and bearings by half of that, so that common moves
     land on nodes and cause no blur; ranges go as far as the boats close in a half turn of the slower turner.
 
     Args:
@@ -115,11 +116,11 @@ def problem_of(
     far = rho_last_m > FAR_M
     grid = Grid(
         rho_last_m=round(rho_last_m, 1),
-        n_rho=56 if far else 64,
+        n_rho=48 if far else 64,
         n_psi=round(360.0 / spacing_deg),
-        n_beta=1 + round((3 if far else 2) * 180.0 / spacing_deg),
-        n_own=_speed_nodes(boats[0]),
-        n_other=_speed_nodes(boats[1]),
+        n_beta=1 + round(360.0 / spacing_deg),
+        n_own=SPEED_NODES,
+        n_other=SPEED_NODES,
         own_top_mps=boats[0].max_speed_mps,
         other_top_mps=boats[1].max_speed_mps,
         rho_ratio=8.0 if far else 5.0,
@@ -147,11 +148,6 @@ def _full_turn_deg(boat: Platform, dt_s: float) -> float:
 def _fitted_horizon(half_turn_s: float) -> float:
     """Long enough for several half turns and the return to top speed, 20 to 60 s."""
     return min(max(20.0, 7.0 * half_turn_s), 60.0)
-
-
-def _speed_nodes(boat: Platform) -> int:
-    """More nodes for boats that gain speed slowly: for those the speed is worth more."""
-    return 7 if 0.0 < boat.max_acc < boat.max_speed_mps / 4.0 else 5
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ..exceptions import TableError
 from ..jit import BoolArray
+from .active import widen
 from .moves import Moves, moves_of
 from .settings import RUDDERS, OtherMay, Problem, places
-from .sweep import sweep, widen
+from .sweep import sweep
 
 TOLERANCE_M = 5e-4
 """Smaller changes of a value within one step are left out."""
@@ -37,7 +38,7 @@ class Progress:
     Attributes:
         values: flat values, m, float32.
         hints: best rudders of each cell (own * 8 + other), uint8.
-        active: rows (range, relative heading) that may still change.
+        active: places (range, relative heading, bearing) that may still change.
         iterations: steps done.
         residual_m: largest change of the last step, m.
     """
@@ -54,7 +55,7 @@ def start(problem: Problem) -> Progress:
     grid = problem.grid
     ranges = np.minimum(grid.ranges_m(), grid.cap_m).astype(np.float32)
     values = np.repeat(ranges, grid.size // grid.n_rho)
-    active = np.ones((grid.n_rho, grid.n_psi), bool)
+    active = np.ones((grid.n_rho, grid.n_psi, grid.n_beta), bool)
     return Progress(values, np.full(grid.size, 2 * 8 + 2, np.uint8), active)
 
 
@@ -73,8 +74,8 @@ def solve(
     """Solve the game by value iteration.
 
     V starts at min(range, cap) and is lowered to max over own rudders, min over the other's (max over both when
-    it cooperates), of min(closest distance in the step, V after it), until nothing changes or the horizon is
-    reached. The result does not depend on the number of threads.
+    it cooperates), of min(closest distance in the step, V after it), until nothing changes or as many iterations
+    are done as the horizon has steps. The result does not depend on the number of threads.
 
     Args:
         problem: boats, mode, grid, step and horizon.
@@ -117,19 +118,23 @@ class _Solver:
         self.moves = (own.place_m, own.turn_rad, own_speed, other.place_m, other.turn_rad, other_speed)
         self.cooperative = problem.other_may is OtherMay.COOPERATIVE
         self.reach_m = _reach(own) + _reach(other)
-        turn = float(np.abs(own.turn_rad).max() + np.abs(other.turn_rad).max())
-        self.psi_cells = min(int(np.ceil(turn / grid.psi_step_rad - 1e-6)), grid.n_psi // 2)
-        self.n_rho = grid.n_rho
+        own_turn = float(np.abs(own.turn_rad).max())
+        self.turns_rad = (own_turn, own_turn + float(np.abs(other.turn_rad).max()))
+        self.row_size = grid.size // grid.n_rho
 
     def step(self, state: Progress, pool: ThreadPoolExecutor, threads: int) -> None:
-        """One value iteration; the state changes only when it is complete."""
-        values, changed = state.values.copy(), np.zeros_like(state.active)
-        pieces = _pieces(state.active, 8 * threads)
+        """One value iteration, from near ranges to far ones; the state changes only when it is complete.
 
-        def piece(bounds: tuple[int, int]) -> float:
+        Each range reads what this iteration made of the nearer ones: breaches come from there, so that one
+        iteration carries them many table steps back.
+        """
+        values, out, changed = state.values.copy(), state.values.copy(), np.zeros_like(state.active)
+        residual = 0.0
+
+        def piece(row: int, first: int, last: int) -> float:
             return sweep(
-                state.values,
                 values,
+                out,
                 state.hints,
                 state.active,
                 changed,
@@ -138,26 +143,23 @@ class _Solver:
                 self.cooperative,
                 self.reach_m,
                 TOLERANCE_M,
-                *bounds,
+                row,
+                first,
+                last,
             )
 
-        residual = max(pool.map(piece, pieces))
-        active = np.zeros_like(state.active)
-        widen(changed, active, self.axes, self.reach_m, self.psi_cells)
+        edges = np.linspace(0, state.active.shape[1], 3 * threads + 1).astype(int)
+        for row in np.flatnonzero(state.active.any(axis=(1, 2))):
+            residual = max(residual, *pool.map(partial(piece, int(row)), edges[:-1], edges[1:]))
+            here = slice(row * self.row_size, (row + 1) * self.row_size)
+            values[here] = out[here]
+        active = widen(changed, self.axes, self.reach_m, *self.turns_rad)
         state.values, state.active, state.residual_m = values, active, residual
         state.iterations += 1
 
 
 def _reach(moves: Moves) -> float:
     return float(np.linalg.norm(moves.place_m, axis=-1).max())
-
-
-def _pieces(active: BoolArray, count: int) -> list[tuple[int, int]]:
-    """Cut the ranges into pieces of about equal work."""
-    work = np.cumsum(active.sum(axis=1) + 0.01)
-    cuts = np.searchsorted(work, np.linspace(0.0, work[-1], count + 1)[1:-1])
-    edges = np.unique(np.concatenate([[0], cuts, [len(work)]]))
-    return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def _keep(problem: Problem, state: Progress, path: Path) -> None:

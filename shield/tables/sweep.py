@@ -1,4 +1,4 @@
-"""One step of value iteration on a grid, compiled."""
+"""Value iteration of one range of a grid, compiled."""
 
 from __future__ import annotations
 
@@ -192,17 +192,18 @@ def sweep(
     cooperative: bool,
     reach_m: float,
     tolerance_m: float,
+    row: int,
     first: int,
     last: int,
 ) -> float:
-    """One value iteration over ranges ``first`` to ``last`` (exclusive): reads ``values``, lowers ``out``.
+    """Value iteration of one range and headings ``first`` to ``last`` (exclusive): reads ``values``, lowers ``out``.
 
     Args:
         values: flat values over the grid, m.
         out: a copy of them, lowered in place.
-        hints: best rudders of each cell, kept between sweeps.
-        active: rows (range, relative heading) that may change; others are skipped.
-        changed: set to True for the rows that did change.
+        hints: best rudders of each cell, kept from one iteration to the next.
+        active: places (range, relative heading, bearing) that may change; others are skipped.
+        changed: set to True for the places that did change.
         axes: description of the grid.
         own_place: own `Moves.place_m`.
         own_turn: own `Moves.turn_rad`.
@@ -213,8 +214,9 @@ def sweep(
         cooperative: whether the other boat helps.
         reach_m: how far the two boats together can move in one step, m.
         tolerance_m: smaller changes are left out, m.
-        first: first range index.
-        last: range index after the last.
+        row: range index.
+        first: first index of relative heading.
+        last: the one after the last.
 
     Returns:
         The largest change, m.
@@ -222,67 +224,38 @@ def sweep(
     n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
     n_own, n_other = int(axes[N_OWN]), int(axes[N_OTHER])
     largest = 0.0
-    for i in range(first, last):
-        rho = rho_node(axes, i)
-        for j in range(n_psi):
-            changed[i, j] = False
-            if not active[i, j]:
+    rho = rho_node(axes, row)
+    for j in range(first, last):
+        psi = j * TWO_PI / n_psi
+        for k in range(n_beta):
+            if not active[row, j, k]:
                 continue
-            psi = j * TWO_PI / n_psi
-            for k in range(n_beta):
-                beta = k * math.pi / (n_beta - 1)
-                x, y = rho * math.sin(beta), rho * math.cos(beta)
-                at = ((i * n_psi + j) * n_beta + k) * n_own * n_other
-                for a in range(n_own):
-                    for b in range(n_other):
-                        old = values[at]
-                        new, hints[at] = cell_value(
-                            values,
-                            axes,
-                            x,
-                            y,
-                            psi,
-                            reach_m,
-                            own_place[a],
-                            own_turn[a],
-                            own_speed[a],
-                            other_place[b],
-                            other_turn[b],
-                            other_speed[b],
-                            cooperative,
-                            old,
-                            hints[at],
-                        )
-                        if new < old - tolerance_m:
-                            out[at] = new
-                            changed[i, j] = True
-                            largest = max(largest, old - new)
-                        else:
-                            out[at] = old
-                        at += 1
+            beta = k * math.pi / (n_beta - 1)
+            x, y = rho * math.sin(beta), rho * math.cos(beta)
+            at = ((row * n_psi + j) * n_beta + k) * n_own * n_other
+            for a in range(n_own):
+                for b in range(n_other):
+                    old = values[at]
+                    new, hints[at] = cell_value(
+                        values,
+                        axes,
+                        x,
+                        y,
+                        psi,
+                        reach_m,
+                        own_place[a],
+                        own_turn[a],
+                        own_speed[a],
+                        other_place[b],
+                        other_turn[b],
+                        other_speed[b],
+                        cooperative,
+                        old,
+                        hints[at],
+                    )
+                    if new < old - tolerance_m:
+                        out[at] = new
+                        changed[row, j, k] = True
+                        largest = max(largest, old - new)
+                    at += 1
     return largest
-
-
-@kernel
-def widen(changed: BoolArray, active: BoolArray, axes: Array, reach_m: float, psi_cells: int) -> int:
-    """Mark the rows from which a changed row (or its mirror image) can be reached in one step; returns their number."""
-    n_rho, n_psi = changed.shape
-    count = 0
-    low = 0
-    for i in range(n_rho):
-        rho = rho_node(axes, i)
-        while low < i and rho_node(axes, low + 1) < rho - reach_m:
-            low += 1
-        high = i
-        while high < n_rho - 1 and rho_node(axes, high) < rho + reach_m:
-            high += 1
-        for j in range(n_psi):
-            active[i, j] = False
-            for m in range(low, high + 1):
-                for d in range(-psi_cells, psi_cells + 1):
-                    p = (j + d) % n_psi
-                    if changed[m, p] or changed[m, (-p) % n_psi]:
-                        active[i, j] = True
-            if active[i, j]:
-                count += 1
-    return count
