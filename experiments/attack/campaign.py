@@ -11,7 +11,7 @@ from rich.console import Group
 
 from ..encounters.guards import NONE
 from ..encounters.play import play
-from ..encounters.replays import record_of
+from ..encounters.replays import records_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import scenes_of
 from ..pool import run_all
@@ -85,9 +85,8 @@ def _write_replay(folder: Path, guard: str, found: Sequence[dict[str, Any]]) -> 
     for entry in order:
         scenes, conditions = scenes_of(entry["scene"] or entry["closest_scene"])
         words = "avoidable breach" if entry["scene"] else f"closest {entry['closest_m']:.2f} m"
-        for name in dict.fromkeys((guard, NONE)):
-            title = f"search {entry['restart']}, {words}, {name}"
-            records.append(record_of(play(scenes, name, conditions), 0, title, name != NONE))
+        films = [(play(scenes, name, conditions), name) for name in dict.fromkeys((guard, NONE))]
+        records += records_of(films, 0, f"search {entry['restart']}, {words}")
     return write_replay(records, folder / "replay.html", title="Attacks")
 
 

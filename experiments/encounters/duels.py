@@ -76,7 +76,7 @@ def corner(cast: Cast) -> None:
     cast.add_own(*start, bearing(start, place), cast.uniform(0.5, 1.0), place, (0.4 * width, 0.4 * height))
     share, offset = cast.uniform(0.6, 1.0), cast.radius_m
     aim = (place[0] + cast.uniform(-offset, offset), place[1] + cast.uniform(-offset, offset))
-    arrives_s = math.dist(start, place) / cast.top(cast.own) + cast.uniform(-1.0, 5.0) * cast.scale
+    arrives_s = math.dist(start, place) / cast.top(cast.own) + cast.uniform(-1.0, 4.0)
     way_m = max(cast.nearest_m, arrives_s * share * cast.top(cast.other))
     begin, tries = ahead(*aim, cast.uniform(180.0, 270.0), way_m), 0
     while not (cast.is_clear(*begin, cast.nearest_m) and begin[0] > 1.0 and begin[1] > 1.0) and tries < MOST_TRIES:

@@ -1,9 +1,8 @@
-"""Games of a film as records, and the worst encounters of a run played again for a replay."""
+"""Games of a film as records, which replays, films and pictures are made of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,25 +10,31 @@ from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_recor
 from steerclear.shield.decision import Reason
 from steerclear.shield.platforms import layout as L
 
-from ..replay_html import write_replay
-from .campaign import Cell
-from .families import draw
-from .guards import NONE, SHIELD
-from .play import Film, play
-from .scenes import DT_S, Conditions
-from .tally import Columns
-from .verdicts import SIDES
+from .guards import NONE
+from .play import Film
+from .scenes import DT_S
 
-MOST_WORST = 10
 EDGE_M = 5.0
 """Water around open-water encounters, m."""
-FAR_M = 1e4
-"""A certificate beyond this, m, says that nobody is near."""
 SHAPE = 1.6
 """Width over height of its picture."""
+Water = tuple[tuple[float, float], tuple[float, float]]
+"""Lower left corner and size of what a replay shows, m."""
 
 
-def record_of(film: Film, game: int, title: str, guarded: bool) -> Record:
+def records_of(films: Sequence[tuple[Film, str]], game: int, name: str) -> list[Record]:
+    """One game, played with different guards, as records that show the same water.
+
+    Args:
+        films: what was played, and the name of the guard.
+        game: which of the games.
+        name: of the encounter.
+    """
+    water = _water_of(films[0][0], [film.state[:, game, :, :2] for film, _ in films])
+    return [record_of(film, game, f"{name}, {guard}", guard != NONE, water) for film, guard in films]
+
+
+def record_of(film: Film, game: int, title: str, guarded: bool, water: Water | None = None) -> Record:
     """One game of a film as the record that replays, films and pictures are made of.
 
     Args:
@@ -37,10 +42,12 @@ def record_of(film: Film, game: int, title: str, guarded: bool) -> Record:
         game: which of its games.
         title: shown as the game's name.
         guarded: whether its commands passed a guard.
+        water: what the picture shows; around what happens when left out.
     """
     scenes, steps = film.scenes, film.scenes.steps
     state = film.state[:, game]
-    position, bounds = _placed(film, state[:, :, :2])
+    corner, bounds = water or _water_of(film, [state[:, :, :2]])
+    position = state[:, :, :2] - np.array(corner)
     heading = state[:, :, L.HEADING]
     n = len(scenes.team)
     own = np.broadcast_to(scenes.own & guarded, (steps, n))
@@ -71,15 +78,17 @@ def _own_breaches(position: np.ndarray, own: np.ndarray, radius_m: float) -> np.
     return found[own[pairs].any(axis=1)]
 
 
-def _placed(film: Film, position: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
-    """Positions within (0, 0) .. bounds: open water gets edges around what happens, wider than high."""
+def _water_of(film: Film, positions: Sequence[np.ndarray]) -> Water:
+    """The field; in open water what is around all positions (T+1, n, 2), wider than high."""
     field = film.scenes.field
     if field is not None:
-        return position - np.array(field[:2]), (field[2] - field[0], field[3] - field[1])
-    low, high = position.min(axis=(0, 1)) - EDGE_M, position.max(axis=(0, 1)) + EDGE_M
+        return (field[0], field[1]), (field[2] - field[0], field[3] - field[1])
+    low = np.min([places.min(axis=(0, 1)) for places in positions], axis=0) - EDGE_M
+    high = np.max([places.max(axis=(0, 1)) for places in positions], axis=0) + EDGE_M
     size, middle = high - low, 0.5 * (low + high)
     size = np.maximum(size, [SHAPE * size[1], size[0] / SHAPE])
-    return position - middle + 0.5 * size, (float(size[0]), float(size[1]))
+    corner = middle - 0.5 * size
+    return (float(corner[0]), float(corner[1])), (float(size[0]), float(size[1]))
 
 
 def _absolute(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
@@ -110,55 +119,3 @@ def _meta(film: Film, bounds: tuple[float, float], title: str, guarded: bool) ->
         "platforms": list(scenes.platforms),
         "title": title,
     }
-
-
-def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) -> list[dict[str, Any]]:
-    """The worst encounters of all cells with a shield: avoidable breaches first, then the closest.
-
-    Without such a cell, those with another guard, or with none.
-    """
-    shields = [cell for cell in columns if cell.guard.partition(":")[0] == SHIELD]
-    cells = shields or [cell for cell in columns if cell.guard != NONE] or list(columns)
-    found = []
-    for cell in cells:
-        values = columns[cell]
-        order = np.lexsort((values["closest_m"], -values["avoidable"]))[:most]
-        found += [
-            {
-                "guard": cell.guard,
-                "own": cell.own,
-                "other": cell.other,
-                "family": cell.family,
-                "number": int(values["number"][k]),
-                "variant": int(values["variant"][k]),
-                "closest_m": float(values["closest_m"][k]),
-                "breaches": int(values["breaches_teammate"][k] + values["breaches_opponent"][k]),
-                "avoidable": int(values["avoidable"][k]),
-                "last_preventable_s": _finite(values["last_preventable_s"][k]),
-                "responsible": None if np.isnan(values["responsible"][k]) else SIDES[int(values["responsible"][k])],
-                "start_certificate_m": _finite(values["start_certificate_m"][k]),
-            }
-            for k in order
-        ]
-    return sorted(found, key=lambda entry: (-entry["avoidable"], entry["closest_m"]))[:most]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if abs(value) < FAR_M else None
-
-
-def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:
-    """Play encounters again, with their guard and without, into one replay."""
-    records = []
-    for entry in worst:
-        scenes = draw(entry["family"], entry["own"], entry["other"], conditions, seed, entry["number"], 1)
-        scenes = scenes.take([entry["variant"]])
-        name = f"{entry['family']} {entry['number']}, {entry['own']} and {entry['other']}"
-        records.append(_record(scenes, entry["guard"], conditions, name))
-        if entry["guard"] != NONE:
-            records.append(_record(scenes, NONE, conditions, name))
-    return write_replay(records, path, title="The worst encounters")
-
-
-def _record(scenes: Any, guard: str, conditions: Conditions, name: str) -> Record:
-    return record_of(play(scenes, guard, conditions), 0, f"{name}, {guard}", guard != NONE)

@@ -15,8 +15,8 @@ from ..tables import number_text, titled
 from .campaign import Campaign, cell_summaries
 from .families import FAMILIES
 from .guards import SHIELD
-from .replays import replay_worst, worst_encounters
 from .report import write_encounter_report
+from .worst import replay_worst, worst_encounters
 
 ONE_RAMMER = "rammer_1"
 UNAVOIDABLE_PERCENT = 1.0
@@ -77,7 +77,7 @@ def _total(cells: Sequence[Mapping[str, Any]], name: str) -> float:
 
 
 def _bar(name: str, value: float, limit: float, judged: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """A bar; ``judged`` are the cells whose verdicts it hangs on."""
+    """A bar; ``judged`` are the cells whose verdicts it hangs on: what was not judged leaves it without data."""
     met: bool | None = value <= limit
     if met and any(cell["not_judged"] for cell in judged):
         met = None

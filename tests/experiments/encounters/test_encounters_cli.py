@@ -10,9 +10,10 @@ from steerclear.experiments import cli, keys
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, campaign, draw, play
 from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
-from steerclear.experiments.encounters.replays import record_of, worst_encounters
+from steerclear.experiments.encounters.replays import record_of, records_of
 from steerclear.experiments.encounters.results import bars_of
 from steerclear.experiments.encounters.scene_file import write_scene
+from steerclear.experiments.encounters.worst import worst_encounters
 from typer.testing import CliRunner
 
 USUAL = Conditions()
@@ -131,6 +132,19 @@ def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
     shift = record["position"] - film.state[:, 1, :, :2]
     np.testing.assert_allclose(shift, np.broadcast_to(shift[0, 0], shift.shape), atol=1e-9)
     assert (record["breaches"][:, 1] == 0).all()
+
+
+def test_the_same_encounter_with_and_without_a_guard_shows_the_same_water():
+    scenes = draw("rammer_1", "heron", "heron", USUAL, 0, 0, 2)
+    near, far = (play(scenes.take([k]), "none", USUAL) for k in (0, 1))
+    far.state[:, :, :, 0] += 100.0
+    first, second = records_of([(near, "none"), (far, "parabolic")], 0, "a name")
+    assert read_meta(first)["env_bounds_m"] == read_meta(second)["env_bounds_m"]
+    assert [read_meta(record)["title"] for record in (first, second)] == ["a name, none", "a name, parabolic"]
+    shifts = [record["position"] - film.state[:, 0, :, :2] for record, film in ((first, near), (second, far))]
+    np.testing.assert_allclose(shifts[0], shifts[1])
+    assert min(record["position"].min() for record in (first, second)) > 0.0
+    assert [read_meta(record)["shielded"] for record in (first, second)] == [[], ["agent_0"]]
 
 
 def cell_columns(closest, avoidable):
