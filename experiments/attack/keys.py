@@ -8,7 +8,7 @@ ATTACK = {
     "searches[].history[]": "the least distance after each generation, m",
     "searches[].tried": "opponents played",
     "searches[].breached": "of those, how many got within the radius",
-    "searches[].judged[].*": "breaches the oracle judged: closest distance, entries, verdicts",
+    "searches[].judged[].*": "breaches the oracle judged: distance, entries, certificate at the start, verdicts",
     "searches[].scene": "file with the avoidable breach found; null without one",
     "failed[].*": "search that could not be run, and why",
     "found": "searches that found an avoidable breach",

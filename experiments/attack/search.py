@@ -21,13 +21,20 @@ from ..encounters.guards import check_guard
 from ..encounters.play import Film, play
 from ..encounters.scene_file import scene_content
 from ..encounters.scenes import Conditions
+from ..encounters.start import start_certificate_m
 from ..encounters.tally import Columns, tally
-from ..encounters.verdicts import judge_game
+from ..encounters.verdicts import judge_game, side_name
 from ..store import key_of
 from .opponents import Duel
 
-MOST_JUDGED = 6
-"""Breaches judged in one search: it ends with the first avoidable one."""
+MOST_JUDGED = 3
+"""Breaches judged in one generation: a search ends with the first avoidable one."""
+NO_SUCCESS_M = 1.0
+"""Merit beyond the radius, m, of an opponent whose breach nobody could have avoided: the search turns elsewhere."""
+HINT = 0.5
+"""Weight of the least certificate a guard had: it tells opponents apart that were all kept at the same distance."""
+MOST_HINT_M = 4.0
+"""Certificates count up to this size, m."""
 
 
 @dataclass(frozen=True)
@@ -89,32 +96,40 @@ class _Hunt:
         self.judged: list[dict[str, Any]] = []
         self.avoidable: dict[str, Any] | None = None
 
-    def closest(self, points: Array) -> Array:
-        """Closest distances, m, of a generation (genes, S): what is minimised."""
+    def merits(self, points: Array) -> Array:
+        """What is minimised, of a generation (genes, S): closest distance, m, and a share of the least certificate."""
         scenes = self.duel.scenes(points.T)
         film = play(scenes, self.search.guard, self.search.conditions)
         columns = tally(film)
-        closest = np.minimum(columns["closest_m"], columns["closest_opponent_m"])
+        closest = columns["closest_m"]
         best = int(closest.argmin())
         if closest[best] < self.best_m:
             self.best_m, self.point = float(closest[best]), points.T[best].copy()
         self.history.append(self.best_m)
         self.tried += scenes.games
-        self._judge(film, columns, closest)
-        return closest
+        hint = np.nan_to_num(film.certificate_m[:, :, scenes.own].min(axis=(0, 2)), nan=MOST_HINT_M)
+        merits = closest + HINT * np.clip(hint, -MOST_HINT_M, MOST_HINT_M)
+        merits[self._judge(film, columns)] = self.search.conditions.radius_m + NO_SUCCESS_M + HINT * MOST_HINT_M
+        return np.asarray(merits)
 
-    def _judge(self, film: Film, columns: Columns, closest: Array) -> None:
-        hits = columns["breaches_teammate"] + columns["breaches_opponent"]
+    def _judge(self, film: Film, columns: Columns) -> list[int]:
+        """Judge the worst of a generation until one is avoidable; the games in which none was."""
+        hits, vain = columns["breaches_teammate"] + columns["breaches_opponent"], []
         self.breached += int((hits > 0).sum())
-        for game in np.argsort(closest):
-            if hits[game] == 0 or len(self.judged) >= MOST_JUDGED or self.avoidable is not None:
-                return
+        for game in np.argsort(columns["closest_m"])[:MOST_JUDGED]:
+            if hits[game] == 0 or self.avoidable is not None:
+                break
             found = judge_game(film, int(game))
-            entry = {"closest_m": float(closest[game]), "breaches": int(hits[game]), **found}
+            start_m = float(start_certificate_m(film)[game])
+            entry = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game])}
+            entry |= found | {"start_certificate_m": start_m, "responsible": side_name(found["responsible"])}
             self.judged.append(entry)
             if found["avoidable"]:
-                scene = scene_content(film.scenes.take([int(game)]), film.conditions, guard=self.search.guard, **entry)
-                self.avoidable = scene
+                scene = film.scenes.take([int(game)])
+                self.avoidable = scene_content(scene, film.conditions, guard=self.search.guard, **entry)
+            else:
+                vain.append(int(game))
+        return vain
 
 
 def run_search(search: Search) -> dict[str, Any]:
@@ -129,7 +144,7 @@ def run_search(search: Search) -> dict[str, Any]:
     random = np.random.default_rng([search.seed, search.restart, 7])
     start = qmc.LatinHypercube(hunt.duel.genes, rng=random).random(search.population)
     differential_evolution(
-        hunt.closest,
+        hunt.merits,
         [(0.0, 1.0)] * hunt.duel.genes,
         strategy="rand1bin",
         init=start,

@@ -50,6 +50,11 @@ def judge_game(film: Film, game: int) -> dict[str, float]:
     return counts
 
 
+def side_name(responsible: float) -> str | None:
+    """Name of a side, given the number in the column ``responsible``; None without a verdict."""
+    return None if np.isnan(responsible) else SIDES[int(responsible)]
+
+
 def judge_worst(film: Film, counted: Columns, worst: np.ndarray) -> tuple[np.ndarray, list[dict[str, float]]]:
     """Judge encounters: the variant that came closest, or another breached one that is avoidable.
 

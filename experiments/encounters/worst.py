@@ -16,7 +16,7 @@ from .play import play
 from .replays import records_of
 from .scenes import Conditions
 from .tally import Columns
-from .verdicts import SIDES
+from .verdicts import side_name
 
 MOST_WORST = 10
 FAR_M = 1e4
@@ -46,7 +46,7 @@ def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) ->
                 "breaches": int(values["breaches_teammate"][k] + values["breaches_opponent"][k]),
                 "avoidable": int(values["avoidable"][k]),
                 "last_preventable_s": _finite(values["last_preventable_s"][k]),
-                "responsible": None if np.isnan(values["responsible"][k]) else SIDES[int(values["responsible"][k])],
+                "responsible": side_name(values["responsible"][k]),
                 "start_certificate_m": _finite(values["start_certificate_m"][k]),
             }
             for k in order

@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 from steerclear.experiments import cli, keys
 from steerclear.experiments.attack.opponents import N_GENES, Duel
-from steerclear.experiments.attack.search import Search, run_search
+from steerclear.experiments.attack.search import Search, _Hunt, run_search
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, play
 from steerclear.experiments.encounters.measure import measure_chunk
 from steerclear.experiments.encounters.scene_file import read_scene, scenes_of
+from steerclear.experiments.encounters.tally import tally
+from steerclear.experiments.encounters.verdicts import NO_VERDICT, SIDES
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
@@ -43,6 +45,8 @@ def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_a
     answer = run_search(search)
     assert answer["breached"] > 0
     assert answer["judged"][-1]["avoidable"] > 0
+    assert answer["judged"][-1]["start_certificate_m"] > 0.0
+    assert answer["judged"][-1]["responsible"] in SIDES
     scenes, conditions = scenes_of(json.loads(json.dumps(answer["scene"])))
     columns = measure_chunk(scenes, "none", conditions, judge=False)
     assert columns["closest_m"][0] == answer["judged"][-1]["closest_m"]
@@ -50,11 +54,32 @@ def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_a
 
 
 def test_a_search_goes_on_while_nothing_is_found(monkeypatch):
-    monkeypatch.setattr("steerclear.experiments.attack.search.judge_game", lambda film, game: {"avoidable": 0.0})
+    monkeypatch.setattr("steerclear.experiments.attack.search.judge_game", lambda film, game: NO_VERDICT)
     answer = run_search(Search(guard="none", population=8, generations=3))
     assert (answer["tried"], len(answer["history"]), answer["scene"]) == (24, 3, None)
-    assert len(answer["judged"]) == 6
+    assert 3 < len(answer["judged"]) <= 9  # at most three a generation
     assert answer["history"] == sorted(answer["history"], reverse=True)
+
+
+def test_an_opponent_whose_breach_nobody_could_avoid_is_no_success(monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.attack.search.judge_game", lambda film, game: NO_VERDICT)
+    hunt = _Hunt(Search(guard="none"))
+    merits = hunt.merits(np.random.default_rng(0).random((hunt.duel.genes, 20)))
+    closest = np.sort([entry["closest_m"] for entry in hunt.judged])
+    assert len(closest) == 3
+    assert closest[-1] < 2.5
+    assert (np.sort(merits)[-3:] >= 2.5 + 1.0).all()
+    assert merits.min() - 2.0 > closest[-1]  # without a guard the hint is the same 2 m for all
+
+
+def test_of_opponents_kept_at_the_same_distance_the_one_that_cost_more_certificate_is_better():
+    hunt = _Hunt(Search(guard="shield"))
+    points = np.random.default_rng(1).random((hunt.duel.genes, 4))
+    film = play(hunt.duel.scenes(points.T), "shield", Conditions())
+    assert film.certificate_m[:, :, 0].min() < 4.0
+    hints = np.clip(film.certificate_m[:, :, 0].min(axis=0), -4.0, 4.0)
+    held = tally(film)["closest_m"] > 2.5
+    np.testing.assert_allclose(hunt.merits(points)[held], (tally(film)["closest_m"] + 0.5 * hints)[held])
 
 
 def test_an_attack_from_end_to_end_and_its_replay():
