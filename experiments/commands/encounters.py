@@ -63,7 +63,7 @@ def encounters(
 ) -> None:
     """Let boats meet in every way there is; count breaches, judge them, write table, report and replays.
 
-    Exit status: 0 done, 1 an avoidable breach with the shield on, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 1 a shield did not keep a bar of no breaches, 2 bad input, 130 interrupted.
     """
     guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_guards(text)))
     if scene:

@@ -16,7 +16,7 @@ CELL_KEYS = {
     "unavoidable": "encounters with breaches of which none was avoidable",
     "started_inside": "encounters whose breaches were under way at the start",
     "not_judged": "encounters with breaches that the oracle was not asked about, and no avoidable one",
-    "responsible.*": "encounters by whose command let the last chance pass: own, other, both, neither, start",
+    "responsible.*": "encounters by whose command let the last chance pass: own, opponent, both, neither, start",
     "started_outside": "encounters in which the shield's certificate at the first decision was at least 0",
     "breaches_outside": "of those, how many were breached",
     "breaches_outside_upper": "95 % upper limit of the probability of that",

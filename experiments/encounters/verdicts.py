@@ -21,7 +21,7 @@ MOST_VARIANTS = 3
 """Breached variants of one encounter that are judged while none of them is avoidable."""
 COUNTS = ("avoidable", "unavoidable", "started_inside", "not_judged")
 VERDICT_COLUMNS = (*COUNTS, "last_preventable_s", "responsible")
-SIDES = ("own", "other", "both", "neither", "start")
+SIDES = ("own", "opponent", "both", "neither", "start")
 """Whose command let the last chance pass; the column ``responsible`` holds the index, NaN without a verdict."""
 NO_VERDICT: dict[str, float] = dict.fromkeys(COUNTS, 0.0) | {"last_preventable_s": np.nan, "responsible": np.nan}
 
@@ -93,7 +93,7 @@ def _entry(verdict: Any, team: np.ndarray) -> tuple[str, float, str]:
     best = max(ours, key=lambda side: -1 if side.last_step is None else side.last_step)
     late = float("nan") if best.last_preventable_s is None else float(best.last_preventable_s)
     inside = [team[boat] == 0 for boat in verdict.responsible_boats()]
-    name = "own" if all(inside) else "both" if any(inside) else "other"
+    name = "own" if all(inside) else "both" if any(inside) else "opponent"
     return str(best.outcome), late, name if inside else str(verdict.responsible)
 
 

@@ -108,7 +108,7 @@ def test_a_current_does_not_change_the_verdict():
     found = judge_game(film, game)
     assert found["avoidable"] == 1.0
     assert set(found) == set(VERDICT_COLUMNS)
-    assert SIDES[int(found["responsible"])] in ("own", "both", "other")
+    assert SIDES[int(found["responsible"])] in ("own", "both", "opponent")
 
 
 def verdict(**counts):
