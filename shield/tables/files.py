@@ -119,7 +119,7 @@ def read_table(path: Path) -> ValueTable:
         TableError: the file is missing, cut short, altered or of another format.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             text, steps = str(file["card"]), file["steps"]
     except FileNotFoundError as error:
         raise TableError(f"there is no table file {path}") from error

@@ -18,7 +18,11 @@ from .moves import moves_of, sub_steps
 
 FAR_M = 30.0
 """Tables that go farther than this get fewer ranges, the nearest of them closer together."""
+LONGEST_S = 30.0
+"""Longest play that is fitted: over longer ones a faster boat catches the most agile one from anywhere (the
+homicidal chauffeur), and a table that says so is of no use."""
 SPEED_NODES = 5
+"""Nodes along each axis of speed."""
 RUDDERS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Rudders both boats choose among, shares of full."""
 
@@ -146,8 +150,8 @@ def _full_turn_deg(boat: Platform, dt_s: float) -> float:
 
 
 def _fitted_horizon(half_turn_s: float) -> float:
-    """Long enough for several half turns and the return to top speed, 20 to 60 s."""
-    return min(max(20.0, 7.0 * half_turn_s), 60.0)
+    """Several half turns and the return to top speed, at most `LONGEST_S`."""
+    return min(max(20.0, 7.0 * half_turn_s), LONGEST_S)
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:

@@ -8,7 +8,6 @@ import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -74,8 +73,8 @@ def solve(
     """Solve the game by value iteration.
 
     V starts at min(range, cap) and is lowered to max over own rudders, min over the other's (max over both when
-    it cooperates), of min(closest distance in the step, V after it), until nothing changes or as many iterations
-    are done as the horizon has steps. The result does not depend on the number of threads.
+    it cooperates), of min(closest distance in the step, V after it), until nothing changes or the horizon is
+    reached. The result does not depend on the number of threads.
 
     Args:
         problem: boats, mode, grid, step and horizon.
@@ -89,11 +88,10 @@ def solve(
     """
     solver = _Solver(problem)
     state = _resume(problem, checkpoint) or start(problem)
-    count = threads or os.cpu_count() or 1
-    with ThreadPoolExecutor(count) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         try:
             while state.iterations < steps_of(problem) and state.residual_m > CONVERGED_M:
-                solver.step(state, pool, count)
+                solver.step(state, pool)
                 if notice is not None:
                     notice(state.iterations, steps_of(problem), state.residual_m)
                 if checkpoint is not None and state.iterations % SAVE_EVERY == 0:
@@ -120,21 +118,15 @@ class _Solver:
         self.reach_m = _reach(own) + _reach(other)
         own_turn = float(np.abs(own.turn_rad).max())
         self.turns_rad = (own_turn, own_turn + float(np.abs(other.turn_rad).max()))
-        self.row_size = grid.size // grid.n_rho
 
-    def step(self, state: Progress, pool: ThreadPoolExecutor, threads: int) -> None:
-        """One value iteration, from near ranges to far ones; the state changes only when it is complete.
+    def step(self, state: Progress, pool: ThreadPoolExecutor) -> None:
+        """One value iteration; the state changes only when it is complete."""
+        values, changed = state.values.copy(), np.zeros_like(state.active)
 
-        Each range reads what this iteration made of the nearer ones: breaches come from there, so that one
-        iteration carries them many table steps back.
-        """
-        values, out, changed = state.values.copy(), state.values.copy(), np.zeros_like(state.active)
-        residual = 0.0
-
-        def piece(row: int, first: int, last: int) -> float:
+        def piece(row: int) -> float:
             return sweep(
+                state.values,
                 values,
-                out,
                 state.hints,
                 state.active,
                 changed,
@@ -144,15 +136,10 @@ class _Solver:
                 self.reach_m,
                 TOLERANCE_M,
                 row,
-                first,
-                last,
             )
 
-        edges = np.linspace(0, state.active.shape[1], 3 * threads + 1).astype(int)
-        for row in np.flatnonzero(state.active.any(axis=(1, 2))):
-            residual = max(residual, *pool.map(partial(piece, int(row)), edges[:-1], edges[1:]))
-            here = slice(row * self.row_size, (row + 1) * self.row_size)
-            values[here] = out[here]
+        rows = np.flatnonzero(state.active.any(axis=(1, 2))).tolist()
+        residual = max(pool.map(piece, rows), default=0.0)
         active = widen(changed, self.axes, self.reach_m, *self.turns_rad)
         state.values, state.active, state.residual_m = values, active, residual
         state.iterations += 1
@@ -178,7 +165,7 @@ def _resume(problem: Problem, path: Path | None) -> Progress | None:
     if path is None or not path.exists():
         return None
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             same = str(file["problem"]) == repr(problem)
             values, hints, active = file["values"], file["hints"], file["active"]
             state = Progress(values, hints, active, int(file["iterations"]), float(file["residual_m"]))

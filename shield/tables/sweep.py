@@ -193,10 +193,8 @@ def sweep(
     reach_m: float,
     tolerance_m: float,
     row: int,
-    first: int,
-    last: int,
 ) -> float:
-    """Value iteration of one range and headings ``first`` to ``last`` (exclusive): reads ``values``, lowers ``out``.
+    """Value iteration of one range: reads ``values``, lowers ``out``.
 
     Args:
         values: flat values over the grid, m.
@@ -215,8 +213,6 @@ def sweep(
         reach_m: how far the two boats together can move in one step, m.
         tolerance_m: smaller changes are left out, m.
         row: range index.
-        first: first index of relative heading.
-        last: the one after the last.
 
     Returns:
         The largest change, m.
@@ -225,7 +221,7 @@ def sweep(
     n_own, n_other = int(axes[N_OWN]), int(axes[N_OTHER])
     largest = 0.0
     rho = rho_node(axes, row)
-    for j in range(first, last):
+    for j in range(n_psi):
         psi = j * TWO_PI / n_psi
         for k in range(n_beta):
             if not active[row, j, k]:

@@ -1,0 +1,50 @@
+"""The tables of the package: there, whole, for today's boats, small, converged."""
+
+import itertools
+
+import numpy as np
+import pytest
+from steerclear.shield.platforms.registry import get_platform
+from steerclear.shield.tables.areas import area_m2, reach_ahead_m, unsafe
+from steerclear.shield.tables.files import SHIPPED, check_parameters, read_table
+from steerclear.shield.tables.settings import OtherMay, table_name
+
+BOATS = ("heron", "surveyor")
+PLACES = list(itertools.product(BOATS, BOATS, OtherMay))
+FILES = {path.name for path in SHIPPED.glob("*.npz")}
+
+
+def shipped(own, other, mode):
+    return read_table(SHIPPED / f"{table_name(own, other, mode)}.npz")
+
+
+@pytest.mark.parametrize(("own", "other", "mode"), PLACES)
+def test_every_pair_has_its_table(own, other, mode):
+    card = shipped(own, other, mode).card
+    check_parameters(card, get_platform(own), get_platform(other), mode)
+    assert card.checked_radii_m == (2.5, 4.0)
+    for radius in ("2.5", "4"):
+        assert card.margin[radius]["runs"] >= 1000
+        assert card.convergence[radius]["mean"] <= 0.1
+
+
+def test_nothing_else_is_shipped_and_it_is_small():
+    assert {f"{table_name(*place)}.npz" for place in PLACES} == FILES
+    assert sum((SHIPPED / name).stat().st_size for name in FILES) < 10e6
+
+
+@pytest.mark.parametrize(("own", "other"), list(itertools.product(BOATS, BOATS)))
+def test_help_makes_sets_smaller(own, other):
+    worst, helped = (shipped(own, other, mode) for mode in OtherMay)
+    tops = get_platform(own).max_speed_mps, get_platform(other).max_speed_mps
+    for heading in (0.0, 90.0, 180.0):
+        assert np.pi * 2.5**2 * 0.99 <= area_m2(helped, 2.5, heading, *tops) <= area_m2(worst, 2.5, heading, *tops)
+    assert reach_ahead_m(helped, 2.5, 180.0, *tops) < reach_ahead_m(worst, 2.5, 180.0, *tops)
+
+
+def test_sets_grow_with_the_radius_and_are_mirror_images():
+    table = shipped("surveyor", "heron", OtherMay.WORST_CASE)
+    small, large = (unsafe(table, radius, 90.0, 3.0, 2.0)[2] for radius in (2.5, 4.0))
+    assert (large >= small).all()
+    mirrored = unsafe(table, 2.5, -90.0, 3.0, 2.0)[2]
+    np.testing.assert_array_equal(small, mirrored[:, ::-1])
