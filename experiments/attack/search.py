@@ -3,7 +3,9 @@
 Differential evolution (Storn and Price 1997) as SciPy has it, rather than CMA-ES: it comes with what is installed
 already, takes a whole generation as one batch, and keeps a spread population in a landscape of many separate basins
 (each side to feint to, each moment to strike) that is flat wherever the guard holds. Attackers may start close to
-each other but never close to an own boat, so that what is found is not the start's doing.
+each other but never close to an own boat, so that what is found is not the start's doing. The distance alone is
+minimised: with a share of the guard's least certificate added, fewer searches of ten got through (5 at 0.1, 3 at 0.5,
+7 without; heron, one attacker, 32 opponents in 8 generations).
 """
 
 from __future__ import annotations
@@ -31,10 +33,6 @@ MOST_JUDGED = 3
 """Breaches judged in one generation: a search ends with the first avoidable one."""
 NO_SUCCESS_M = 1.0
 """Merit beyond the radius, m, of an opponent whose breach nobody could have avoided: the search turns elsewhere."""
-HINT = 0.5
-"""Weight of the least certificate a guard had: it tells opponents apart that were all kept at the same distance."""
-MOST_HINT_M = 4.0
-"""Certificates count up to this size, m."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class _Hunt:
         self.avoidable: dict[str, Any] | None = None
 
     def merits(self, points: Array) -> Array:
-        """What is minimised, of a generation (genes, S): closest distance, m, and a share of the least certificate."""
+        """What is minimised, of a generation (genes, S): closest distance, m, or more where a breach is no success."""
         scenes = self.duel.scenes(points.T)
         film = play(scenes, self.search.guard, self.search.conditions)
         columns = tally(film)
@@ -107,10 +105,9 @@ class _Hunt:
             self.best_m, self.point = float(closest[best]), points.T[best].copy()
         self.history.append(self.best_m)
         self.tried += scenes.games
-        hint = np.nan_to_num(film.certificate_m[:, :, scenes.own].min(axis=(0, 2)), nan=MOST_HINT_M)
-        merits = closest + HINT * np.clip(hint, -MOST_HINT_M, MOST_HINT_M)
-        merits[self._judge(film, columns)] = self.search.conditions.radius_m + NO_SUCCESS_M + HINT * MOST_HINT_M
-        return np.asarray(merits)
+        merits = closest.copy()
+        merits[self._judge(film, columns)] = self.search.conditions.radius_m + NO_SUCCESS_M
+        return merits
 
     def _judge(self, film: Film, columns: Columns) -> list[int]:
         """Judge the worst of a generation until one is avoidable; the games in which none was."""
