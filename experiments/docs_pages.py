@@ -13,6 +13,7 @@ from .comparison_page import STEM, write_comparison
 from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, table
+from .reach_show import tables_page
 from .tables import interval_text, number_text
 from .tally import RADII_M, breach_column
 from .verdicts import HEADS, verdict_rows
@@ -25,7 +26,7 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
 
     Args:
         results: contents of JSON files that ``ablate``, ``evaluate``, ``bench`` or ``encounters`` wrote; all those of
-            ``encounters`` go into one comparison.
+            ``encounters`` go into one comparison; cards of value tables are {"command": "reach", "card": JSON}.
         folder: where to.
 
     Returns:
@@ -41,7 +42,10 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
         encounters = [content for content in results if content.get("command") == "encounters"]
         if encounters:
             pages[f"{STEM}.md"], pictures = write_comparison(encounters, folder)
-        for content in (one for one in results if one.get("command") != "encounters"):
+        cards = [content["card"] for content in results if content.get("command") == "reach"]
+        if cards:
+            pages["table_cards.md"] = tables_page(cards)
+        for content in (one for one in results if one.get("command") not in ("encounters", "reach")):
             name, text, picture = _page_of(content, folder)
             pages[name] = text
             pictures += picture

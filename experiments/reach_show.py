@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.files import ValueTable
 from steerclear.shield.tables.make import COARSER
 
+from .markdown import MADE, table
 from .tables import titled
 
 COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
@@ -31,7 +33,7 @@ def show_card(console: Console, card: Card) -> None:
     console.print("valid for an own boat at full thrust; at most this far apart under optimal play")
     heads = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
     for radius in (f"{radius:g}" for radius in card.checked_radii_m):
-        rows = [[name, *(f"{area:.1f}" for area in areas)] for name, areas in card.areas_m2[radius].items()]
+        rows = _areas(card, radius)
         console.print()
         console.print(titled(f"Area, m², from which {radius} m cannot be kept, by relative heading", heads, rows))
     console.print()
@@ -59,11 +61,55 @@ def _worth_of(card: Card, radius: str) -> dict[str, str]:
     }
 
 
-def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path:
+def tables_page(cards: Sequence[str]) -> str:
+    """Write the page of value tables from their cards.
+
+    Args:
+        cards: as JSON.
+
+    Raises:
+        TableError: one is no card.
+    """
+    lines = ["# Value tables: figures", "", MADE, "", "What the words mean: [tables.md](tables.md).", ""]
+    for card in map(Card.of_json, cards):
+        radii = [f"{radius:g}" for radius in card.checked_radii_m]
+        lines += [f"## {card.own} with {card.other}, {card.other_may}", "", _made_how(card), ""]
+        lines += [*table(["", *(f"{radius} m" for radius in radii)], worth(card)), "", _model_errors(card), ""]
+        for radius in radii:
+            lines += [f"Areas, m², from which {radius} m cannot be kept, by speeds and relative heading:", ""]
+            lines += [
+                *table(["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)], _areas(card, radius)),
+                "",
+            ]
+    return "\n".join(lines)
+
+
+def _areas(card: Card, radius: str) -> list[list[str]]:
+    return [[name, *(f"{area:.1f}" for area in areas)] for name, areas in card.areas_m2[radius].items()]
+
+
+def _made_how(card: Card) -> str:
+    grid = card.make_grid()
+    nodes = " x ".join(str(n) for n in grid.shape)
+    return (
+        f"Grid {nodes}, ranges {grid.rho_first_m:g} to {grid.rho_last_m:g} m, step {card.dt_s:g} s, "
+        f"{card.iterations} steps of at most {card.horizon_s / card.dt_s:.0f}, last change {card.residual_m:.4f} m."
+    )
+
+
+def _model_errors(card: Card) -> str:
+    parts = [
+        f"{getattr(card, role)} {error['place_m_p99']:.3f} m, {error['speed_mps_p99']:.3f} m/s"
+        for role, error in card.model_error.items()
+    ]
+    return f"Error of the reduced model over one step, 99th percentile: {'; '.join(dict.fromkeys(parts))}."
+
+
+def draw_sets(values: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path:
     """Draw where each radius cannot be kept, in the own boat's frame, bow up; one panel a heading and speed pair.
 
     Args:
-        table: the table.
+        values: the table.
         radii_m: separation radii, m.
         path: file to write; its ending chooses the kind.
 
@@ -72,18 +118,18 @@ def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path
     """
     from matplotlib.figure import Figure  # without pyplot: no window system is touched
 
-    grid = table.card.make_grid()
+    grid = values.card.make_grid()
     canvas = Figure(figsize=(3.4 * len(SHOWN_DEG), 3.4 * len(SPEED_SHARES)), layout="constrained", dpi=120)
     panels = canvas.subplots(len(SPEED_SHARES), len(SHOWN_DEG), squeeze=False)
     farthest = max(radii_m)
     for row, (own, other) in zip(panels, SPEED_SHARES, strict=True):
         for axis, heading in zip(row, SHOWN_DEG, strict=True):
             speeds = own * grid.own_top_mps, other * grid.other_top_mps
-            farthest = max(farthest, _draw_panel(axis, table, radii_m, heading, speeds))
+            farthest = max(farthest, _draw_panel(axis, values, radii_m, heading, speeds))
     for axis in panels.flat:
         axis.set(xlim=(-1.1 * farthest, 1.1 * farthest), ylim=(-1.1 * farthest, 1.1 * farthest))
     panels.flat[0].legend(fontsize=6, loc="upper left")
-    title = f"{table.card.own} (bow up) with {table.card.other}, {table.card.other_may}"
+    title = f"{values.card.own} (bow up) with {values.card.other}, {values.card.other_may}"
     canvas.suptitle(f"{title}: where the other boat must not be, m")
     try:
         canvas.savefig(path)
@@ -93,12 +139,12 @@ def draw_sets(table: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path
 
 
 def _draw_panel(
-    axis: Any, table: ValueTable, radii_m: tuple[float, ...], heading_deg: float, speeds: tuple[float, float]
+    axis: Any, values: ValueTable, radii_m: tuple[float, ...], heading_deg: float, speeds: tuple[float, float]
 ) -> float:
     """Draw one panel; returns how far its sets reach, m."""
     ring, farthest = np.linspace(0.0, 2.0 * np.pi, 181), 0.0
     for colour, radius in zip(itertools.cycle(COLOURS), sorted(radii_m, reverse=True)):
-        ranges, bearings, inside = unsafe(table, radius, heading_deg, *speeds)
+        ranges, bearings, inside = unsafe(values, radius, heading_deg, *speeds)
         x, y = ranges[:, None] * np.sin(bearings), ranges[:, None] * np.cos(bearings)
         axis.contourf(x, y, inside.astype(float), [0.5, 1.5], colors=[colour])
         axis.plot(radius * np.sin(ring), radius * np.cos(ring), color="black", lw=0.8, ls=":")

@@ -8,13 +8,16 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.tables.files import read_table
 
 from ..docs_pages import write_pages
 from ..results import NAMES
 from .console import command, out
 
 COMMANDS = "ablate, evaluate, bench or encounters"
-Sources = Annotated[list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {COMMANDS}.")]
+Sources = Annotated[
+    list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {COMMANDS}; value tables (.npz).")
+]
 Folder = Annotated[Path, typer.Option("--out", help="Folder for the pages.")]
 
 
@@ -29,6 +32,8 @@ def docs(sources: Sources = None, folder: Folder = Path("docs")) -> None:
 
 
 def _read(source: Path) -> dict[str, Any]:
+    if source.suffix == ".npz":
+        return {"command": "reach", "card": read_table(source).card.to_json()}
     path = source / NAMES["results"] if source.is_dir() else source
     try:
         content = json.loads(path.read_text())

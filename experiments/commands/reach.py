@@ -21,12 +21,11 @@ from steerclear.shield.tables.files import (
     remedy,
     save_table,
 )
-from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, coarser, make_table
+from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_radii, coarser, make_table
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
 from ..reach_show import draw_sets, show_card
-from ..tables import titled
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 
@@ -80,11 +79,12 @@ def solve(
     problem = problem_of(own, other, other_may, horizon_s=horizon)
     if quick:
         problem = coarser(problem, 2.0)
+    radii = tuple(radius) if radius else RADII_M
+    check_radii(problem, radii)
     target = out_file or cache_folder() / f"{problem.name}.npz"
     kept = checkpoint or target.with_name(target.name + ".checkpoint")
     try:
         with _stages() as stage:
-            radii = tuple(radius) if radius else RADII_M
             table = make_table(
                 problem, radii, threads=jobs, checkpoint=kept, runs=RUNS // 20 if quick else RUNS, stage=stage
             )
@@ -157,8 +157,8 @@ def check(files: TableFiles = None) -> None:
     if not paths:
         raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
     faults = [_fault(path) for path in paths]
-    rows = [[path.name, fault or "in order"] for path, fault in zip(paths, faults, strict=True)]
-    out().print(titled("Value tables", ["file", "state"], rows))
+    for path, fault in zip(paths, faults, strict=True):
+        out().print(f"{path.name}: {fault or 'in order'}", markup=False, soft_wrap=True)
     finish(not any(faults))
 
 
