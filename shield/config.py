@@ -50,7 +50,7 @@ class ShieldConfig:
     coordination: str = "team"
     solver: str = "daqp"
     opponent_share: float = 1.0
-    response_per_s: float = math.inf
+    response_per_s: float = 1.0
     margin_cap_m: float = 2.0
     tail_s: float = 5.0
     horizon_s: float | None = None

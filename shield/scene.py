@@ -24,6 +24,8 @@ class Boats(NamedTuple):
         fastest_mps: speed no boat of the kind exceeds over ground, (n,); the stored speed may lag behind it.
         granted_turn_dps: turn rate granted to each boat as an opponent at its top speed, (n,).
         granted_acc_mps2: acceleration granted to each boat as an opponent, (n,).
+        granted_dec_mps2: rate at which each boat, as an opponent, loses speed in a turn, (n,).
+        granted_loss: share of its top speed that each boat, as an opponent, loses in its granted turn, (n,).
         samples: path samples of each boat's horizon, (n,).
         hunt_samples: path samples over which hunting opponents are followed, (n,), at least ``samples``.
         fade: factor of negative margins against hunters per path sample, (n,).
@@ -37,6 +39,8 @@ class Boats(NamedTuple):
     fastest_mps: Array
     granted_turn_dps: Array
     granted_acc_mps2: Array
+    granted_dec_mps2: Array
+    granted_loss: Array
     samples: IntArray
     hunt_samples: IntArray
     fade: Array

@@ -68,6 +68,8 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
         granted_turn_dps=np.array([share * limit.turn_rate_dps for limit in limits]),
         granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),
+        granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
+        granted_loss=np.array([share * _lasting_loss(limit) for limit in limits]),
         samples=np.array([max(2, math.ceil(value / sample_s)) for value in horizon_s], dtype=np.int64),
         hunt_samples=np.array([max(2, math.ceil(value / sample_s)) for value in hunt_s], dtype=np.int64),
         fade=np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
@@ -87,3 +89,8 @@ def _stride(kind: Platform, limit: Limits, dt_s: float) -> int:
     """Model steps between path samples: the chord between two may cut its arc, v w t^2 / 8 deep, by `SAG_M`."""
     bend = kind.fastest_mps(dt_s) * math.radians(limit.turn_rate_dps)
     return int(math.sqrt(8.0 * SAG_M / bend) / dt_s + 1e-9) if bend > 0.0 else 1
+
+
+def _lasting_loss(limit: Limits) -> float:
+    """Share of top speed lost in a turn, as far as it is not regained at once when the turn ends."""
+    return limit.turn_loss * min(1.0, limit.turn_deceleration_mps2 / max(limit.acceleration_mps2, 1e-6))

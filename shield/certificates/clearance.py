@@ -170,8 +170,8 @@ def clear_of_course(
 def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -> tuple[float, float]:
     """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity.
 
-    Where there is none, it steers ``ahead`` samples ahead of the boat: one as fast as the boat and on its quarter
-    comes nearest by closing in slowly on an all but parallel course, not by heading for the boat.
+    Where there is none, or one far off, it steers ``ahead`` samples ahead of the boat: one about as fast as the boat
+    and on its quarter comes nearest by closing in slowly on an all but parallel course.
     (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
     """
     a = vx * vx + vy * vy - way * way
@@ -191,6 +191,7 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -
         time = early if early > 0.0 else late
     if time <= 0.0:
         return rx + ahead * vx, ry + ahead * vy
+    time = min(time, ahead)
     return rx + time * vx, ry + time * vy
 
 
@@ -204,6 +205,8 @@ def clear_of_pursuer(
     speed_mps: float,
     top_speed_mps: float,
     acc_mps2: float,
+    dec_mps2: float,
+    loss: float,
     turn_rad: float,
     lead: bool,
     ahead: float,
@@ -230,9 +233,11 @@ def clear_of_pursuer(
         speed_mps: its speed, m/s.
         top_speed_mps: its top speed, m/s.
         acc_mps2: acceleration granted to it, m/s^2.
+        dec_mps2: rate at which it loses speed in a turn, m/s^2.
+        loss: share of its top speed it loses in the hardest turn granted to it.
         turn_rad: granted turn per sample, rad.
         lead: steer for the meeting point instead of the boat itself.
-        ahead: samples by which it leads the boat where they cannot meet.
+        ahead: most samples by which it leads the boat.
         sample_s: time between samples, s.
         samples: last sample.
         closing_m: most the distance can shrink per sample, m.
@@ -268,16 +273,21 @@ def clear_of_pursuer(
             vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
             ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
         along, across = ux * ax + uy * ay, ux * ay - uy * ax
+        rudder = 1.0
         if along > 0.0 and abs(across) * c <= along * s:
             norm = math.sqrt(ax * ax + ay * ay)
             if norm > 1e-12:
                 ux, uy = ax / norm, ay / norm
+                rudder = min(1.0, abs(across) / (norm * s)) if s > 0.0 else 0.0
         elif across >= 0.0:
             ux, uy = c * ux - s * uy, s * ux + c * uy
         else:
             ux, uy = c * ux + s * uy, c * uy - s * ux
         time_s = stride * sample_s
-        new_speed = max(speed_mps, min(top_speed_mps, speed_mps + acc_mps2 * time_s))
+        steady = top_speed_mps * (1.0 - loss * rudder)
+        new_speed = min(steady, speed_mps + acc_mps2 * time_s)
+        if speed_mps > steady:
+            new_speed = max(steady, speed_mps - dec_mps2 * time_s)
         way = 0.5 * (speed_mps + new_speed) * time_s
         speed_mps = new_speed
         x += way * ux

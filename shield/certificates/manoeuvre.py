@@ -42,8 +42,21 @@ RECOVERY_S = 1.5
 SLOWEST = 0.3
 """Opponents are granted the turn rate of at least this fraction of full thrust: thrust comes before way."""
 
+FREE_RUDDER = 0.3
+"""Share of the granted turn that costs a hunter no speed."""
+
+RUDDERS = (1.0, 0.6, FREE_RUDDER)
+"""Hardest turns hunters are followed with, shares of the granted one.
+
+A hard turn costs speed, a gentle one time: the best pursuer between is covered, for each of these loses no more speed
+than one that turns as hard as the next gentler, down to none at all.
+"""
+
+FORGOTTEN_LOSS = 0.1
+"""Hunters that lose less of their speed for good in their hardest turn are followed with that turn only."""
+
 LEAD_SHARE = 0.15
-"""Share of the time it is followed by which a hunter that cannot meet the boat leads it."""
+"""Share of the time it is followed by which a hunter leads the boat at most."""
 
 
 @kernel
@@ -138,7 +151,7 @@ def clear_of_hunter(
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
-    The worse of two hunters: one steers at the boat, one for the meeting point.
+    The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently.
     """
     sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
@@ -146,7 +159,9 @@ def clear_of_hunter(
     thrust = state[j, L.THRUST] / boats.params[j, L.MAX_THRUST]
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, thrust, SLOWEST))
     work.out[MARGIN] = FAR
-    for lead in range(2):
+    manners = 2 * len(RUDDERS) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
+    for manner in range(manners):
+        share = RUDDERS[manner // 2]
         clear_of_pursuer(
             path,
             course[0],
@@ -156,8 +171,10 @@ def clear_of_hunter(
             speed,
             top,
             boats.granted_acc_mps2[j],
-            turn,
-            lead == 1,
+            boats.granted_dec_mps2[j],
+            boats.granted_loss[j] * (share - FREE_RUDDER),
+            share * turn,
+            manner % 2 == 1,
             LEAD_SHARE * boats.hunt_samples[i],
             sample_s,
             boats.hunt_samples[i],

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+
 from ..jit import Array
 from . import layout as L
 from .actuator import actuate, largest_turn
@@ -23,6 +25,8 @@ class Limits:
         acceleration_mps2: highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2.
         turn_rate_dps: highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it).
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
+        turn_loss: share of top speed lost in a long turn at full rudder and full speed command.
+        turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
     """
 
@@ -30,17 +34,22 @@ class Limits:
     acceleration_mps2: float
     turn_rate_dps: float
     half_turn_s: float
+    turn_loss: float
+    turn_deceleration_mps2: float
     stop_s: float
 
 
 @lru_cache(maxsize=64)
 def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
     """Limits of a platform, by simulation with step ``dt_s``, s."""
+    speeds = _speeds_in_turn(platform, dt_s)
     return Limits(
         top_speed_mps=platform.max_speed_mps,
         acceleration_mps2=_acceleration(platform, dt_s),
         turn_rate_dps=_turn_rate(platform, dt_s),
         half_turn_s=_half_turn(platform, dt_s),
+        turn_loss=1.0 - speeds.min() / speeds[0],
+        turn_deceleration_mps2=_deceleration(speeds, dt_s),
         stop_s=_stop(platform, dt_s),
     )
 
@@ -85,6 +94,22 @@ def _turn_rate(platform: Platform, dt_s: float) -> float:
         actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
         fastest = max(fastest, float((state[L.HEADING] - before) % 360.0) / dt_s)
     return round(fastest, 9)
+
+
+def _speeds_in_turn(platform: Platform, dt_s: float) -> Array:
+    """Speeds, m/s, over a turn of `LONGEST_S` begun at top speed."""
+    params, state = cruise(platform, dt_s)
+    speeds = [float(state[L.SPEED])]
+    for _ in range(int(LONGEST_S / dt_s)):
+        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
+        speeds.append(float(state[L.SPEED]))
+    return np.array(speeds)
+
+
+def _deceleration(speeds: Array, dt_s: float) -> float:
+    lost = speeds[0] - speeds.min()
+    half = int(np.argmax(speeds <= speeds[0] - 0.5 * lost))
+    return float(0.5 * lost / (half * dt_s)) if half > 0 else 0.0
 
 
 def _half_turn(platform: Platform, dt_s: float) -> float:

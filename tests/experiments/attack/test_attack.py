@@ -15,7 +15,7 @@ from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
 FOUND = sorted((Path(__file__).parents[2] / "data" / "encounters").glob("*.json"))
-OPEN = {"heron_rammer_b", "heron_pincer_a", "heron_pincer_b", "surveyor_rammer_a", "surveyor_rammer_b"}
+OPEN: set[str] = set()
 """Found scenes that the shield does not hold yet; a fix takes its scene out of here."""
 
 
