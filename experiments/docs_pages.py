@@ -16,7 +16,11 @@ from .markdown import MADE, table
 from .reach_show import tables_page
 from .tables import interval_text, number_text
 from .tally import RADII_M, breach_column
+from .unsafe_sets import sets_page
 from .verdicts import HEADS, verdict_rows
+
+POOLED = ("encounters", "reach", "reach-compare")
+"""Commands whose results go into one page together."""
 
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
@@ -25,8 +29,9 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
     """Write the pages that results give, and the page of JSON keys.
 
     Args:
-        results: contents of JSON files that ``ablate``, ``evaluate``, ``bench`` or ``encounters`` wrote; all those of
-            ``encounters`` go into one comparison; cards of value tables are {"command": "reach", "card": JSON}.
+        results: contents of JSON files that ``ablate``, ``evaluate``, ``bench``, ``encounters`` or ``reach compare``
+            wrote; all those of ``encounters`` go into one comparison, of ``reach compare`` into one page; cards of
+            value tables are {"command": "reach", "card": JSON}.
         folder: where to.
 
     Returns:
@@ -45,7 +50,10 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
         cards = [content["card"] for content in results if content.get("command") == "reach"]
         if cards:
             pages["table_cards.md"] = tables_page(cards)
-        for content in (one for one in results if one.get("command") not in ("encounters", "reach")):
+        sets = [content for content in results if content.get("command") == "reach-compare"]
+        if sets:
+            pages["unsafe_sets.md"] = sets_page(sets)
+        for content in (one for one in results if one.get("command") not in POOLED):
             name, text, picture = _page_of(content, folder)
             pages[name] = text
             pictures += picture

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import SteerclearError, TableError
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.files import (
@@ -26,6 +27,9 @@ from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
 from ..reach_show import draw_sets, show_card
+from ..store import write_json
+from ..tables import titled
+from ..unsafe_sets import HEADS, RATIO_BAR, compare_sets, content_of, rows_of
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 
@@ -142,6 +146,31 @@ def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable
     except TableError as error:
         raise TableError(f"{error}; make it with: {remedy(own, other, mode)} --out {file}") from error
     return table
+
+
+@app.command()
+@command
+def compare(
+    own: OwnBoat,
+    other: OtherBoat,
+    radius: Annotated[float, typer.Option(metavar="M", help="Separation radius, m.")] = 2.5,
+    shield_set: o.ShieldSet = None,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Compare the set the shield cannot promise to save with the reachability set.
+
+    Exit status: 0 the shield's is at most 1.15 times as large everywhere, 1 it is larger somewhere.
+    """
+    values = load_table(own, other, "worst-case")
+    check_radii(problem_of(own, other), (radius,))
+    config = ShieldConfig.of(**o.shield_settings(radius, None, None, shield_set))
+    with _stages() as stage:
+        notice = stage("sets")
+        pairs = compare_sets(values, config, lambda done, total: notice(done, total, 0.0))
+    out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(pairs)))
+    if json_file is not None:
+        write_json(json_file, content_of(values, config, pairs))
+    finish(all(pair.ratio <= RATIO_BAR for pair in pairs))
 
 
 @app.command()
