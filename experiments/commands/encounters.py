@@ -29,7 +29,7 @@ Family = Annotated[str, typer.Option(metavar="A,B", help="Families of encounters
 Number = Annotated[int, typer.Option("--n", metavar="N", help="Encounters per family, platforms and guard.")]
 GuardNames = Annotated[
     list[str] | None,
-    typer.Option("--guard", metavar="A,B", help="none, shield, shield:KEY=VALUE,..., or a filter of the literature."),
+    typer.Option("--guard", metavar="A,B", help="none, shield, reach (both :KEY=VALUE,...), or one of the literature."),
 ]
 Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.")]
 Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]

@@ -1,4 +1,4 @@
-"""Guards by name: ``none``, ``shield``, ``shield:KEY=VALUE,...`` and the filters of the literature."""
+"""Guards by name: ``none``, ``shield`` and ``reach`` (both with ``:KEY=VALUE,...``), and filters of the literature."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from steerclear.shield.surroundings import OPEN_WATER, Surroundings
 
 from .scenes import DT_S, Conditions, Scenes
 
-NONE, SHIELD = "none", "shield"
+NONE, SHIELD, REACH = "none", "shield", "reach"
 GIVEN = {"separation_m": "--radius", "position_error_m": "--noise", "delay_s": "--delay", "dt_s": "no option"}
 """Settings that the conditions of a run decide."""
 
@@ -52,7 +52,7 @@ def parse_guards(text: str) -> list[str]:
     """Split names of guards at commas; ``shield:a=1,b=2,none`` is two: a piece ``b=2`` belongs to what is before.
 
     Raises:
-        ConfigError: no name, one that is not known, or settings that the shield refuses.
+        ConfigError: no name, one that is not known, or settings that it refuses.
     """
     names: list[str] = []
     for piece in filter(None, (part.strip() for part in text.split(","))):
@@ -76,10 +76,14 @@ def check_guard(name: str) -> None:
     base, settings = split_name(name)
     if base == SHIELD:
         ShieldConfig.of(**settings)
+    elif base == REACH:
+        from ..reach_guard import check_settings
+
+        check_settings(settings)
     elif settings:
-        raise ConfigError(f"{base!r} takes no settings; only shield:KEY=VALUE,... does")
+        raise ConfigError(f"{base!r} takes no settings; only shield:KEY=VALUE,... and reach:KEY=VALUE,... do")
     elif base != NONE and base not in textbook_names():
-        raise ConfigError(f"unknown guard {base!r}; choose from none, shield, {', '.join(textbook_names())}")
+        raise ConfigError(f"unknown guard {base!r}; choose from none, shield, reach, {', '.join(textbook_names())}")
 
 
 def textbook_names() -> tuple[str, ...]:
@@ -137,6 +141,11 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
         return guard(*fleet, around)
     if base == SHIELD:
         return BatchedShield(*fleet, around)
+    if base == REACH:
+        from ..reach_guard import ReachGuard, check_settings
+
+        check_settings(settings)
+        return ReachGuard(*fleet)
     if base not in textbook_names():
         check_guard(base)
     from ..textbook import make_guard
