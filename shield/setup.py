@@ -59,7 +59,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     stride = max(1, min(strides, default=1))
     sample_s = stride * config.dt_s
     hunt_s = [
-        max(value, certificate.hunt_s(limit)) if share > 0.0 else value
+        max(value, config.hunt_s or certificate.hunt_s(limit)) if share > 0.0 else value
         for value, limit in zip(horizon_s, limits, strict=True)
     ]
     return Boats(

@@ -10,11 +10,12 @@ from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.certificates import CERTIFICATES
 from steerclear.shield.config import COORDINATION
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
+from steerclear.shield.setup import boats_of
 
 TEXTS = ("certificate", "coordination", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
-NOT_ZERO = ["separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s"]
-MAY_BE_NONE = ["horizon_s", "edge_m"]
+NOT_ZERO = ["separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s", "hunt_s"]
+MAY_BE_NONE = ["horizon_s", "hunt_s", "edge_m"]
 MAY_BE_INFINITE = ["response_per_s", "max_track_age_s"]
 
 
@@ -122,3 +123,18 @@ def test_sensible_settings_are_taken_as_given(separation, share, certificate):
     config = ShieldConfig.of(separation_m=separation, opponent_share=share, certificate=certificate)
     assert (config.separation_m, config.opponent_share, config.certificate) == (separation, share, certificate)
     assert Shield(config).config is config
+
+
+def test_hunters_are_followed_as_long_as_asked():
+    def samples_of(**settings):
+        boats = boats_of(ShieldConfig(**settings), ("surveyor", "surveyor"), (0, 1))
+        return boats.hunt_samples[0] * boats.sample_s, boats.samples[0] * boats.sample_s
+
+    by_platform, escape = samples_of()
+    asked, _ = samples_of(hunt_s=25.0)
+    least, _ = samples_of(hunt_s=1.0)
+    assert by_platform > 45.0
+    assert asked == pytest.approx(25.0, abs=0.5)
+    assert least == escape
+    with pytest.raises(ConfigError, match="hunt_s"):
+        ShieldConfig(hunt_s=0.0)
