@@ -14,6 +14,7 @@ from .markdown import MADE, table
 
 STEM = "comparison"
 COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
+MARKS = ("o", "s", "^", "D")
 OTHERS = ("#b5532a", "#6a4c93", "#2e7d32", "#c99700", "#ad1457", "#37474f")
 
 
@@ -118,10 +119,9 @@ def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
     canvas = Figure(figsize=(4.4 * across, 3.6 * down), layout="constrained", dpi=150)
     axes = canvas.subplots(down, across, squeeze=False).ravel()
     names = list(dict.fromkeys(guard for contest in contests for guard in contest.cells))
-    spare = iter(OTHERS * (1 + len(names) // len(OTHERS)))
-    colours = {name: COLOURS[name] if name in COLOURS else next(spare) for name in names}
+    looks = looks_of(names)
     for axis, contest in zip(axes, contests, strict=False):
-        _draw(axis, contest, colours)
+        _draw(axis, contest, looks)
     for axis in axes[len(contests) :]:
         axis.set_visible(False)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -130,11 +130,20 @@ def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
     return path
 
 
-def _draw(axis: Any, contest: Contest, colours: Mapping[str, str]) -> None:
+def looks_of(guards: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Colour and mark of each guard; where colours run out they come again with another mark."""
+    others = [guard for guard in guards if guard not in COLOURS]
+    pairs = [(colour, mark) for mark in MARKS for colour in OTHERS]
+    looks = {guard: pairs[k % len(pairs)] for k, guard in enumerate(others)}
+    return {guard: looks.get(guard, (COLOURS.get(guard, ""), MARKS[0])) for guard in guards}
+
+
+def _draw(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, str]]) -> None:
     for guard, one in contest.totals.items():
         share = 100.0 * one["breached"] / one["encounters"]
         above = [[0.0], [100.0 * one["breached_upper"] - share]]
-        axis.errorbar(one["changed_percent"], share, above, fmt="o", capsize=3, color=colours[guard], label=guard)
+        colour, mark = looks[guard]
+        axis.errorbar(one["changed_percent"], share, above, fmt=mark, capsize=3, color=colour, label=guard)
     axis.set_yscale("symlog", linthresh=0.1)
     axis.set_ylim(bottom=-0.02)
     axis.set_title(contest.title, fontsize=9)

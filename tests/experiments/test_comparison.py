@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments.comparison import cells_of, contests_of
-from steerclear.experiments.comparison_page import comparison_page
+from steerclear.experiments.comparison_page import comparison_page, looks_of
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError
 
@@ -118,3 +118,10 @@ def test_bad_results_are_refused(tmp_path):
         write_pages([content(broken)], tmp_path)
     with pytest.raises(ConfigError, match="no family that all guards met"):
         write_pages([content()], tmp_path)
+
+
+def test_guards_are_told_apart_when_colours_run_out():
+    guards = ["none", "shield", *(f"shield:hunt_s={k}" for k in range(20))]
+    looks = looks_of(guards)
+    assert list(looks) == guards
+    assert len(set(looks.values())) == len(guards)
