@@ -234,7 +234,7 @@ def clear_of_pursuer(
         top_speed_mps: its top speed, m/s.
         acc_mps2: acceleration granted to it, m/s^2.
         dec_mps2: rate at which it loses speed in a turn, m/s^2.
-        loss: share of its top speed it loses in the hardest turn granted to it.
+        loss: share of its top speed it loses in a turn of ``turn_rad`` per sample.
         turn_rad: granted turn per sample, rad.
         lead: steer for the meeting point instead of the boat itself.
         ahead: most samples by which it leads the boat.
@@ -248,6 +248,7 @@ def clear_of_pursuer(
         out: the result row.
     """
     root = radius_m + cap_m
+    fastest_mps = max(top_speed_mps, speed_mps)
     worst = cap_m
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
     weight = 1.0
@@ -284,7 +285,7 @@ def clear_of_pursuer(
         else:
             ux, uy = c * ux + s * uy, c * uy - s * ux
         time_s = stride * sample_s
-        steady = top_speed_mps * (1.0 - loss * rudder)
+        steady = fastest_mps * (1.0 - loss * rudder)
         new_speed = min(steady, speed_mps + acc_mps2 * time_s)
         if speed_mps > steady:
             new_speed = max(steady, speed_mps - dec_mps2 * time_s)

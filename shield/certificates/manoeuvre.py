@@ -39,17 +39,11 @@ REGAIN_M = 0.01
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
-SLOWEST = 0.3
-"""Opponents are granted the turn rate of at least this fraction of full thrust: thrust comes before way."""
-
-FREE_RUDDER = 0.3
-"""Share of the granted turn that costs a hunter no speed."""
-
-RUDDERS = (1.0, 0.6, FREE_RUDDER)
+RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
 
-A hard turn costs speed, a gentle one time: the best pursuer between is covered, for each of these loses no more speed
-than one that turns as hard as the next gentler, down to none at all.
+A hard turn costs speed, a gentle one time. Each of these turns as hard as its own entry and loses the speed of the next
+gentler one, and so does better than any that turn steadily in between; the last entry is only that, none is followed.
 """
 
 FORGOTTEN_LOSS = 0.1
@@ -156,10 +150,9 @@ def clear_of_hunter(
     sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
     course = work.course[j]
-    thrust = state[j, L.THRUST] / boats.params[j, L.MAX_THRUST]
-    turn = math.radians(boats.granted_turn_dps[j]) * sample_s * min(1.0, max(speed / top, thrust, SLOWEST))
+    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
     work.out[MARGIN] = FAR
-    manners = 2 * len(RUDDERS) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
+    manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     for manner in range(manners):
         share = RUDDERS[manner // 2]
         clear_of_pursuer(
@@ -172,7 +165,7 @@ def clear_of_hunter(
             top,
             boats.granted_acc_mps2[j],
             boats.granted_dec_mps2[j],
-            boats.granted_loss[j] * (share - FREE_RUDDER),
+            boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
             share * turn,
             manner % 2 == 1,
             LEAD_SHARE * boats.hunt_samples[i],

@@ -94,3 +94,17 @@ def test_a_boat_that_regains_its_speed_at_once_is_followed_without_its_loss():
     assert at["heron"].boats.granted_loss[1] < 0.1
     assert at["surveyor"].boats.granted_loss[1] == pytest.approx(0.85)
     assert at["surveyor"].boats.granted_dec_mps2[1] == pytest.approx(0.125, abs=0.01)
+
+
+def test_a_hunter_at_rest_is_granted_the_turn_its_thrust_will_bring():
+    platform = get_platform("surveyor")
+    own = boat(platform, 0.0, 0.0, 0.0, 2.26 / 3.0)
+    hunter = fresh_state(4.70, 56.12, -10.05, 0.0)
+    hunter[[L.SPEED_ERROR, L.HEADING_ERROR]] = 0.0
+    assert modelled("surveyor", own, hunter, 1.0, 0.0)[0] < 0.0
+
+
+def test_a_hunter_seen_faster_than_its_platform_keeps_that_speed():
+    platform = get_platform("heron")
+    own, hunter = boat(platform, 0.0, 0.0, 0.0, 1.0), boat(platform, 0.0, -6.0, 0.0, 1.3)
+    assert modelled("heron", own, hunter, 1.0, 0.0)[0] < 0.5
