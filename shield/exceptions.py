@@ -37,3 +37,27 @@ class SolverError(SteerclearError, RuntimeError):
 
 class TableError(SteerclearError, ValueError):
     """A reachability value table is missing, damaged, made for other boats, or cannot be solved."""
+
+
+class BridgeError(SteerclearError, RuntimeError):
+    """Base of what can go wrong between the shield and boats."""
+
+
+class LinkError(BridgeError):
+    """A boat's link cannot be opened, is lost, or does not answer in time."""
+
+
+class LinkRefused(LinkError):
+    """The boat's autopilot answered no: a mode, arming, a parameter or an unsigned packet."""
+
+
+class FleetFileError(ConfigError):
+    """A FLEET.yaml has an unknown key, a value out of range, or boats that contradict each other."""
+
+
+class FeedError(SteerclearError, ValueError):
+    """A packet of the position or game feed is not what the format says."""
+
+
+class LogError(SteerclearError, ValueError):
+    """A black-box log cannot be read, is cut off before its first decision, or is of another version."""

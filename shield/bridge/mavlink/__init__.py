@@ -1,0 +1,1 @@
+"""ArduPilot boats over MAVLink 2."""

@@ -1,0 +1,43 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.exceptions import ConfigError
+
+ANGLES = st.floats(-360.0, 360.0)
+
+
+@given(st.floats(-60, 60), st.floats(-180, 180), ANGLES, st.floats(-500, 500), st.floats(-500, 500))
+def test_places_round_trip_to_a_tenth_of_a_millimetre(latitude, longitude, axis, x, y):
+    frame = FieldFrame(latitude, longitude, axis)
+    assert frame.to_field_m(*frame.to_geodetic_deg(x, y)) == pytest.approx((x, y), abs=1e-4)
+
+
+@given(ANGLES, st.floats(0.0, 2 * math.pi, exclude_max=True))
+def test_headings_round_trip_and_agree_with_vectors(axis, heading):
+    frame = FieldFrame(42.0, -71.0, axis)
+    there = frame.heading_to_true_rad(heading)
+    assert math.cos(frame.heading_to_field_rad(there) - heading) == pytest.approx(1.0, abs=1e-12)
+    x, y = frame.turn_to_field(math.sin(there), math.cos(there))
+    assert (x, y) == pytest.approx((math.sin(heading), math.cos(heading)), abs=1e-12)
+
+
+def test_north_of_an_unturned_field_is_its_y_axis():
+    # one minute of latitude is a nautical mile, to the earth's flattening
+    x, y = FieldFrame(45.0, 8.0).to_field_m(45.0 + 1 / 60, 8.0)
+    assert x == pytest.approx(0.0, abs=1e-6)
+    assert y == pytest.approx(1852.0, rel=2e-3)
+
+
+def test_a_field_along_the_east_has_its_y_axis_there():
+    frame = FieldFrame(45.0, 8.0, 90.0)
+    assert frame.turn_to_field(1.0, 0.0) == pytest.approx((0.0, 1.0), abs=1e-12)
+    assert frame.heading_to_true_rad(0.0) == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("place", [(90.0, 0.0, 0.0), (math.nan, 0.0, 0.0), (0.0, 181.0, 0.0), (0.0, 0.0, math.inf)])
+def test_impossible_places_are_refused(place):
+    with pytest.raises(ConfigError, match="give"):
+        FieldFrame(*place)
