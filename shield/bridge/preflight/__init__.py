@@ -1,0 +1,1 @@
+"""Checks before boats move: each a function that answers with a `CheckResult`."""
