@@ -1,0 +1,190 @@
+"""What the keys of a FLEET.yaml must agree on with each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..config import ShieldConfig
+from ..exceptions import ConfigError, FleetFileError
+from ..platforms import Gains, Platform, get_platform
+from .fleet_settings import FleetSettings
+
+LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
+
+
+def check_fleet(fleet: FleetSettings) -> None:
+    """Check what single keys cannot.
+
+    Raises:
+        FleetFileError: two things of the file contradict each other; one line that names both.
+    """
+    _check_names(fleet)
+    _check_agents(fleet)
+    _check_fence(fleet)
+    for name in {boat.platform for boat in fleet.boats} | set(fleet.platforms):
+        platform_of(fleet, name)
+    shield_config(fleet)
+    _check_links(fleet)
+    _check_contacts(fleet)
+    _check_listeners(fleet)
+    _check_limits(fleet)
+
+
+def platform_of(fleet: FleetSettings, name: str) -> Platform:
+    """The platform of that name: the file's own, or one the package knows.
+
+    Raises:
+        FleetFileError: there is none, or its settings make no sense.
+    """
+    if name not in fleet.platforms:
+        try:
+            return get_platform(name)
+        except ConfigError as error:
+            raise FleetFileError(f"{error}; or describe it under platforms") from None
+    settings: dict[str, Any] = dict(fleet.platforms[name])
+    try:
+        for controller in ("speed_pid", "heading_pid"):
+            if isinstance(settings.get(controller), Mapping):
+                settings[controller] = Gains(**settings[controller])
+        return Platform(**{"kind": "usv", **settings, "name": name})
+    except (ConfigError, TypeError) as error:
+        raise FleetFileError(f"platforms.{name}: {error}") from None
+
+
+def shield_config(fleet: FleetSettings) -> ShieldConfig:
+    """Settings of the shield with this file's step, coordination and ages.
+
+    Raises:
+        FleetFileError: a setting is unknown or contradicts the file's own key.
+    """
+    settings = dict(fleet.shield)
+    dt_s = 1.0 / fleet.rate_hz
+    for key, value, source in (("dt_s", dt_s, "rate_hz"), ("coordination", fleet.coordination, "coordination")):
+        given = settings.setdefault(key, value)
+        same = given == value or (isinstance(given, float) and isinstance(value, float) and math.isclose(given, value))
+        if not same:
+            raise FleetFileError(f"shield.{key} is {given!r} and {source} says {value!r}; leave shield.{key} out")
+    oldest = max(fleet.limits.contact.lost_after_s, fleet.limits.navigation.lost_after_s)
+    settings.setdefault("max_track_age_s", oldest + dt_s)
+    try:
+        config = ShieldConfig.of(**settings)
+    except (ConfigError, TypeError) as error:
+        raise FleetFileError(f"shield: {error}") from None
+    if config.max_track_age_s < oldest:
+        raise FleetFileError(
+            f"shield.max_track_age_s is {config.max_track_age_s} s and boats are kept for {oldest} s "
+            "(limits.*.lost_after_s); leave shield.max_track_age_s out"
+        )
+    return config
+
+
+def address_of(text: str, key: str) -> tuple[str, int]:
+    """Host and port of HOST:PORT.
+
+    Raises:
+        FleetFileError: it is not of that form.
+    """
+    host, colon, port = text.rpartition(":")
+    if not colon or not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise FleetFileError(f'{key} is {text!r}; give "HOST:PORT", such as "127.0.0.1:14700"')
+    return host, int(port)
+
+
+def _check_names(fleet: FleetSettings) -> None:
+    _check_unique([boat.name for boat in fleet.boats], "are named")
+
+
+def _check_agents(fleet: FleetSettings) -> None:
+    agents = [boat.agent for boat in fleet.boats if boat.agent is not None]
+    _check_unique(agents, "play")
+    expected = [f"agent_{i}" for i in range(len(agents))]
+    if agents != expected or len(agents) % 2:
+        raise FleetFileError(
+            f"agents are {', '.join(agents) or 'missing'}; give an even number of boats agent_0, agent_1, ... in that "
+            "order, blue first, and boats outside the game no agent"
+        )
+
+
+def _check_unique(values: list[str], what: str) -> None:
+    for value in values:
+        if values.count(value) > 1:
+            raise FleetFileError(f"two boats {what} {value!r}; give each its own")
+
+
+def _check_fence(fleet: FleetSettings) -> None:
+    fence = fleet.geofence
+    if not (fence.xmin_m < fence.xmax_m and fence.ymin_m < fence.ymax_m):
+        raise FleetFileError(f"geofence {fence.box} is empty; give xmin_m < xmax_m and ymin_m < ymax_m")
+
+
+def _check_links(fleet: FleetSettings) -> None:
+    seen: dict[tuple[str, int], str] = {}
+    for boat in fleet.boats:
+        if boat.link is None:
+            continue
+        kind = boat.link.address.split(":")[0]
+        if kind not in LINK_KINDS or ":" not in boat.link.address:
+            raise FleetFileError(
+                f"boat {boat.name!r}: link address {boat.link.address!r}; give one of "
+                f"{', '.join(f'{k}:...' for k in LINK_KINDS)}, such as udpin:127.0.0.1:14550"
+            )
+        if kind != "serial":
+            address_of(boat.link.address.partition(":")[2], f"boat {boat.name!r}: link address")
+        other = seen.setdefault((boat.link.address, boat.link.system_id), boat.name)
+        if other != boat.name:
+            raise FleetFileError(
+                f"boats {other!r} and {boat.name!r} have one system_id, {boat.link.system_id}, on {boat.link.address}; "
+                "give each its own"
+            )
+
+
+def _check_contacts(fleet: FleetSettings) -> None:
+    for boat in fleet.boats:
+        kind = boat.contact or ("feed" if fleet.feed is not None else "telemetry")
+        commanded = boat.link is not None and boat.commanded
+        if kind == "feed" and fleet.feed is None:
+            raise FleetFileError(f"boat {boat.name!r} is known from the feed, and the file has none; add feed: listen")
+        if kind == "telemetry" and boat.link is None:
+            raise FleetFileError(
+                f"nobody says where boat {boat.name!r} is; give it a link, or contact: feed and a feed section"
+            )
+        if not commanded and boat.feed_listen is not None:
+            raise FleetFileError(f"boat {boat.name!r} is not commanded; leave its feed_listen out")
+
+
+def _check_listeners(fleet: FleetSettings) -> None:
+    """No two sockets of ours on one port."""
+    taken: dict[int, str] = {}
+    for boat in fleet.boats:
+        if boat.link is not None and boat.link.address.startswith("udpin:"):
+            taken[address_of(boat.link.address.partition(":")[2], "link")[1]] = f"the link of {boat.name!r}"
+    for key, text in _feed_listeners(fleet):
+        port = address_of(text, key)[1]
+        if port in taken:
+            raise FleetFileError(f"{key} and {taken[port]} use one port, {port}; give each its own")
+        taken[port] = key
+    for text in () if fleet.feed is None else fleet.feed.publish:
+        address_of(text, "feed.publish")
+
+
+def _feed_listeners(fleet: FleetSettings) -> list[tuple[str, str]]:
+    if fleet.feed is None:
+        return []
+    listeners = [("feed.listen", fleet.feed.listen)]
+    if fleet.feed.referee is not None:
+        listeners.append(("feed.referee", fleet.feed.referee))
+    return listeners + [(f"feed_listen of {b.name!r}", b.feed_listen) for b in fleet.boats if b.feed_listen]
+
+
+def _check_limits(fleet: FleetSettings) -> None:
+    limits = fleet.limits
+    later: tuple[tuple[str, float, float], ...] = (
+        ("navigation.lost_after_s", limits.navigation.max_age_s, limits.navigation.lost_after_s),
+        ("contact.lost_after_s", limits.contact.max_age_s, limits.contact.lost_after_s),
+        ("policy.give_up_after_s", limits.policy.max_age_s, limits.policy.give_up_after_s),
+    )
+    for name, first, second in later:
+        if second < first:
+            raise FleetFileError(f"limits.{name} is {second} s, before max_age_s, {first} s; give it at least that")

@@ -1,0 +1,204 @@
+"""`FleetFile`: a FLEET.yaml, read and checked as a whole before anything is opened or sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from ..config import ShieldConfig
+from ..exceptions import FleetFileError
+from ..platforms import Platform
+from ..surroundings import Surroundings
+from .fleet_checks import check_fleet, platform_of, shield_config
+from .fleet_messages import explain
+from .fleet_settings import BoatSettings, FleetSettings
+from .frame import FieldFrame
+
+OUTSIDE_TEAM = 2
+"""Team number of boats outside the game."""
+
+
+class FleetFile(FleetSettings):
+    """A FLEET.yaml and what follows from it. Build it with `load_fleet` or `parse_fleet`.
+
+    Boats are in the file's order everywhere: fleets, commands, records.
+    """
+
+    @cached_property
+    def frame(self) -> FieldFrame:
+        """The field's frame."""
+        origin = self.field.origin
+        return FieldFrame(origin.latitude_deg, origin.longitude_deg, self.field.y_axis_deg)
+
+    @cached_property
+    def shield_config(self) -> ShieldConfig:
+        """Settings of the shield: the file's, with step and coordination from the file's own keys."""
+        return shield_config(self)
+
+    @cached_property
+    def surroundings(self) -> Surroundings:
+        """The geofence, as the shield keeps it."""
+        return Surroundings(field=self.geofence.box)
+
+    @property
+    def dt_s(self) -> float:
+        """Step of the loop, s."""
+        return self.shield_config.dt_s
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all boats."""
+        return tuple(boat.name for boat in self.boats)
+
+    @cached_property
+    def agent_ids(self) -> tuple[str, ...]:
+        """Agents of the game, agent_0 first."""
+        return tuple(boat.agent for boat in self.boats if boat.agent is not None)
+
+    @cached_property
+    def platform_of(self) -> Mapping[str, Platform]:
+        """Platform of each boat, by boat's name."""
+        return {boat.name: platform_of(self, boat.platform) for boat in self.boats}
+
+    @cached_property
+    def team_of(self) -> Mapping[str, int]:
+        """0 blue, 1 red, 2 outside the game, by boat's name: the first half of the agents is blue."""
+        half = len(self.agent_ids) // 2
+        return {
+            boat.name: OUTSIDE_TEAM if boat.agent is None else int(int(boat.agent.removeprefix("agent_")) >= half)
+            for boat in self.boats
+        }
+
+    @property
+    def team_number(self) -> int:
+        """0 when our boats play blue, 1 when red."""
+        return int(self.team == "red")
+
+    def boat(self, name: str) -> BoatSettings:
+        """The boat of that name.
+
+        Raises:
+            FleetFileError: no boat has it.
+        """
+        for boat in self.boats:
+            if boat.name == name:
+                return boat
+        raise FleetFileError(f"no boat is named {name!r}; the file has {', '.join(self.names)}")
+
+    def commanded(self, only: str | None = None) -> tuple[BoatSettings, ...]:
+        """Boats a process commands: those of our team with a link, or the one named.
+
+        Raises:
+            FleetFileError: ``only`` names a boat we may not command, or per_boat coordination without a name.
+        """
+        ours = tuple(boat for boat in self.boats if self._is_ours(boat))
+        if only is None:
+            if self.coordination == "per_boat":
+                raise FleetFileError("coordination is per_boat: a process per boat; name this process's with --boat")
+            return ours
+        boat = self.boat(only)
+        if boat not in ours:
+            raise FleetFileError(
+                f"boat {only!r} is not ours to command; choose one of {', '.join(b.name for b in ours)}"
+            )
+        return (boat,)
+
+    def _is_ours(self, boat: BoatSettings) -> bool:
+        return boat.link is not None and boat.commanded and self.team_of[boat.name] == self.team_number
+
+    def contact_of(self, boat: BoatSettings) -> str:
+        """How a process that does not command this boat knows it: "feed" or "telemetry"."""
+        return boat.contact or ("feed" if self.feed is not None else "telemetry")
+
+    def feed_listen(self, boat: str | None = None) -> str | None:
+        """HOST:PORT at which a runner hears the feed: the team's, or the one of a boat's own process."""
+        own = None if boat is None else self.boat(boat).feed_listen
+        return own or (None if self.feed is None else self.feed.listen)
+
+    def feed_listeners(self) -> tuple[str, ...]:
+        """Every HOST:PORT at which a runner of this file may hear the feed: who publishes sends to all of them."""
+        if self.feed is None:
+            return ()
+        if self.coordination == "team":
+            return (self.feed.listen,)
+        return tuple(dict.fromkeys(b.feed_listen or self.feed.listen for b in self.boats if self._is_ours(b)))
+
+    def position_listeners(self) -> tuple[str, ...]:
+        """Every HOST:PORT positions go to: the runners' and the referee's."""
+        referee = () if self.feed is None or self.feed.referee is None else (self.feed.referee,)
+        return (*self.feed_listeners(), *referee)
+
+
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
+    """Safe loader that refuses a key given twice, which YAML would silently let the last one win."""
+
+
+def _mapping(loader: _Loader, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+    seen: set[Any] = set()
+    for key_node, _ in node.value:
+        key = loader.construct_object(key_node, deep=True)
+        if isinstance(key, (str, int)) and key in seen:
+            line = key_node.start_mark.line + 1
+            raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice (line {line})")
+        seen.add(key if isinstance(key, (str, int)) else id(key_node))
+    return yaml.SafeLoader.construct_mapping(loader, node, deep=True)
+
+
+_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None) -> FleetFile:
+    """A fleet file from its text.
+
+    Args:
+        text: YAML.
+        where: its name, for messages.
+        folder: what relative paths in it start from; None leaves them.
+
+    Raises:
+        FleetFileError: it is no YAML, has an unknown or missing key, a value out of range, or boats that contradict
+            each other; one line.
+    """
+    try:
+        content = yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise FleetFileError(f"{where} is not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict):
+        raise FleetFileError(f"{where} holds no settings; give version, field, geofence, team and boats")
+    try:
+        fleet = FleetFile.model_validate(content)
+    except ValidationError as error:
+        raise FleetFileError(f"{where}: {explain(error, FleetFile)}") from None
+    if folder is not None:
+        fleet = _rooted(fleet, folder)
+    try:
+        check_fleet(fleet)
+    except FleetFileError as error:
+        raise FleetFileError(f"{where}: {error}") from None
+    return fleet
+
+
+def load_fleet(path: str | Path) -> FleetFile:
+    """Read and check a FLEET.yaml; relative paths in it start from its folder.
+
+    Raises:
+        FleetFileError: as `parse_fleet`, or the file cannot be read.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FleetFileError(f"cannot read {path} ({error}); give the path of a FLEET.yaml") from None
+    return parse_fleet(text, str(path), path.resolve().parent)
+
+
+def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:
+    update: dict[str, Any] = {"log_dir": folder / fleet.log_dir}
+    if fleet.signing is not None:
+        update["signing"] = fleet.signing.model_copy(update={"key_file": folder / fleet.signing.key_file})
+    return fleet.model_copy(update=update)

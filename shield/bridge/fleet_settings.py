@@ -1,0 +1,195 @@
+"""The sections of a FLEET.yaml: their keys, units and bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Response = Literal["hold_course", "slow", "hold_station", "stop"]
+FenceResponse = Literal["return", "hold_course", "slow", "hold_station", "stop"]
+LogResponse = Literal["go_on", "hold_course", "slow", "hold_station", "stop"]
+
+Name = Annotated[
+    str,
+    Field(pattern=r"^[A-Za-z0-9_.-]{1,32}$", description="give 1 to 32 letters, digits, '_', '-' or '.'"),
+]
+Seconds = Annotated[float, Field(gt=0.0, le=3600.0, description="give seconds > 0")]
+Metres = Annotated[float, Field(ge=-1e6, le=1e6, description="give metres in the field's frame")]
+Length = Annotated[float, Field(gt=0.0, le=1e5, description="give metres > 0")]
+
+
+class Section(BaseModel):
+    """Part of the file: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Origin(Section):
+    """Where the field's corner (0, 0) is."""
+
+    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0, description="give the corner's latitude, deg")]
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0, description="give the corner's longitude, deg")]
+
+
+class FieldSettings(Section):
+    """The field of play; y axis along ``y_axis_deg``, deg clockwise from true north; size along x and y, m."""
+
+    origin: Origin = Field(description="give latitude_deg and longitude_deg of the field's corner")
+    y_axis_deg: Annotated[
+        float, Field(ge=-360.0, le=360.0, description="give the true course of the field's y axis, deg")
+    ] = 0.0
+    size_m: tuple[Length, Length] = Field(description="give [length along x, length along y] in m")
+
+
+class Geofence(Section):
+    """The water no boat of ours may leave, m in the field's frame."""
+
+    xmin_m: Metres
+    ymin_m: Metres
+    xmax_m: Metres
+    ymax_m: Metres
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """(xmin, ymin, xmax, ymax), m."""
+        return self.xmin_m, self.ymin_m, self.xmax_m, self.ymax_m
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a point is inside; NaN is not."""
+        return self.xmin_m <= x_m <= self.xmax_m and self.ymin_m <= y_m <= self.ymax_m
+
+
+class LinkSettings(Section):
+    """How a boat is reached.
+
+    ``address``: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD. ``rate_hz``:
+    rate of the telemetry asked for. ``route``: name of the command message, "auto" chooses by what the boat can.
+    """
+
+    kind: Literal["mavlink"] = Field(description="the kind of link: mavlink")
+    address: Annotated[str, Field(min_length=4, max_length=200, description='give e.g. "udpin:127.0.0.1:14550"')]
+    system_id: Annotated[int, Field(ge=1, le=255, description="give the autopilot's MAVLink system id, 1 to 255")]
+    rate_hz: Annotated[float, Field(gt=0.0, le=40.0, description="give the telemetry rate, Hz, at most 40")] = 20.0
+    route: Annotated[str, Field(min_length=1, description='give "auto" or the name of a route')] = "auto"
+
+
+class BoatSettings(Section):
+    """One boat.
+
+    ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``contact``:
+    how this boat is known to a process that does not command it: "feed" (UDP positions) or "telemetry" (its own link);
+    None: "feed" when the file has a feed, else "telemetry". ``commanded``: false for a boat with a link that somebody
+    else steers. ``feed_listen``: HOST:PORT at which this boat's own process hears the feed (coordination per_boat).
+    """
+
+    name: Name
+    agent: Annotated[str, Field(pattern=r"^agent_\d+$", description="give agent_0, agent_1, ...")] | None = None
+    platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron")]
+    link: LinkSettings | None = None
+    contact: Literal["feed", "telemetry"] | None = Field(None, description="give feed or telemetry")
+    commanded: bool = True
+    feed_listen: str | None = Field(None, description='give "HOST:PORT"')
+
+
+class Signing(Section):
+    """MAVLink 2 signing: 32-byte secret key in a file only its owner can read."""
+
+    key_file: Path = Field(description="give the path of the key file")
+    link_id: Annotated[int, Field(ge=0, le=255, description="give this link's number, 0 to 255")] = 1
+
+
+class Feed(Section):
+    """UDP JSON positions and game state.
+
+    ``listen``: HOST:PORT of the runner. ``allow``: hosts packets are taken from. ``referee``: HOST:PORT at which the
+    referee hears positions. ``publish``: HOST:PORT list the runner sends its own boats' positions to.
+    """
+
+    listen: str = Field(description='give "HOST:PORT", such as "127.0.0.1:14700"')
+    allow: tuple[str, ...] = Field(("127.0.0.1",), description="give a list of host addresses", min_length=1)
+    referee: str | None = Field(None, description='give "HOST:PORT"')
+    publish: tuple[str, ...] = Field((), description='give a list of "HOST:PORT"')
+
+
+class NavigationLimit(Section):
+    """Own position, heading and speed: older than ``max_age_s``, the response; older than ``lost_after_s``, unknown.
+
+    A boat whose own state is unknown is told to stop by its link; the others keep clear of where it may be.
+    """
+
+    max_age_s: Seconds = 0.5
+    then: Response = "stop"
+    lost_after_s: Seconds = 2.0
+
+
+class ContactLimit(Section):
+    """Other boats: older than ``max_age_s``, the response of all own boats; older than ``lost_after_s``, another."""
+
+    max_age_s: Seconds = 1.0
+    then: Response = "slow"
+    lost_after_s: Seconds = 5.0
+    lost_then: Response = "stop"
+
+
+class PolicyLimit(Section):
+    """The policy's answer: older than ``max_age_s`` or unusable, the response; after ``give_up_after_s``, another."""
+
+    max_age_s: Seconds = 0.5
+    then: Response = "hold_course"
+    give_up_after_s: Seconds = 3.0
+    give_up_then: Response = "hold_station"
+
+
+class AgeLimit(Section):
+    """Something older than ``max_age_s``, and the response."""
+
+    max_age_s: Seconds
+    then: Response
+
+
+class FenceLimit(Section):
+    """A boat outside the geofence; "return" steers it back in at half speed."""
+
+    then: FenceResponse = "return"
+
+
+class LogLimit(Section):
+    """The black box cannot be written any more (disk full)."""
+
+    then: LogResponse = "hold_station"
+
+
+class Limits(Section):
+    """How old things may be, s, and what happens beyond."""
+
+    navigation: NavigationLimit = NavigationLimit()
+    contact: ContactLimit = ContactLimit()
+    policy: PolicyLimit = PolicyLimit()
+    link: AgeLimit = AgeLimit(max_age_s=1.0, then="stop")
+    game: AgeLimit = AgeLimit(max_age_s=2.0, then="hold_station")
+    geofence: FenceLimit = FenceLimit()
+    log: LogLimit = LogLimit()
+
+
+class FleetSettings(Section):
+    """The whole file, section by section; `fleet_file.FleetFile` adds what follows from it."""
+
+    version: Literal[1] = Field(description="the version of the format: 1")
+    rate_hz: Annotated[float, Field(ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")] = 10.0
+    field: FieldSettings = Field(description="give origin and size_m of the field")
+    geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the water no boat may leave")
+    team: Literal["blue", "red"] = Field(description="the side our boats play: blue or red")
+    coordination: Literal["team", "per_boat"] = Field(
+        "team", description="team (one process for all boats) or per_boat (a process per boat)"
+    )
+    preset: Annotated[str, Field(min_length=1, description="give the name of the game's rules")] = "aamas2024"
+    rules: dict[str, Any] = Field({}, description="give settings of the game that differ from the preset's")
+    shield: dict[str, Any] = Field({}, description="give settings of the shield, by name")
+    platforms: dict[Name, dict[str, Any]] = Field({}, description="give platforms of your own, by name")
+    boats: tuple[BoatSettings, ...] = Field(min_length=1, max_length=64, description="give the list of boats")
+    signing: Signing | None = None
+    feed: Feed | None = None
+    limits: Limits = Limits()
+    log_dir: Path = Field(Path("logs"), description="give the folder of the logs")
