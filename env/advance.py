@@ -9,7 +9,7 @@ from steerclear.shield.jit import Array, kernel
 from . import rules as R
 from .arrays import Games, Rules
 from .collisions import check_collisions
-from .motion import move_boats
+from .motion import move_boats, place_boats
 
 CHUNK = 64
 """Games handled together, rule by rule."""
@@ -26,6 +26,19 @@ def first_unusable(commands: Array) -> int:
 
 
 @kernel
+def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
+    for b in range(first, last):
+        games.time_s[b] += rules.dt_s
+    R.check_bounds(rules, games, first, last)
+    R.check_grabs(rules, games, first, last)
+    R.check_tags(rules, games, first, last)
+    R.check_captures(rules, games, first, last)
+    R.check_untags(rules, games, first, last)
+    R.check_end(rules, games, first, last)
+    check_collisions(rules, games, first, last)
+
+
+@kernel
 def advance_games(rules: Rules, games: Games, commands: Array) -> None:
     """Move all boats under ``commands`` (B, n, 2), speed m/s and relative heading deg, and apply the rules.
 
@@ -37,12 +50,16 @@ def advance_games(rules: Rules, games: Games, commands: Array) -> None:
         last = min(first + CHUNK, n_games)
         R.recharge(rules, games, first, last)
         move_boats(rules, games, commands, first, last)
-        for b in range(first, last):
-            games.time_s[b] += rules.dt_s
-        R.check_bounds(rules, games, first, last)
-        R.check_grabs(rules, games, first, last)
-        R.check_tags(rules, games, first, last)
-        R.check_captures(rules, games, first, last)
-        R.check_untags(rules, games, first, last)
-        R.check_end(rules, games, first, last)
-        check_collisions(rules, games, first, last)
+        _after_the_move(rules, games, first, last)
+
+
+@kernel
+def follow_games(rules: Rules, games: Games, seen: Array) -> None:
+    """Apply the rules to boats that moved by themselves to ``seen`` (B, n, 4), see `motion.place_boats`."""
+    n_games = games.state.shape[0]
+    games.events[:] = 0
+    for first in range(0, n_games, CHUNK):
+        last = min(first + CHUNK, n_games)
+        R.recharge(rules, games, first, last)
+        place_boats(rules, games, seen, first, last)
+        _after_the_move(rules, games, first, last)

@@ -9,7 +9,7 @@ import numpy as np
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 
-from .advance import CHUNK, advance_games, first_unusable
+from .advance import CHUNK, advance_games, first_unusable, follow_games
 from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
@@ -19,9 +19,9 @@ from .observation_layout import observation_bounds, observation_keys
 from .observe import observe_games
 from .randomness import seed_states
 from .reward import reward_games
-from .starts import default_places, reset_games
+from .starts import default_places, reset_games, start_where_seen
 from .validation import check_count
-from .view import GameView, view_game
+from .view import GameView, restore_game, view_game
 
 CommandFilter = Callable[["BatchedMctf", Array], Array]
 """Stands between decision and motion: ``filter(core, commands (B, n, 2)) -> commands``; the shield's place."""
@@ -139,8 +139,7 @@ class BatchedMctf:
         Raises:
             GameError: no such game, or a state that the rules do not allow.
         """
-        if not 0 <= game < self.n_games:
-            raise GameError(f"there is no game {game}; games are 0..{self.n_games - 1}")
+        self._check_game(game)
         start_from(self.config, self.rules, self.games, game, self._places, init)
         return self.observe()
 
@@ -170,6 +169,41 @@ class BatchedMctf:
         given = self._checked("commands", commands)
         self._refuse("command", first_unusable(given))
         advance_games(self.rules, self.games, given)
+
+    def start_seen(self, seen: Array) -> None:
+        """Start all games with boats that something else moves, such as real ones, where they are.
+
+        Args:
+            seen: (B, n, 4) x m, y m, heading deg, speed m/s; a boat whose x is NaN is nowhere, and out of bounds.
+
+        Raises:
+            GameError: wrong shape, or a value that is neither finite nor of a boat that is nowhere.
+        """
+        start_where_seen(self.rules, self.games, self._checked_sight(seen))
+
+    def follow(self, seen: Array, dt_s: float) -> None:
+        """`advance` for boats that something else moved: the same rules in the same order, moving nothing.
+
+        Args:
+            seen: (B, n, 4) where the boats are now, as in `start_seen`.
+            dt_s: time since the last call, s, which cool-downs and the game's clock go on by.
+
+        Raises:
+            GameError: see `start_seen`, or ``dt_s`` is not a time.
+        """
+        given = self._checked_sight(seen)
+        if not 0.0 <= dt_s < np.inf:
+            raise GameError(f"dt_s is {dt_s}; give a finite time >= 0, in s")
+        follow_games(self.rules._replace(dt_s=float(dt_s)), self.games, given)
+
+    def restore(self, view: GameView, game: int = 0) -> None:
+        """Make a game stand as a view of it, or of another of the same size, says: the inverse of `view`.
+
+        Raises:
+            GameError: there is no such game, or the view has other boats.
+        """
+        self._check_game(game)
+        restore_game(self.rules, self.games, game, view)
 
     def step(
         self, actions: Array, command_filter: CommandFilter | None = None
@@ -208,6 +242,21 @@ class BatchedMctf:
         if array.shape != self._commands.shape:
             raise GameError(f"{name} have shape {array.shape}; give {self._commands.shape}: speed m/s, heading deg")
         return array
+
+    def _checked_sight(self, seen: Any) -> Array:
+        array = np.array(seen, dtype=np.float64, order="C")
+        wanted = (self.n_games, self.n_boats, 4)
+        if array.shape != wanted:
+            raise GameError(f"seen has shape {array.shape}; give {wanted}: x m, y m, heading deg, speed m/s")
+        nowhere = np.isnan(array[..., 0])
+        if not np.isfinite(array[~nowhere]).all():
+            raise GameError("seen holds a value that is not finite; give NaN as the x of a boat that is nowhere")
+        array[nowhere] = (np.nan, np.nan, 0.0, 0.0)
+        return array
+
+    def _check_game(self, game: int) -> None:
+        if not 0 <= game < self.n_games:
+            raise GameError(f"there is no game {game}; games are 0..{self.n_games - 1}")
 
     def _refuse(self, what: str, number: int) -> None:
         if number >= 0:

@@ -47,12 +47,18 @@ def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
 
 
 @kernel
-def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
-    """A boat that hit an obstacle goes back, turned round and stopped, and loses the flag; its autopilot remembers."""
-    state = games.state[b, i]
+def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
+    """What hitting an obstacle costs boat ``i``: the flag, and by the rules perhaps a tag."""
     if rules.tag_on_collision:
         games.is_tagged[b, i] = True
     drop_flag(rules, games, b, i)
+
+
+@kernel
+def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
+    """A boat that hit an obstacle goes back, turned round and stopped, and loses the flag; its autopilot remembers."""
+    state = games.state[b, i]
+    penalise_hit(rules, games, b, i)
     before = games.previous_position[b, i]
     x, y = state[L.X], state[L.Y]
     state[L.X], state[L.Y] = before[0], before[1]
@@ -116,3 +122,33 @@ def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: in
             if games.has_flag[b, i]:
                 games.flag_position[b, 1 - team, 0] = state[L.X]
                 games.flag_position[b, 1 - team, 1] = state[L.Y]
+
+
+@kernel
+def see_boat(state: Array, seen: Array) -> None:
+    """Put what is seen of a boat, ``seen`` (4,) x m, y m, heading deg, speed m/s, into its state row."""
+    state[L.X], state[L.Y] = seen[0], seen[1]
+    state[L.HEADING] = wrap_degrees(seen[2])
+    state[L.SPEED] = seen[3]
+
+
+@kernel
+def place_boats(rules: Rules, games: Games, seen: Array, first: int, last: int) -> None:
+    """`move_boats` for boats that something else moves: same order, same bookkeeping, but nothing is moved.
+
+    ``seen`` is (B, n, 4): x m, y m, heading deg, speed m/s, where the boats are now. A boat whose position is NaN
+    is nowhere: on no side and out of bounds.
+    """
+    has_obstacles = rules.obstacles.bounds.shape[0] > 0
+    for b in range(first, last):
+        for i in range(rules.n_boats):
+            state = games.state[b, i]
+            x, y = state[L.X], state[L.Y]
+            games.on_side[b, i] = is_on_side(rules.scrimmage, rules.side_sign[rules.team[i]], x, y)
+            if has_obstacles and touches_obstacle(rules.obstacles, x, y, rules.agent_radius[i]):
+                penalise_hit(rules, games, b, i)
+            games.previous_position[b, i, 0], games.previous_position[b, i, 1] = x, y
+            see_boat(state, seen[b, i])
+            if games.has_flag[b, i]:
+                games.flag_position[b, 1 - rules.team[i], 0] = state[L.X]
+                games.flag_position[b, 1 - rules.team[i], 1] = state[L.Y]

@@ -14,10 +14,10 @@ from .angles import heading_to
 from .arrays import Games, Rules
 from .config import GameConfig
 from .field import FieldGeometry, line_through_field
-from .motion import is_on_side
+from .motion import is_on_side, see_boat
 from .obstacles import closest_on_segment, touches_obstacle
 from .randomness import next_uniform
-from .rules import check_grabs, check_tags, check_untags
+from .rules import check_bounds, check_grabs, check_tags, check_untags
 
 MAX_TRIES = 20_000
 """Random places tried for one boat before the field counts as full."""
@@ -184,6 +184,17 @@ def settle(rules: Rules, games: Games, b: int) -> None:
     check_grabs(rules, games, b, b + 1)
     check_tags(rules, games, b, b + 1)
     check_untags(rules, games, b, b + 1)
+
+
+@kernel
+def start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
+    """Start every game with its boats where they are: ``seen`` (B, n, 4) as in `motion.place_boats`."""
+    for b in range(games.state.shape[0]):
+        clear_game(rules, games, b)
+        for i in range(rules.n_boats):
+            see_boat(games.state[b, i], seen[b, i])
+        check_bounds(rules, games, b, b + 1)
+        settle(rules, games, b)
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 
@@ -88,3 +89,19 @@ def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameVie
         truncated=bool(games.truncated[b]),
         **{name: np.copy(getattr(games, name)[b]) for name in _COPIED},
     )
+
+
+def restore_game(rules: Rules, games: Games, b: int, view: GameView) -> None:
+    """Make game ``b`` stand as a view says; what a view does not hold (random numbers, who touches whom) stays.
+
+    Raises:
+        GameError: an array of the view has another shape.
+    """
+    for name in _COPIED:
+        target, given = getattr(games, name)[b], np.asarray(getattr(view, name))
+        if given.shape != target.shape:
+            raise GameError(f"{name} of the view has shape {given.shape}; give {target.shape}, of the same game")
+    for name in _COPIED:
+        getattr(games, name)[b] = getattr(view, name)
+    games.time_s[b] = view.time_s
+    games.terminated[b], games.truncated[b] = view.terminated, view.truncated
