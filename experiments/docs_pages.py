@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +12,16 @@ from .bench.report import bench_tables
 from .comparison_page import STEM, write_comparison
 from .docs_plots import plot_off_on
 from .keys import KEYS
-from .markdown import MADE, table
+from .markdown import MADE, bars_table, table
 from .reach_show import tables_page
-from .tables import interval_text, number_text
+from .tables import interval_text
 from .tally import RADII_M, breach_column
-from .unsafe_sets import sets_page
+from .unsafe_sets_page import sets_page
 from .verdicts import HEADS, verdict_rows
 
-POOLED = ("encounters", "reach", "reach-compare")
-"""Commands whose results go into one page together."""
-
+Page = tuple[str, str, list[Path]]
+"""File name, text, and pictures written beside it."""
+SOURCES = "ablate, evaluate, bench, encounters or reach compare"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -29,48 +29,66 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
     """Write the pages that results give, and the page of JSON keys.
 
     Args:
-        results: contents of JSON files that ``ablate``, ``evaluate``, ``bench``, ``encounters`` or ``reach compare``
-            wrote; all those of ``encounters`` go into one comparison, of ``reach compare`` into one page; cards of
-            value tables are {"command": "reach", "card": JSON}.
+        results: contents of JSON files that the commands of `SOURCES` wrote; those of commands in `POOLED` go into one
+            page together. Cards of value tables are {"command": "reach", "card": JSON}.
         folder: where to.
 
     Returns:
         What was written.
 
     Raises:
-        ConfigError: results of another command, or the folder cannot be written to.
+        ConfigError: results of another command or cut short, or the folder cannot be written to.
     """
-    pages = {"json_keys.md": keys_page()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        pictures: list[Path] = []
-        encounters = [content for content in results if content.get("command") == "encounters"]
-        if encounters:
-            pages[f"{STEM}.md"], pictures = write_comparison(encounters, folder)
-        cards = [content["card"] for content in results if content.get("command") == "reach"]
-        if cards:
-            pages["table_cards.md"] = tables_page(cards)
-        sets = [content for content in results if content.get("command") == "reach-compare"]
-        if sets:
-            pages["unsafe_sets.md"] = sets_page(sets)
-        for content in (one for one in results if one.get("command") not in POOLED):
-            name, text, picture = _page_of(content, folder)
-            pages[name] = text
-            pictures += picture
+        pages, pictures = _pages_of(results, folder)
         for name, text in pages.items():
             (folder / name).write_text(text)
     except OSError as error:
         raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
+    except (KeyError, TypeError, AttributeError, IndexError) as error:  # content is whatever a file held
+        raise ConfigError(
+            f"results are cut short or of another version ({type(error).__name__}: {error}); make them again"
+        ) from error
     return [*(folder / name for name in pages), *pictures]
 
 
-def _page_of(content: Mapping[str, Any], folder: Path) -> tuple[str, str, list[Path]]:
+def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[str, str], list[Path]]:
+    """Text of each page by file name, and the pictures written."""
+    pages: dict[str, str] = {"json_keys.md": keys_page()}
+    pictures: list[Path] = []
+    for command, write in POOLED.items():
+        found = [content for content in results if content.get("command") == command]
+        if found:
+            name, text, picture = write(found, folder)
+            pages[name] = text
+            pictures += picture
+    for content in (one for one in results if one.get("command") not in POOLED):
+        name, text, picture = _page_of(content, folder)
+        pages[name] = text
+        pictures += picture
+    return pages, pictures
+
+
+def _encounters(found: Sequence[Mapping[str, Any]], folder: Path) -> Page:
+    text, pictures = write_comparison(found, folder)
+    return f"{STEM}.md", text, pictures
+
+
+POOLED: dict[str, Callable[[Sequence[Mapping[str, Any]], Path], Page]] = {
+    "encounters": _encounters,
+    "reach": lambda found, folder: ("table_cards.md", tables_page([content["card"] for content in found]), []),
+    "reach-compare": lambda found, folder: ("unsafe_sets.md", sets_page(found), []),
+}
+"""Commands whose results go into one page together, and what makes it."""
+
+
+def _page_of(content: Mapping[str, Any], folder: Path) -> Page:
     command = content.get("command")
     if command == "bench":
         return "bench.md", bench_page(content), []
     if command not in ("ablate", "evaluate"):
-        known = "ablate, evaluate, bench or encounters"
-        raise ConfigError(f"no page can be made of results of {command!r}; give results of {known}")
+        raise ConfigError(f"no page can be made of results of {command!r}; give results of {SOURCES}")
     stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
     plots = _plots(content, folder, stem) if command == "ablate" and content["pairings"] else []
     return f"{stem}.md", runs_page(content, plots), plots
@@ -98,7 +116,7 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
         if summary["reasons"]:
             lines += [_reasons_line(summary["reasons"]), ""]
     if content["bars"]:
-        lines += ["## Bars", "", *_bars_table(content["bars"]), ""]
+        lines += ["## Bars", "", *bars_table(content["bars"]), ""]
     return "\n".join(lines)
 
 
@@ -107,7 +125,7 @@ def bench_page(content: Mapping[str, Any]) -> str:
     lines = ["# Speed and memory", "", MADE, "", _machine_line(content), ""]
     for one in bench_tables(content):
         lines += [f"## {one.title}", "", *table(one.heads, one.rows), ""]
-    return "\n".join([*lines, "## Bars", "", *_bars_table(content["bars"]), ""])
+    return "\n".join([*lines, "## Bars", "", *bars_table(content["bars"]), ""])
 
 
 def keys_page() -> str:
@@ -149,15 +167,6 @@ def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
 
 def _verdicts(summary: Mapping[str, Any]) -> list[list[str]]:
     return verdict_rows(summary["verdicts"], interval_text)
-
-
-def _bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:
-    verdict = {True: "met", False: "**not met**", None: "no data"}
-    rows = [
-        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
-        for bar in bars
-    ]
-    return table(["", "measured", "bar", ""], rows)
 
 
 def _reasons_line(reasons: Mapping[str, int]) -> str:

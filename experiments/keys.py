@@ -198,15 +198,14 @@ ENCOUNTERS = {**_PROVENANCE, **_ENCOUNTERS, **{f"bars[].{k}": v for k, v in _BAR
 ATTACK = {**_PROVENANCE, **_ATTACK}
 
 SETS = {
-    "command": "reach-compare",
-    "own": "platform of the own boat",
-    "other": "platform of the opponent",
-    "radius_m": "separation radius, m",
+    **_PROVENANCE,
     "pairs[].own_mps": "own speed, m/s",
     "pairs[].other_mps": "the opponent's speed, m/s",
     "pairs[].heading_deg": "heading of the opponent relative to the own one, deg; 180 is head-on",
     "pairs[].shield_m2": "positions of the opponent at which the shield's certificate is negative, m^2",
-    "pairs[].reach_m2": "positions at which the value table is below the radius, m^2",
+    "pairs[].reach_m2": "positions at which the value table is below the radius, m^2, over the same cells",
+    "pairs[].missed_m2": "positions that the table calls lost and the shield calls safe, m^2",
+    **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}

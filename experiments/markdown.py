@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from .tables import number_text
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 
@@ -12,3 +14,13 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
     """Lines of a table: the first column words, the others numbers."""
     ruler = ["---", *("---:" for _ in heads[1:])]
     return [f"| {' | '.join(str(cell) for cell in row)} |" for row in (heads, ruler, *rows)]
+
+
+def bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Lines of the table of bars: what was measured, what is asked, whether it is met."""
+    verdict = {True: "met", False: "**not met**", None: "no data"}
+    rows = [
+        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
+        for bar in bars
+    ]
+    return table(["", "measured", "bar", ""], rows)

@@ -3,30 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES, area_m2
-from steerclear.shield.tables.files import ValueTable
+from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES
+from steerclear.shield.tables.files import ValueTable, stack_tables
+from steerclear.shield.tables.lookup import table_value
 from steerclear.shield.tables.margin import full_thrust_state
-
-from .markdown import MADE, table
 
 RANGES, BEARINGS = 200, 72
 RATIO_BAR = 1.15
-HEADS = ("own/other m/s", "relative heading", "shield, m²", "reachability, m²", "ratio")
+MISSED_PERCENT_BAR = 2.0
+"""Share of the reachability set the shield may call safe, %: what the table's rounding (2.4 cm) and grid leave open."""
+GIVEN = {
+    "separation_m": "both sets are of the radius given with --radius",
+    "buffer_m": "both sets are of the radius given with --radius, without buffer",
+    "position_error_m": "the value table takes positions as exact; widen both sets with --radius",
+    "delay_s": "the value table knows no delay; leave it out, or widen both sets with --radius",
+}
+"""Settings under which the two sets would answer different questions, and what to do instead."""
 
 
 @dataclass(frozen=True)
 class SetPair:
-    """Areas of both sets for one pair of speeds and one relative heading.
+    """Areas of both sets for one pair of speeds and one relative heading, over the same cells.
 
     Attributes:
         own_mps: own speed, m/s.
@@ -34,6 +42,8 @@ class SetPair:
         heading_deg: heading of the opponent relative to the own one, deg; 180 is head-on.
         shield_m2: positions of the opponent at which the shield's certificate is negative, m^2.
         reach_m2: positions at which the table's value is below the radius, m^2.
+        missed_m2: positions of the second kind and not of the first, m^2: the table calls them lost, the shield calls
+            them safe, and one of the two is wrong.
     """
 
     own_mps: float
@@ -41,11 +51,29 @@ class SetPair:
     heading_deg: float
     shield_m2: float
     reach_m2: float
+    missed_m2: float
 
     @property
     def ratio(self) -> float:
         """The shield's set by area, times the reachability set."""
         return self.shield_m2 / self.reach_m2
+
+    @property
+    def missed_percent(self) -> float:
+        """Share of the reachability set that the shield calls safe, %."""
+        return 100.0 * self.missed_m2 / self.reach_m2
+
+
+def sets_config(radius_m: float, settings: Mapping[str, Any]) -> ShieldConfig:
+    """Settings of the shield whose set is compared at a radius.
+
+    Raises:
+        ConfigError: one of `GIVEN`, or one that the shield refuses.
+    """
+    for name, remedy in GIVEN.items():
+        if name in settings:
+            raise ConfigError(f"{name} cannot be set here: {remedy}")
+    return ShieldConfig.of(separation_m=radius_m, buffer_m=0.0, **settings)
 
 
 def compare_sets(
@@ -55,41 +83,45 @@ def compare_sets(
 
     Args:
         values: worst-case table of the pair.
-        config: settings; the radius is its ``separation_m``, without buffer.
+        config: settings; both sets are of the radius it keeps, buffer and position error included.
         notice: called with pairs done and all.
     """
-    bare = replace(config, buffer_m=0.0)
     grid, found = values.card.make_grid(), []
-    places = [(a * grid.own_top_mps, b * grid.other_top_mps, h) for a, b in SPEED_SHARES for h in HEADINGS_DEG]
-    for own_mps, other_mps, heading_deg in places:
-        shield_m2 = shield_area_m2(values, bare, heading_deg, own_mps, other_mps)
-        reach_m2 = area_m2(values, config.separation_m, heading_deg, own_mps, other_mps)
-        found.append(SetPair(own_mps, other_mps, heading_deg, shield_m2, reach_m2))
+    places = [(h, a * grid.own_top_mps, b * grid.other_top_mps) for a, b in SPEED_SHARES for h in HEADINGS_DEG]
+    for place in places:
+        found.append(compare_pair(values, config, *place))
         if notice is not None:
             notice(len(found), len(places))
     return found
 
 
-def shield_area_m2(
+def compare_pair(
     values: ValueTable, config: ShieldConfig, heading_deg: float, own_mps: float, other_mps: float
-) -> float:
-    """Area, m^2, of the opponent's positions, up to the table's range, at which the certificate is negative."""
-    radius_m = config.separation_m
+) -> SetPair:
+    """Areas of both sets, up to the table's range, for one relative heading and pair of speeds."""
+    radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
     edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, RANGES + 1)
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    bearings = np.arange(BEARINGS) * (2.0 * math.pi / BEARINGS)
-    rho, beta = (axis.ravel() for axis in np.meshgrid(middles, bearings, indexing="ij"))
     names = values.card.own, values.card.other
     own = full_thrust_state(get_platform(names[0]), own_mps)
     other = full_thrust_state(get_platform(names[1]), other_mps, heading_deg)
+    state = _all_round(own, other, 0.5 * (edges[1:] + edges[:-1]))
+    ours, theirs = certificates_m(state, names, config) < 0.0, values_m(values, state) < radius_m
+    cells = np.repeat(0.5 * np.diff(edges**2) * (2.0 * math.pi / BEARINGS), BEARINGS)
+    disc, areas = math.pi * radius_m**2, [float(cells[lost].sum()) for lost in (ours, theirs, theirs & ~ours)]
+    return SetPair(own_mps, other_mps, heading_deg, disc + areas[0], disc + areas[1], areas[2])
+
+
+def _all_round(own: Array, other: Array, ranges_m: Array) -> Array:
+    """States (ranges x BEARINGS, 2, N_STATE) with the other boat at the ranges, on `BEARINGS` bearings each."""
+    bearings = np.arange(BEARINGS) * (2.0 * math.pi / BEARINGS)
+    rho, beta = (axis.ravel() for axis in np.meshgrid(ranges_m, bearings, indexing="ij"))
     state = np.tile(np.stack([own, other]), (rho.size, 1, 1))
     state[:, 1, L.X], state[:, 1, L.Y] = rho * np.sin(beta), rho * np.cos(beta)
-    lost = _certificate_m(state, names, config) < 0.0
-    cells = 0.5 * np.diff(edges**2) * (2.0 * math.pi / BEARINGS)
-    return math.pi * radius_m**2 + float((lost.reshape(RANGES, BEARINGS) * cells[:, None]).sum())
+    return state
 
 
-def _certificate_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
+def certificates_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
+    """The shield's certificate for the first boat of every state, m."""
     shield = BatchedShield(config, len(state), names, (0, 1))
     wanted = np.zeros((len(state), 2, 2))
     wanted[:, :, 0] = get_platform(names[0]).max_speed_mps
@@ -97,43 +129,9 @@ def _certificate_m(state: Array, names: tuple[str, str], config: ShieldConfig) -
     return np.asarray(shield.certificate_m[:, 0])
 
 
-def rows_of(pairs: Sequence[SetPair]) -> list[list[str]]:
-    """Rows under `HEADS`."""
-    return [
-        [
-            f"{pair.own_mps:g}/{pair.other_mps:g}",
-            f"{pair.heading_deg:g}°",
-            f"{pair.shield_m2:.1f}",
-            f"{pair.reach_m2:.1f}",
-            f"{pair.ratio:.2f}",
-        ]
-        for pair in pairs
-    ]
-
-
-def content_of(values: ValueTable, config: ShieldConfig, pairs: Sequence[SetPair]) -> dict[str, Any]:
-    """The comparison as JSON."""
-    return {
-        "command": "reach-compare",
-        "own": values.card.own,
-        "other": values.card.other,
-        "radius_m": config.separation_m,
-        "pairs": [asdict(pair) for pair in pairs],
-    }
-
-
-def sets_page(contents: Sequence[Mapping[str, Any]]) -> str:
-    """Write the page of the sets from contents of `content_of`."""
-    lines = ["# Sets that cannot be saved", "", MADE, ""]
-    lines += [
-        "Positions of an opponent from which the radius cannot be kept, by area: where the shield's certificate is"
-    ]
-    lines += ["negative, and where the worst-case value table is below the radius. Both boats at full thrust.", ""]
-    for content in contents:
-        pairs = [SetPair(**pair) for pair in content["pairs"]]
-        lines += [f"## {content['own']} meets {content['other']}, {content['radius_m']:g} m", ""]
-        lines += [*table(HEADS, rows_of(pairs)), ""]
-        worst = max(pair.ratio for pair in pairs)
-        met = sum(pair.ratio <= RATIO_BAR for pair in pairs)
-        lines += [f"Largest ratio {worst:.2f}; {met} of {len(pairs)} within {RATIO_BAR:g}.", ""]
-    return "\n".join(lines)
+def values_m(values: ValueTable, state: Array) -> Array:
+    """The table's value of every state, m."""
+    tables = stack_tables([values])
+    gap, heading = state[:, 1, : L.Y + 1] - state[:, 0, : L.Y + 1], np.radians(state[:, :, L.HEADING])
+    rows = np.column_stack([gap, heading, state[:, :, L.SPEED]])
+    return np.array([table_value(tables, 0, *row) for row in rows.tolist()])

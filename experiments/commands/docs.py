@@ -10,13 +10,12 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import read_table
 
-from ..docs_pages import write_pages
+from ..docs_pages import SOURCES, write_pages
 from ..results import NAMES
 from .console import command, out
 
-COMMANDS = "ablate, evaluate, bench or encounters"
 Sources = Annotated[
-    list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {COMMANDS}; value tables (.npz).")
+    list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {SOURCES}; value tables (.npz).")
 ]
 Folder = Annotated[Path, typer.Option("--out", help="Folder for the pages.")]
 
@@ -40,5 +39,5 @@ def _read(source: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot read results from {path} ({error}); give a results folder or a JSON file") from error
     if not isinstance(content, dict):
-        raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {COMMANDS}")
+        raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {SOURCES}")
     return content
