@@ -66,6 +66,12 @@ class FleetFile(FleetSettings):
         return {boat.name: platform_of(self, boat.platform) for boat in self.boats}
 
     @cached_property
+    def kind_of(self) -> Mapping[str, str | Platform]:
+        """Platform of each boat as fleets have it: its name, or the platform itself when the file describes it."""
+        kinds = {boat.name: boat.platform for boat in self.boats}
+        return {name: self.platform_of[name] if kind in self.platforms else kind for name, kind in kinds.items()}
+
+    @cached_property
     def team_of(self) -> Mapping[str, int]:
         """0 blue, 1 red, 2 outside the game, by boat's name: the first half of the agents is blue."""
         half = len(self.agent_ids) // 2

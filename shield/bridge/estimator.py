@@ -1,0 +1,196 @@
+"""Own boats: what the autopilot remembers is followed by running the boat's model on the commands sent.
+
+Telemetry says where a boat is, never what its controllers remember, and what they remember decides what the next
+command does. The model is stepped through the commands in effect and corrected by telemetry, measurement by
+measurement at the time each was true. As long as telemetry agrees with the model the row is the model's, bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..jit import Array
+from ..platforms import Platform, fresh_state, step_boat
+from ..platforms import layout as L
+from ..tracks import thrust_at
+from .link import BoatReading
+
+GAIN = 0.5
+"""Share of a difference that is corrected at once: a filter of about 0.15 s at 10 Hz."""
+
+ROUNDING = np.array([0.01, 0.01, 0.02, 0.01])
+"""Differences below this (m, m, deg, m/s) are what messages round off, and are left alone."""
+
+SURPRISE = np.array([1.5, 1.5, 25.0, 0.6])
+"""Differences beyond this (m, m, deg, m/s) say that the boat did not obey the model: it starts afresh there."""
+
+BOAT_TIMEOUT_S = 3.0
+"""A boat that hears nothing goes on with its last command for this long, then stops."""
+
+LONGEST_GAP_STEPS = 50
+"""Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
+
+_SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A boat of ours now.
+
+    Attributes:
+        row: (N_STATE,) state and autopilot memory.
+        age_s: since the oldest of what it rests on was measured, s.
+        spread_m: half the distance between where it is if it heard the last commands and if it did not, m.
+    """
+
+    row: Array
+    age_s: float
+    spread_m: float
+
+
+class Estimator:
+    """Follows one boat.
+
+    Args:
+        platform: the boat's.
+        dt_s: step of the loop and the model, s.
+        delay_s: from sending a command to its effect, s.
+    """
+
+    def __init__(self, platform: Platform, dt_s: float, delay_s: float) -> None:
+        self._params = platform.pack()
+        self._dt_s, self._delay_s = dt_s, delay_s
+        self._row: Array | None = None
+        self._deaf: Array | None = None
+        self._last_heard: tuple[float, float] | None = None
+        self._time_s = -math.inf
+        self._fixed_s = np.full(len(_SEEN), -math.inf)
+        self._commands: deque[tuple[float, float, float]] = deque(maxlen=64)
+        self._past: deque[tuple[float, Array]] = deque(maxlen=32)
+
+    @property
+    def known(self) -> bool:
+        """Whether there was ever a fix."""
+        return self._row is not None
+
+    def estimate(self, now_s: float) -> Estimate | None:
+        """The boat at the time of the last `advance`; None before the first fix."""
+        if self._row is None or self._deaf is None:
+            return None
+        apart = self._deaf[: L.Y + 1] - self._row[: L.Y + 1]
+        return Estimate(self._row.copy(), now_s - float(self._fixed_s.min()), 0.5 * float(np.hypot(*apart)))
+
+    def sent(self, tick_s: float, heading_rad: float, speed_mps: float) -> None:
+        """Note a command that left at the tick of that time."""
+        self._commands.append((tick_s, speed_mps, heading_rad))
+
+    def advance(self, now_s: float) -> None:
+        """Run the model on to ``now_s``, in whole steps."""
+        if self._row is None or self._deaf is None:
+            return
+        steps = round((now_s - self._time_s) / self._dt_s)
+        for _ in range(min(steps, LONGEST_GAP_STEPS)):
+            self._step(self._row, self._in_effect(self._time_s))
+            self._step(self._deaf, self._unheard(self._time_s))
+            self._time_s += self._dt_s
+        if steps > 0 or now_s < self._time_s:
+            self._time_s = now_s
+        self._past.append((now_s, self._row[_SEEN]))
+
+    def correct(self, reading: BoatReading) -> None:
+        """Take a reading, already found sensible, whose fields are all there."""
+        measured = _measured(reading)
+        fixed_s = _times(reading)
+        if self._row is None:
+            self.start(reading)
+            return
+        fresh = fixed_s > self._fixed_s + 1e-6
+        difference = self._difference(measured, fixed_s)
+        difference[~fresh] = 0.0
+        if (np.abs(difference) > SURPRISE).any():
+            self.start(reading)
+            return
+        difference[np.abs(difference) <= ROUNDING] = 0.0
+        if difference.any():
+            self._shift(GAIN * difference)
+        self._fixed_s = np.maximum(self._fixed_s, fixed_s)
+        self._deaf, self._last_heard = self._row.copy(), self._in_effect(self._time_s)
+
+    def start(self, reading: BoatReading) -> None:
+        """Begin afresh where the reading says: the boat is taken to hold its course and speed."""
+        x, y, heading_deg, speed = _run_on(_measured(reading), reading.read_s - _times(reading))
+        row = fresh_state(x, y, heading_deg, speed)
+        row[L.THRUST] = thrust_at(self._params, speed)
+        self._row, self._deaf = row, row.copy()
+        self._fixed_s, self._time_s = _times(reading), reading.read_s
+        self._last_heard = self._in_effect(self._time_s)
+        self._past.clear()
+        self._past.append((reading.read_s, row[_SEEN]))
+
+    def _step(self, row: Array, command: tuple[float, float] | None) -> None:
+        if command is None:
+            way = row[L.SPEED] * self._dt_s
+            row[L.X] += way * math.sin(math.radians(row[L.HEADING]))
+            row[L.Y] += way * math.cos(math.radians(row[L.HEADING]))
+            return
+        error = (command[1] - row[L.HEADING] + 180.0) % 360.0 - 180.0
+        step_boat(self._params, row, command[0], error, self._dt_s)
+
+    def _in_effect(self, time_s: float) -> tuple[float, float] | None:
+        """Speed, m/s, and heading, deg, of the command that works in the step after ``time_s``."""
+        for sent_s, speed, heading in reversed(self._commands):
+            if sent_s + self._delay_s <= time_s + 0.5 * self._dt_s:
+                return speed, float(np.degrees(heading))
+        return None
+
+    def _unheard(self, time_s: float) -> tuple[float, float] | None:
+        """The command in effect if the boat heard nothing since its last fix."""
+        silent = time_s - float(self._fixed_s.min())
+        if silent <= BOAT_TIMEOUT_S or self._last_heard is None:
+            return self._last_heard
+        return 0.0, self._last_heard[1]
+
+    def _difference(self, measured: Array, fixed_s: Array) -> Array:
+        """Measured less believed, each at the time it was measured."""
+        times = np.array([time for time, _ in self._past])
+        rows = np.array([row for _, row in self._past])
+        difference = np.zeros(len(_SEEN))
+        for k in range(len(_SEEN)):
+            column = np.unwrap(rows[:, k], period=360.0) if k == 2 else rows[:, k]
+            difference[k] = measured[k] - np.interp(fixed_s[k], times, column)
+        difference[2] = (difference[2] + 180.0) % 360.0 - 180.0
+        return difference
+
+    def _shift(self, by: Array) -> None:
+        """Correct the row, what led up to it, and the errors the controllers saw: they saw the true ones."""
+        row = self._row
+        if row is None:
+            return
+        row[_SEEN] += by
+        row[L.HEADING] = (row[L.HEADING] + 180.0) % 360.0 - 180.0
+        row[L.HEADING_ERROR] -= by[2]
+        row[L.SPEED_ERROR] -= by[3]
+        for _, past in self._past:
+            past += by
+
+
+def _measured(reading: BoatReading) -> Array:
+    """X m, y m, heading deg in [-180, 180), speed m/s."""
+    heading_deg = (math.degrees(reading.heading_rad) + 180.0) % 360.0 - 180.0
+    return np.array([*reading.position_m, heading_deg, reading.speed_mps])
+
+
+def _times(reading: BoatReading) -> Array:
+    """When each of them was true, s."""
+    ages = (reading.position_age_s, reading.position_age_s, reading.heading_age_s, reading.velocity_age_s)
+    return reading.read_s - np.array(ages)
+
+
+def _run_on(seen: Array, age_s: Array) -> Array:
+    """The boat's values, run straight on by the age of its position."""
+    way, heading = seen[3] * age_s[0], math.radians(seen[2])
+    return seen + np.array([way * math.sin(heading), way * math.cos(heading), 0.0, 0.0])

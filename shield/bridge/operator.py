@@ -1,0 +1,137 @@
+"""The person in charge: STOP ALL, and overrides that are logged, end by themselves and say what they disable."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from dataclasses import dataclass
+
+from ..exceptions import ConfigError
+from .tick import Action
+
+LOG = logging.getLogger(__name__)
+
+LONGEST_OVERRIDE_S = 600.0
+"""No override lasts longer; it can be given again."""
+
+DISABLES = {
+    "contact": "the response to an old or lost contact; once it is lost, boats no longer keep clear of it",
+    "policy": "the response to an old or unusable policy; the boat stands by with no speed instead",
+    "game": "the response to an old state of the game; the policy goes on with what it last saw",
+    "geofence": "the response to leaving the geofence; the shield still turns boats back at the edge",
+    "log": "the response to a black box that cannot be written; what follows is not recorded",
+    "commander": "the response to a second commander; both steer the boat",
+}
+"""What can be overridden, and what that switches off. The shield itself, own navigation and lost links cannot be."""
+
+
+@dataclass(frozen=True)
+class Override:
+    """A declared response switched off for a while.
+
+    Attributes:
+        condition: one of `DISABLES`.
+        subject: boat or contact it is about; empty: all.
+        until_s: time it ends, s on the loop's clock.
+        by: who asked for it.
+    """
+
+    condition: str
+    subject: str
+    until_s: float
+    by: str
+
+    def covers(self, condition: str, subject: str) -> bool:
+        """Whether it switches this response off."""
+        return self.condition == condition and self.subject in ("", subject)
+
+
+class Operator:
+    """What the operator asked for; safe to call from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._overrides: tuple[Override, ...] = ()
+        self._stopped = ""
+        self._ended = ""
+
+    @property
+    def stopped(self) -> str:
+        """Why all boats are told to stop; empty: they are not."""
+        return self._stopped
+
+    @property
+    def ended(self) -> str:
+        """Why the run is to end; empty: it goes on."""
+        return self._ended
+
+    def stop_all(self, by: str = "operator") -> None:
+        """Tell all boats to stop, at every tick, until `resume`."""
+        with self._lock:
+            self._stopped = by
+        LOG.warning("STOP ALL by %s", by)
+
+    def resume(self, by: str = "operator") -> None:
+        """Take STOP ALL back."""
+        with self._lock:
+            self._stopped = ""
+        LOG.warning("STOP ALL taken back by %s", by)
+
+    def end(self, by: str = "operator") -> None:
+        """End the run: boats are left stopped."""
+        with self._lock:
+            self._ended = by
+        LOG.warning("end of the run asked for by %s", by)
+
+    def override(self, condition: str, subject: str, seconds: float, now_s: float, by: str = "operator") -> Override:
+        """Switch a declared response off for a while.
+
+        Args:
+            condition: one of `DISABLES`.
+            subject: boat or contact; empty: all.
+            seconds: for how long, at most `LONGEST_OVERRIDE_S`.
+            now_s: the loop's clock.
+            by: who asks.
+
+        Raises:
+            ConfigError: it cannot be overridden, or not for so long.
+        """
+        if condition not in DISABLES:
+            raise ConfigError(f"{condition!r} cannot be overridden; choose one of {', '.join(DISABLES)}")
+        if not 0.0 < seconds <= LONGEST_OVERRIDE_S:
+            raise ConfigError(f"an override of {seconds} s; give more than 0 and at most {LONGEST_OVERRIDE_S:g} s")
+        made = Override(condition, subject, now_s + seconds, by)
+        with self._lock:
+            kept = [entry for entry in self._overrides if (entry.condition, entry.subject) != (condition, subject)]
+            self._overrides = (*kept, made)
+        LOG.warning("override of %s for %g s by %s: disables %s", self._name(made), seconds, by, DISABLES[condition])
+        return made
+
+    def active(self, now_s: float) -> tuple[Override, ...]:
+        """Overrides in force; those that ended are logged and dropped."""
+        with self._lock:
+            ended = [entry for entry in self._overrides if entry.until_s <= now_s]
+            if ended:
+                self._overrides = tuple(entry for entry in self._overrides if entry.until_s > now_s)
+        for entry in ended:
+            LOG.warning("override of %s ended", self._name(entry))
+        return self._overrides
+
+    def actions(self, now_s: float) -> tuple[Action, ...]:
+        """What is in force, for the record and the display."""
+        stop = [Action("all", "stop_all", "stop", f"STOP ALL by {self._stopped}")] if self._stopped else []
+        overrides = [
+            Action(
+                entry.subject or "all",
+                "override",
+                entry.condition,
+                f"override of {self._name(entry)} for {entry.until_s - now_s:.0f} s more: disables "
+                f"{DISABLES[entry.condition]}",
+            )
+            for entry in self.active(now_s)
+        ]
+        return (*stop, *overrides)
+
+    @staticmethod
+    def _name(entry: Override) -> str:
+        return f"{entry.condition} {entry.subject}".strip()

@@ -1,0 +1,88 @@
+"""Whether a fix can be true: finite, of a boat's size of values, and reachable from the last one.
+
+A jump is refused at first. A boat that keeps saying the same new place is believed in the end: receivers do settle on
+a better fix, and a track that never comes back would be worse.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+FARTHEST_M = 1e5
+"""Positions farther from the field's corner than this are faults."""
+
+SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
+"""Speeds beyond this share of the platform's top plus this much are faults: current and wind give less."""
+
+JUMP_M = 3.0
+"""Differences from where the boat must be that no receiver's noise explains, m."""
+
+BELIEVED_AFTER_S = 2.0
+"""A new place told consistently for this long is believed, s."""
+
+
+@dataclass(frozen=True)
+class Fix:
+    """Where a boat was: position m, speed m/s, heading rad, and when, s."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_mps: float
+    fixed_s: float
+
+    def after(self, time_s: float) -> tuple[float, float]:
+        """Position at another time on the same course, m."""
+        way = self.speed_mps * (time_s - self.fixed_s)
+        return self.x_m + way * math.sin(self.heading_rad), self.y_m + way * math.cos(self.heading_rad)
+
+
+class Gate:
+    """Lets fixes of one boat through, or says why not.
+
+    Args:
+        fastest_mps: top speed of its platform, m/s.
+    """
+
+    def __init__(self, fastest_mps: float) -> None:
+        self._fastest = SPEED_SHARE * fastest_mps + SPEED_MORE_MPS
+        self._last: Fix | None = None
+        self._doubted: Fix | None = None
+        self._doubted_since_s = 0.0
+
+    def refuse(self, fix: Fix) -> str:
+        """Why this fix is not taken; empty: it is taken."""
+        text = self._impossible(fix)
+        if text:
+            return text
+        if self._last is None or self._near(self._last, fix):
+            self._last, self._doubted = fix, None
+            return ""
+        return self._doubt(fix, self._last)
+
+    def _impossible(self, fix: Fix) -> str:
+        values = (fix.x_m, fix.y_m, fix.heading_rad, fix.speed_mps, fix.fixed_s)
+        if not all(math.isfinite(value) for value in values):
+            return "a value is not finite"
+        if math.hypot(fix.x_m, fix.y_m) > FARTHEST_M:
+            return f"position ({fix.x_m:.0f}, {fix.y_m:.0f}) m is nowhere near the field"
+        if abs(fix.speed_mps) > self._fastest:
+            return f"speed {fix.speed_mps:.1f} m/s is beyond the boat"
+        return ""
+
+    def _near(self, before: Fix, fix: Fix) -> bool:
+        """Whether the boat can have come from there, whatever it did on the way."""
+        seconds = abs(fix.fixed_s - before.fixed_s)
+        x, y = before.after(fix.fixed_s)
+        return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M + 2.0 * self._fastest * min(seconds, 60.0)
+
+    def _doubt(self, fix: Fix, last: Fix) -> str:
+        if self._doubted is None or not self._near(self._doubted, fix):
+            self._doubted_since_s = fix.fixed_s
+        self._doubted = fix
+        if fix.fixed_s - self._doubted_since_s >= BELIEVED_AFTER_S:
+            self._last, self._doubted = fix, None
+            return ""
+        x, y = last.after(fix.fixed_s)
+        return f"position jumped {math.hypot(fix.x_m - x, fix.y_m - y):.0f} m"

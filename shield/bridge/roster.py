@@ -1,0 +1,169 @@
+"""What is known of every boat of the file now: own boats from telemetry and model, others from contacts."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from ..jit import Array
+from ..platforms import fresh_state
+from ..platforms import layout as L
+from .contact import Contact
+from .estimator import Estimator
+from .fleet_file import FleetFile
+from .link import NEVER_S, BoatReading, Sent
+from .plausible import Fix, Gate
+
+LOG = logging.getLogger(__name__)
+
+EARLY_S = 0.1
+"""Contacts fixed later than now by more than this are faults of a clock."""
+
+TALK_EVERY_S = 5.0
+"""The same fault of the same boat is logged again after this long."""
+
+MOST_TOLD = 256
+"""Faults remembered for that, at most: names on the feed are anybody's."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One boat now.
+
+    Attributes:
+        row: (N_STATE,) state; NaN memory where unknown.
+        ahead_s: time since the row was true, s: 0 for own boats, whose model is run on to now.
+        age_s: time since the oldest measurement it rests on, s.
+        error_m: bound on its position, without what age adds, m.
+    """
+
+    row: Array
+    ahead_s: float
+    age_s: float
+    error_m: float
+
+
+class Roster:
+    """Keeps the tracks of all boats of a file.
+
+    Args:
+        fleet: the file.
+        commanded: names of the boats this process commands.
+    """
+
+    def __init__(self, fleet: FleetFile, commanded: Iterable[str]) -> None:
+        config = fleet.shield_config
+        self.fleet = fleet
+        self.commanded = tuple(commanded)
+        self._estimators = {
+            name: Estimator(fleet.platform_of[name], config.dt_s, config.delay_s) for name in self.commanded
+        }
+        self._own_gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in self.commanded}
+        self._gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in fleet.names}
+        self._contacts: dict[str, Contact] = {}
+        self._faults: dict[str, str] = {}
+        self._told_s: dict[tuple[str, str], float] = {}
+        self._now_s = -math.inf
+
+    @property
+    def faults(self) -> Mapping[str, str]:
+        """Why the latest fix of a boat was refused, by name."""
+        return self._faults
+
+    def update(self, now_s: float, readings: Mapping[str, BoatReading], contacts: Iterable[Contact]) -> None:
+        """Take what came in, and run own boats on to now."""
+        self._now_s = now_s
+        self._faults = {}
+        for name, estimator in self._estimators.items():
+            estimator.advance(now_s)
+            if name in readings:
+                self._take_reading(name, readings[name], estimator)
+        for contact in contacts:
+            self._take_contact(contact)
+
+    def sent(self, tick_s: float, sent: Mapping[str, Sent]) -> None:
+        """Note what left at the tick of that time."""
+        for name, message in sent.items():
+            if message.delivered and math.isfinite(message.heading_rad) and math.isfinite(message.speed_mps):
+                self._estimators[name].sent(tick_s, message.heading_rad, message.speed_mps)
+
+    def track(self, name: str) -> Track | None:
+        """The boat now; None: never seen."""
+        own = self._own_track(name)
+        if own is None or own.age_s > self.fleet.limits.navigation.lost_after_s:
+            seen = self._contact_track(name)
+            if own is None or (seen is not None and seen.age_s < own.age_s):
+                return seen
+        return own
+
+    def navigation_age_s(self, name: str) -> float:
+        """Age of what is known of an own boat by its own telemetry, s; inf: nothing yet."""
+        own = self._own_track(name)
+        return NEVER_S if own is None else own.age_s
+
+    def contact_age_s(self, name: str) -> float:
+        """Age of what is known of another boat, s; inf: nothing yet."""
+        seen = self._contact_track(name)
+        return NEVER_S if seen is None else seen.age_s
+
+    def _own_track(self, name: str) -> Track | None:
+        estimator = self._estimators.get(name)
+        estimate = None if estimator is None else estimator.estimate(self._now_s)
+        if estimate is None:
+            return None
+        error = self.fleet.shield_config.position_error_m
+        stale = estimate.age_s > self.fleet.limits.navigation.max_age_s
+        return Track(estimate.row, 0.0, estimate.age_s, error + estimate.spread_m * stale)
+
+    def _contact_track(self, name: str) -> Track | None:
+        contact = self._contacts.get(name)
+        if contact is None:
+            return None
+        row = fresh_state(*contact.position_m, math.degrees(contact.heading_rad), contact.speed_mps)
+        row[L.HEADING] = (row[L.HEADING] + 180.0) % 360.0 - 180.0
+        row[L.THRUST] = math.nan
+        age = max(0.0, self._now_s - contact.fixed_s)
+        return Track(row, age, age, max(contact.error_m, self.fleet.shield_config.position_error_m))
+
+    def _take_reading(self, name: str, reading: BoatReading, estimator: Estimator) -> None:
+        if not math.isfinite(reading.age_s):
+            return  # something was never received: no fix
+        fix = Fix(*reading.position_m, reading.heading_rad, reading.speed_mps, reading.read_s - reading.position_age_s)
+        text = self._own_gates[name].refuse(fix)
+        if text:
+            self._note(name, text)
+        else:
+            estimator.correct(reading)
+
+    def _take_contact(self, contact: Contact) -> None:
+        name = contact.boat
+        if name not in self._gates:
+            self._note(name, "is not in the fleet file: add it, so that boats keep clear of it")
+            return
+        known = self._contacts.get(name)
+        if known is not None and contact.fixed_s <= known.fixed_s:
+            return  # the same fix, or one that came late
+        if not 0.0 <= contact.error_m < math.inf:
+            self._note(name, f"error {contact.error_m} m is no bound")
+            return
+        if contact.fixed_s > self._now_s + EARLY_S:
+            self._note(name, f"fixed {contact.fixed_s - self._now_s:.1f} s in the future")
+            return
+        text = self._gates[name].refuse(
+            Fix(*contact.position_m, contact.heading_rad, contact.speed_mps, contact.fixed_s)
+        )
+        if text:
+            self._note(name, text)
+        else:
+            self._contacts[name] = replace(contact, fixed_s=min(contact.fixed_s, self._now_s))
+
+    def _note(self, name: str, text: str) -> None:
+        self._faults[name] = text
+        kind = (name, text.split()[0])
+        if len(self._told_s) > MOST_TOLD:
+            self._told_s.clear()
+        if self._now_s - self._told_s.get(kind, -math.inf) >= TALK_EVERY_S:
+            self._told_s[kind] = self._now_s
+            LOG.warning("%s: fix refused: %s", name, text)
