@@ -1,1 +1,6 @@
-"""Simulated boats behind real MAVLink sockets: our dynamics, an autopilot that behaves as the real one measured."""
+"""Boats without boats: simulated hulls behind real MAVLink sockets."""
+
+from .fleet import SimFleet
+from .settings import LATER_FIRMWARE, AutopilotSettings, Firmware, RadioSettings, SimBoat, Water
+
+__all__ = ["LATER_FIRMWARE", "AutopilotSettings", "Firmware", "RadioSettings", "SimBoat", "SimFleet", "Water"]

@@ -1,0 +1,120 @@
+"""One simulated boat: hull, sensors, autopilot and both directions of its radio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.platforms import get_platform
+
+from .autopilot import Autopilot
+from .faults import Faults
+from .helmsman import Helmsman
+from .hull import Hull
+from .orders import Order
+from .radio import Radio
+from .sensing import Sensors
+from .settings import AutopilotSettings, RadioSettings, SimBoat
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all boats of a fleet share.
+
+    Attributes:
+        frame: where the field is.
+        autopilot: how autopilots behave.
+        radio: what the radio does.
+        noise: of the sensors: 0 none, 1 as measured.
+        key: signing key; None: unsigned.
+    """
+
+    frame: FieldFrame
+    autopilot: AutopilotSettings
+    radio: RadioSettings
+    noise: float = 0.0
+    key: bytes | None = None
+
+
+class Boat:
+    """One boat.
+
+    Args:
+        spec: who it is.
+        start: x m, y m, heading deg.
+        system_id: of its autopilot.
+        setting: what all boats share.
+        seed: of its random numbers.
+        write: takes the packets that reach the commander.
+    """
+
+    def __init__(
+        self,
+        spec: SimBoat,
+        start: tuple[float, float, float],
+        system_id: int,
+        setting: Setting,
+        seed: np.random.SeedSequence,
+        write: Callable[[bytes], None],
+    ) -> None:
+        seeds = [np.random.default_rng(child) for child in seed.spawn(4)]
+        platform = get_platform(spec.platform)
+        self.spec = spec
+        self.system_id = system_id
+        self.hull = Hull.at(platform, *start, setting.autopilot.brake_mps2)
+        self.helmsman = Helmsman(self.hull)
+        self.down, self.up = Radio(setting.radio, seeds[0]), Radio(setting.radio, seeds[1])
+        self._sensors = Sensors(setting.frame, setting.noise, seeds[2])
+        self._write = write
+        seen = self._sensors.sense(self.hull, 0.0)
+        settings = _with_top_speed(setting.autopilot, platform.max_speed_mps)
+        self.autopilot = Autopilot(system_id, settings, setting.frame, seen, self._transmit, setting.key)
+        self.faults = Faults(self.autopilot, self.down, self.up, setting.frame, seeds[3])
+        self.order: Order = self.autopilot.vehicle.order()
+        self.seen = seen
+
+    def step(self, time_s: float, order: Order | None = None) -> None:
+        """Move by one step, to ``time_s``, as its autopilot orders or as given."""
+        self.order = self.autopilot.vehicle.order() if order is None else order
+        self.helmsman.step(self.order)
+        self.seen = self._sensors.sense(self.hull, time_s)
+
+    def tick(self, now_s: float) -> None:
+        """Let the autopilot look at its clocks and send, and the radio deliver."""
+        self.faults.tick(now_s)
+        for packet in self.up.take(now_s):
+            self.autopilot.receive(packet, now_s)
+        if self.autopilot.reboot_wanted:
+            self.restart(now_s)
+        if not self.faults.is_dark:
+            self.autopilot.snapshot = self.faults.sensed(self.seen, now_s)
+            self.autopilot.tick(now_s)
+        self.deliver(now_s)
+
+    def hear(self, packet: bytes, now_s: float) -> None:
+        """A packet leaves for this boat."""
+        self.up.put(packet, now_s)
+        for arrived in self.up.take(now_s):
+            self.autopilot.receive(arrived, now_s)
+        self.deliver(now_s)
+
+    def deliver(self, now_s: float) -> None:
+        """Hand over what has crossed the radio."""
+        for packet in self.down.take(now_s):
+            self._write(packet)
+
+    def restart(self, now_s: float) -> None:
+        """The autopilot boots anew; the boat runs on without motors."""
+        self.hull.forget()
+        self.autopilot.boot(now_s)
+
+    def _transmit(self, packet: bytes) -> None:
+        self.down.put(packet, self.autopilot.now_s)
+
+
+def _with_top_speed(settings: AutopilotSettings, top_mps: float) -> AutopilotSettings:
+    """Settings whose WP_SPEED is the platform's top speed, unless it is given."""
+    parameters = {"WP_SPEED": top_mps, "CRUISE_SPEED": top_mps} | dict(settings.parameters)
+    return AutopilotSettings(**{**vars(settings), "parameters": parameters})
