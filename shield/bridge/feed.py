@@ -1,0 +1,231 @@
+"""`FeedReceiver` hears positions and the state of the game over UDP; `FeedSender` sends them.
+
+What is in a packet: `feed_packets`; which packets count: `feed_order`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+from types import TracebackType
+from typing import Self
+
+from ..exceptions import FeedError
+from .clock import Clock
+from .contact import Contact
+from .feed_order import Budget, Order
+from .feed_packets import MAX_BYTES, BoatStatus, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
+from .feed_sender import FeedSender
+from .feed_sockets import hearing_socket, is_among, network_of, socket_address
+from .frame import FieldFrame
+
+__all__ = [
+    "BoatStatus",
+    "FeedReceiver",
+    "FeedSender",
+    "Fix",
+    "FlagStatus",
+    "GameState",
+    "Packet",
+    "game_state",
+    "parse_packet",
+    "socket_address",
+]
+
+logger = logging.getLogger(__name__)
+
+PACKETS_PER_S = 1000.0
+"""Packets read a second; when more come the rest is thrown away, so that a flood takes no time from the loop."""
+FAR_M = 20_000.0
+"""A boat further from the field than this is an error of the sender."""
+_PAUSE_S = 0.02
+MAX_CONTACTS = 256
+
+
+class FeedReceiver:
+    """Hears the feed on a socket of its own, in a thread of its own. A `ContactSource`; a context manager.
+
+    The age of a fix is counted on our clock from its receipt, plus the age its sender declared: senders' clocks are
+    never trusted. Packets that are malformed, old, repeated, too long, from hosts not allowed, or more than can be read
+    are dropped and counted in `faults`.
+
+    Args:
+        listen: HOST:PORT to hear at; port 0 takes a free one, see ``address``.
+        frame: the field's frame.
+        clock: clock of all times here.
+        allow: hosts (addresses or networks) packets are taken from.
+        boats: names that fixes are taken of; None takes all.
+
+    Raises:
+        BridgeError: the address cannot be heard at.
+        ConfigError: ``listen`` or ``allow`` is no address.
+    """
+
+    def __init__(
+        self,
+        listen: str,
+        frame: FieldFrame,
+        clock: Clock,
+        allow: Iterable[str] = ("127.0.0.1",),
+        boats: Collection[str] | None = None,
+    ) -> None:
+        self._frame = frame
+        self._clock = clock
+        self._boats = None if boats is None else frozenset(boats)
+        self._allowed = tuple(network_of(host) for host in allow)
+        self._lock = threading.Lock()
+        self._contacts: dict[str, Contact] = {}
+        self._game: GameState | None = None
+        self._game_s = -math.inf
+        self._faults: Counter[str] = Counter()
+        self._texts: dict[str, str] = {}
+        self._order = Order()
+        self._budget = Budget(PACKETS_PER_S)
+        self._closing = threading.Event()
+        self._socket = hearing_socket(listen)
+        host, port = self._socket.getsockname()[:2]
+        self.address = f"{host}:{port}"
+        """HOST:PORT heard at."""
+        self._thread = threading.Thread(target=self._hear, name="feed", daemon=True)
+        self._thread.start()
+
+    def read(self) -> Sequence[Contact]:
+        """The latest contact of each boat ever heard of."""
+        with self._lock:
+            return tuple(self._contacts.values())
+
+    def game(self) -> GameState | None:
+        """The latest state of the game; None: none yet."""
+        with self._lock:
+            return self._game
+
+    def game_age_s(self) -> float:
+        """Time since it was received, s; inf: none yet."""
+        with self._lock:
+            return self._clock.now_s() - self._game_s
+
+    def faults(self) -> dict[str, int]:
+        """How many packets, fixes or boats were refused so far, by kind."""
+        with self._lock:
+            return dict(self._faults)
+
+    def fault_texts(self) -> dict[str, str]:
+        """The last explanation of each kind of fault."""
+        with self._lock:
+            return dict(self._texts)
+
+    def take(self, data: bytes, host: str) -> None:
+        """Take one datagram as if it had come from ``host``; never raises on what is in it."""
+        now_s = self._clock.now_s()
+        if not is_among(host, self._allowed):
+            self._refuse("foreign", f"packet from {host}, which feed.allow does not name")
+            return
+        try:
+            packet = parse_packet(data)
+        except FeedError as error:
+            self._refuse("malformed", f"{host}: {error}")
+            return
+        problem = self._order.problem(packet, now_s)
+        if problem is not None:
+            self._refuse(*problem)
+            return
+        for text in packet.refused:
+            self._refuse("fix", f"{packet.sender}: {text}")
+        if packet.game is not None:
+            self._take_game(packet.game, packet.sender, now_s)
+        for fix in packet.fixes:
+            self._take_fix(fix, packet.sender, now_s)
+
+    def close(self) -> None:
+        """Give the socket back; may be called again."""
+        self._closing.set()
+        with contextlib.suppress(OSError):  # wakes the thread where the system can; else its wait ends soon by itself
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._thread.join(timeout=2.0)
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _hear(self) -> None:
+        while not self._closing.is_set():
+            try:
+                data, source = self._socket.recvfrom(MAX_BYTES + 1)
+            except TimeoutError:
+                continue
+            except OSError as error:  # the network went away; the ages of what was heard tell
+                self._refuse("socket", str(error))
+                self._closing.wait(_PAUSE_S)
+                continue
+            if self._closing.is_set():
+                return
+            if self._budget.take(time.monotonic()):
+                self.take(data, str(source[0]))
+            else:
+                self._drop_flood()
+
+    def _drop_flood(self) -> None:
+        """Rest, then throw away what has come meanwhile: read later it would seem younger than it is."""
+        self._closing.wait(_PAUSE_S)
+        dropped = 1
+        self._socket.setblocking(False)
+        try:
+            for _ in range(2000):
+                self._socket.recv(1)
+                dropped += 1
+        except OSError:
+            pass
+        finally:
+            self._socket.settimeout(0.2)
+        self._refuse("flood", f"more than {PACKETS_PER_S:g} packets a second", dropped)
+
+    def _take_game(self, game: GameState, sender: str, now_s: float) -> None:
+        if self._boats is not None and not self._boats >= set(game.boats):
+            strangers = ", ".join(sorted(set(game.boats) - self._boats))
+            self._refuse("unknown boat", f"{sender}: the game has {strangers}, not of this fleet")
+            return
+        with self._lock:
+            self._game, self._game_s = game, now_s
+
+    def _take_fix(self, fix: Fix, sender: str, now_s: float) -> None:
+        known_names = self._boats if self._boats is not None or len(self._contacts) < MAX_CONTACTS else self._contacts
+        if known_names is not None and fix.boat not in known_names:
+            self._refuse("unknown boat", f"{sender}: boat {fix.boat} is not of this fleet")
+            return
+        x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
+        if not math.hypot(x_m, y_m) <= FAR_M:
+            self._refuse("fix", f"{sender}: {fix.boat} is {math.hypot(x_m, y_m) / 1e3:.0f} km from the field")
+            return
+        contact = Contact(
+            boat=fix.boat,
+            position_m=(x_m, y_m),
+            heading_rad=self._frame.heading_to_field_rad(math.radians(fix.heading_deg)),
+            speed_mps=fix.speed_mps,
+            fixed_s=now_s - fix.age_s,
+            error_m=fix.error_m,
+            source=sender,
+        )
+        with self._lock:
+            known = self._contacts.get(fix.boat)
+            if known is not None and known.source != sender and known.fixed_s > contact.fixed_s:
+                return  # of two senders the fresher one counts
+            self._contacts[fix.boat] = contact
+
+    def _refuse(self, kind: str, text: str, times: int = 1) -> None:
+        with self._lock:
+            first = kind not in self._faults
+            self._faults[kind] += times
+            self._texts[kind] = text
+        if first:
+            logger.warning("feed: %s; more of this kind is only counted", text)
