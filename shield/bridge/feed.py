@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-import socket
 import threading
 import time
 from collections import Counter
@@ -145,8 +144,8 @@ class FeedReceiver:
     def close(self) -> None:
         """Give the socket back; may be called again."""
         self._closing.set()
-        with contextlib.suppress(OSError):  # wakes the thread where the system can; else its wait ends soon by itself
-            self._socket.shutdown(socket.SHUT_RDWR)
+        with contextlib.suppress(OSError):  # a datagram of its own wakes the thread; else its wait ends soon by itself
+            self._socket.sendto(b"", self._socket.getsockname())
         self._thread.join(timeout=2.0)
         self._socket.close()
 
