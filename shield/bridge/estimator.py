@@ -85,7 +85,11 @@ class Estimator:
         return Estimate(self._row.copy(), now_s - float(self._fixed_s.min()), 0.5 * float(np.hypot(*apart)))
 
     def sent(self, tick_s: float, heading_rad: float, speed_mps: float) -> None:
-        """Note a command that left at the tick of that time."""
+        """Note a command that left at the tick of that time; a heading of NaN is the present one."""
+        if math.isnan(heading_rad):
+            if self._row is None:
+                return
+            heading_rad = math.radians(self._row[L.HEADING])
         self._commands.append((tick_s, speed_mps, heading_rad))
 
     def advance(self, now_s: float) -> None:

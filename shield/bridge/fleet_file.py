@@ -96,13 +96,18 @@ class FleetFile(FleetSettings):
                 return boat
         raise FleetFileError(f"no boat is named {name!r}; the file has {', '.join(self.names)}")
 
+    @property
+    def ours(self) -> tuple[BoatSettings, ...]:
+        """Boats of our team with a link, to be commanded by some process of ours."""
+        return tuple(boat for boat in self.boats if self._is_ours(boat))
+
     def commanded(self, only: str | None = None) -> tuple[BoatSettings, ...]:
         """Boats a process commands: those of our team with a link, or the one named.
 
         Raises:
             FleetFileError: ``only`` names a boat we may not command, or per_boat coordination without a name.
         """
-        ours = tuple(boat for boat in self.boats if self._is_ours(boat))
+        ours = self.ours
         if only is None:
             if self.coordination == "per_boat":
                 raise FleetFileError("coordination is per_boat: a process per boat; name this process's with --boat")
@@ -132,7 +137,7 @@ class FleetFile(FleetSettings):
             return ()
         if self.coordination == "team":
             return (self.feed.listen,)
-        return tuple(dict.fromkeys(b.feed_listen or self.feed.listen for b in self.boats if self._is_ours(b)))
+        return tuple(dict.fromkeys(b.feed_listen or self.feed.listen for b in self.ours))
 
     def position_listeners(self) -> tuple[str, ...]:
         """Every HOST:PORT positions go to: the runners' and the referee's."""

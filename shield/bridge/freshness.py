@@ -13,8 +13,8 @@ from .responses import strongest
 from .roster import Roster
 from .tick import Action
 
-SECOND_COMMANDER = "second_commander"
-"""Key of `BoatReading.faults` under which a link counts commands of somebody else."""
+RIVAL_S = 2.0
+"""A second commander counts as there for this long after its last command was noticed, s."""
 
 WHOLE_S = 99.0
 """Ages beyond this are shown as "never" or in whole seconds."""
@@ -28,6 +28,7 @@ class Seen:
         readings: of own boats.
         usable: own boats for which the policy's answer can be used now.
         policy_age_s: age of the last usable answer of each own boat, s; inf: none yet.
+        rivals: own boats that somebody else commands too.
         policy_fault: what the policy's process says is wrong; empty: nothing.
         game_age_s: age of the state of the game, s; inf: none yet.
         game_over: whether the game has ended.
@@ -38,6 +39,7 @@ class Seen:
     readings: Mapping[str, BoatReading]
     usable: Collection[str]
     policy_age_s: Mapping[str, float]
+    rivals: Collection[str] = ()
     policy_fault: str = ""
     game_age_s: float = math.inf
     game_over: bool = False
@@ -113,7 +115,7 @@ def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict:
     elif not reading.ready:
         verdict.idle.add(boat)
         verdict.actions.append(Action(boat, "mode", "none", f"{boat} does not obey: {reading.why_not or reading.mode}"))
-    if reading.faults.get(SECOND_COMMANDER) and not seen.overridden("commander", boat):
+    if boat in seen.rivals and not seen.overridden("commander", boat):
         verdict.due(Action(boat, "commander", limits.link.then, f"{boat}: somebody else commands it too"), (boat,))
     track = roster.track(boat)
     outside = track is not None and not fleet.geofence.holds(float(track.row[0]), float(track.row[1]))

@@ -53,6 +53,7 @@ class Operator:
         self._lock = threading.Lock()
         self._overrides: tuple[Override, ...] = ()
         self._stopped = ""
+        self._hard = False
         self._ended = ""
 
     @property
@@ -61,20 +62,30 @@ class Operator:
         return self._stopped
 
     @property
+    def hard(self) -> bool:
+        """Whether they are stopped by their links, past the shield: STOP ALL was asked for twice."""
+        return self._hard
+
+    @property
     def ended(self) -> str:
         """Why the run is to end; empty: it goes on."""
         return self._ended
 
     def stop_all(self, by: str = "operator") -> None:
-        """Tell all boats to stop, at every tick, until `resume`."""
+        """Tell all boats to stop, at every tick, until `resume`.
+
+        The first time they stop through the shield, which may have them get clear of each other before. The second time
+        they stop by their links' surest way, whatever is near.
+        """
         with self._lock:
+            self._hard = bool(self._stopped)
             self._stopped = by
-        LOG.warning("STOP ALL by %s", by)
+        LOG.warning("STOP ALL by %s%s", by, ", past the shield" if self._hard else "")
 
     def resume(self, by: str = "operator") -> None:
         """Take STOP ALL back."""
         with self._lock:
-            self._stopped = ""
+            self._stopped, self._hard = "", False
         LOG.warning("STOP ALL taken back by %s", by)
 
     def end(self, by: str = "operator") -> None:
@@ -119,7 +130,8 @@ class Operator:
 
     def actions(self, now_s: float) -> tuple[Action, ...]:
         """What is in force, for the record and the display."""
-        stop = [Action("all", "stop_all", "stop", f"STOP ALL by {self._stopped}")] if self._stopped else []
+        past = ", past the shield" if self._hard else ""
+        stop = [Action("all", "stop_all", "stop", f"STOP ALL by {self._stopped}{past}")] if self._stopped else []
         overrides = [
             Action(
                 entry.subject or "all",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .frame import TWO_PI
 from ..jit import Array
 from ..platforms import Platform
 from ..platforms import layout as L
 from .fleet_settings import Geofence
+from .frame import TWO_PI
 
 STRENGTH = {"go_on": 0, "hold_course": 1, "slow": 2, "hold_station": 3, "return": 4, "stop": 5}
 """Of several responses due at once the strongest is done."""

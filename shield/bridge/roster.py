@@ -86,7 +86,7 @@ class Roster:
     def sent(self, tick_s: float, sent: Mapping[str, Sent]) -> None:
         """Note what left at the tick of that time."""
         for name, message in sent.items():
-            if message.delivered and math.isfinite(message.heading_rad) and math.isfinite(message.speed_mps):
+            if message.delivered and math.isfinite(message.speed_mps):
                 self._estimators[name].sent(tick_s, message.heading_rad, message.speed_mps)
 
     def track(self, name: str) -> Track | None:

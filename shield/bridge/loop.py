@@ -1,0 +1,261 @@
+"""The fixed-rate loop: read, judge, decide, send, record; on a monotonic clock, until told to end."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..commands import Commands
+from ..exceptions import BridgeError
+from ..shield import Shield
+from .assemble import seen_now
+from .clock import Clock
+from .contact import Contact, ContactSource
+from .fleet_file import FleetFile
+from .freshness import RIVAL_S, Seen, Verdict, judge
+from .helm import Helm, Steered
+from .link import BoatReading, Link
+from .operator import Operator
+from .overruns import Overruns
+from .policy_watch import PolicyWatch
+from .roster import Roster
+from .tick import Tick, TickSink
+from .wanted import Snapshot, WantedSource
+
+LOG = logging.getLogger(__name__)
+
+TALK_EVERY_S = 5.0
+"""The same failure is logged again after this long, s."""
+
+SECOND_COMMANDER = "second_commander"
+"""Key of `BoatReading.faults` under which a link counts commands of somebody else."""
+
+
+class GameState(Protocol):
+    """The state of the game as a referee sent it."""
+
+    over: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the feed has it."""
+
+
+class GameSource(Protocol):
+    """Gives the latest state of the game; never waits."""
+
+    def game(self) -> GameState | None:
+        """None: none yet."""
+
+    def game_age_s(self) -> float:
+        """Its age, s; inf: none yet."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the loop works with.
+
+    Attributes:
+        links: of the boats this process commands, connected and prepared.
+        ears: links that are only listened to, of boats somebody else commands.
+        contacts: other sources of positions.
+        game: the referee's state of the game; None: none.
+        policy: where wanted commands come from.
+        sinks: get every tick; the black box among them.
+    """
+
+    links: Mapping[str, Link]
+    policy: WantedSource
+    ears: Mapping[str, Link] = field(default_factory=dict)
+    contacts: Sequence[ContactSource] = ()
+    game: GameSource | None = None
+    sinks: Sequence[TickSink] = ()
+
+
+class Loop:
+    """Runs boats.
+
+    Args:
+        fleet: the file.
+        parts: links, policy, sources and sinks; the loop closes none of them.
+        operator: STOP ALL, overrides, the end.
+        clock: of all times; the links and the feed have the same.
+        shield: the shield; None: one with the file's settings.
+    """
+
+    def __init__(
+        self, fleet: FleetFile, parts: Parts, operator: Operator, clock: Clock, shield: Shield | None = None
+    ) -> None:
+        self.fleet = fleet
+        self.parts = parts
+        self.operator = operator
+        self.clock = clock
+        self.overruns = Overruns(fleet.dt_s)
+        self.roster = Roster(fleet, parts.links)
+        chosen = Shield(fleet.shield_config, fleet.surroundings) if shield is None else shield
+        self._helm = Helm(fleet, chosen, parts.links, clock)
+        self._watch = PolicyWatch(fleet, tuple(parts.links))
+        self._mates = _mates(fleet, parts.links)
+        self._number = 0
+        self._log_fault = ""
+        self._broken: set[int] = set()
+        self._rivals_s: dict[str, float] = {}
+        self._broke_s = -math.inf
+
+    def run(self, seconds: float | None = None) -> str:
+        """Turn at the file's rate until the operator ends it or the time is over; boats are left told to stop.
+
+        Args:
+            seconds: how long, s on the loop's clock; None: until ended.
+
+        Returns:
+            Why it ended.
+        """
+        began = self.clock.now_s()
+        last = math.inf if seconds is None else began + seconds
+        due = began
+        try:
+            while not self.operator.ended and due < last:
+                self.clock.sleep_until(due)
+                self._turn_or_stop(due)
+                due = self.overruns.next_due(due, self.clock.now_s())
+        finally:
+            self._helm.stop_all(tuple(self.parts.links))
+        return self.operator.ended or f"ran for {self.clock.now_s() - began:.0f} s"
+
+    def _turn_or_stop(self, due_s: float) -> None:
+        """A turn that breaks where none should leaves boats told to stop, and the next one is tried."""
+        try:
+            self.turn(due_s)
+        except Exception:
+            self._helm.stop_all(tuple(self.parts.links))
+            if self.clock.now_s() - self._broke_s >= TALK_EVERY_S:
+                self._broke_s = self.clock.now_s()
+                LOG.exception("a turn of the loop broke; boats told to stop")
+
+    def turn(self, due_s: float) -> Tick:
+        """One turn.
+
+        Args:
+            due_s: when it was due.
+        """
+        began = self.clock.now_s()
+        readings = {name: link.read() for name, link in self.parts.links.items()}
+        contacts = self._contacts()
+        self.roster.update(began, readings, contacts)
+        answer, policy_age, fault = _latest(self.parts.policy)
+        self._watch.update(began, answer, policy_age, fault)
+        game, game_age = self._game()
+        verdict = judge(self.fleet, self.roster, self._seen(began, readings, game, game_age))
+        steered = self._steer(answer, verdict)
+        self.roster.sent(began, steered.sent)
+        tick = Tick(
+            number=self._number,
+            due_s=due_s,
+            began_s=began,
+            sent_s=self.clock.now_s(),
+            readings=readings,
+            contacts=contacts,
+            fleet=steered.fleet,
+            wanted=steered.wanted,
+            surroundings=steered.surroundings,
+            decisions=steered.decisions,
+            shield_reset=steered.shield_reset,
+            sent=steered.sent,
+            policy_age_s=policy_age,
+            actions=(*self.operator.actions(began), *verdict.actions, *steered.actions),
+            game={} if game is None else game.as_dict(),
+        )
+        self._number += 1
+        self._record(tick)
+        self.parts.policy.offer(Snapshot(tick.number, began, seen_now(self.roster), tick.game, game_age))
+        return tick
+
+    def _steer(self, answer: Commands | None, verdict: Verdict) -> Steered:
+        if self.operator.stopped:
+            verdict.responses.update(dict.fromkeys(self.parts.links, "stop"))
+        if self.operator.hard:
+            sent = self._helm.stop_all(tuple(self.parts.links))
+            return Steered(None, None, None, None, False, sent, ())
+        limit = self.fleet.limits.contact.max_age_s
+        mates = {name for name in self._mates if self.roster.contact_age_s(name) <= limit}
+        return self._helm.steer(self.roster, answer, verdict, mates)
+
+    def _seen(
+        self, now_s: float, readings: Mapping[str, BoatReading], game: GameState | None, game_age_s: float
+    ) -> Seen:
+        for name, reading in readings.items():
+            if reading.faults.get(SECOND_COMMANDER):
+                self._rivals_s[name] = now_s
+        return Seen(
+            readings=readings,
+            usable=self._watch.usable,
+            policy_age_s=self._watch.ages(now_s),
+            rivals={name for name, time_s in self._rivals_s.items() if now_s - time_s <= RIVAL_S},
+            policy_fault=self._watch.fault,
+            game_age_s=game_age_s,
+            game_over=game is not None and game.over,
+            log_fault=self._log_fault,
+            overrides=self.operator.active(now_s),
+        )
+
+    def _contacts(self) -> tuple[Contact, ...]:
+        heard = [contact for source in self.parts.contacts for contact in source.read()]
+        error = self.fleet.shield_config.position_error_m
+        told = [_contact_of(link.read(), error) for link in self.parts.ears.values()]
+        return (*heard, *(contact for contact in told if contact is not None))
+
+    def _game(self) -> tuple[GameState | None, float]:
+        source = self.parts.game
+        return (None, math.inf) if source is None else (source.game(), source.game_age_s())
+
+    def _record(self, tick: Tick) -> None:
+        """Give the tick to all; a sink that can keep no more is named, and the others still get it."""
+        for k, sink in enumerate(self.parts.sinks):
+            try:
+                sink.take(tick)
+            except BridgeError as error:
+                if k not in self._broken:
+                    LOG.error("%s", error)
+                self._broken.add(k)
+                self._log_fault = str(error)
+            except Exception:
+                if k not in self._broken:
+                    LOG.exception("a sink broke; it gets no boat into danger")
+                self._broken.add(k)
+            else:
+                self._broken.discard(k)
+        if not self._broken:
+            self._log_fault = ""
+
+
+def _latest(policy: WantedSource) -> tuple[Commands | None, float, str]:
+    answer = policy.latest()
+    return answer if isinstance(answer, tuple) else (answer.commands, answer.age_s, answer.fault)
+
+
+def _mates(fleet: FleetFile, links: Mapping[str, Link]) -> tuple[str, ...]:
+    """Team-mates that another process of ours commands, behind a shield of its own."""
+    if fleet.coordination == "team":
+        return ()
+    return tuple(boat.name for boat in fleet.ours if boat.name not in links)
+
+
+def _contact_of(reading: BoatReading, error_m: float) -> Contact | None:
+    """A boat's own telemetry as a contact; None while something of it was never received."""
+    values = (*reading.position_m, reading.heading_rad, reading.speed_mps, reading.age_s)
+    if not np.isfinite(values).all():
+        return None
+    return Contact(
+        boat=reading.boat,
+        position_m=reading.position_m,
+        heading_rad=reading.heading_rad,
+        speed_mps=reading.speed_mps,
+        fixed_s=reading.read_s - reading.age_s,
+        error_m=error_m,
+        source="telemetry",
+    )
