@@ -1,1 +1,35 @@
-"""The black box: every input, decision and output of a run, on disk within a second, and what reads it back."""
+"""The black box: every input, decision and output on disk, at most a second behind, and reading it back.
+
+How to use it::
+
+    header = LogHeader(config=config, surroundings=surroundings, platforms=platforms_of(kinds), boats=boats,
+                       frame=fleet.frame, fleet_text=text, policy="medium", clock_s=clock.now_s())
+    box = McapWriter(log_path(folder, ".mcap"), header)      # a TickSink
+    box.take(tick)                                           # every turn; BridgeError: ticks can no longer be kept
+    box.note("override of blue_1 by the operator")           # a line of text
+    box.close()
+    tlog = TlogWriter(log_path(folder, ".tlog"))             # tlog.on_bytes("in" | "out", raw, unix_us)
+    check_disk(folder, boats=6)                              # before the start: a CheckResult
+    with LogReader(path) as log:                             # also of a log cut off by a crash
+        for tick in log.ticks(): ...
+"""
+
+from .disk import Disk
+from .header import LoggedBoat, LogHeader, platforms_of
+from .mcap_writer import McapWriter, log_path
+from .reader import LogLine, LogReader
+from .space import check_disk
+from .tlog import TlogWriter
+
+__all__ = [
+    "Disk",
+    "LogHeader",
+    "LogLine",
+    "LogReader",
+    "LoggedBoat",
+    "McapWriter",
+    "TlogWriter",
+    "check_disk",
+    "log_path",
+    "platforms_of",
+]

@@ -1,0 +1,182 @@
+"""`LogHeader`: what a log must know besides its ticks, so that the shield can be built again as it was."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from ...config import ShieldConfig
+from ...exceptions import LogError, SteerclearError
+from ...platforms import Gains, Platform, get_platform
+from ...surroundings import OPEN_WATER, Surroundings
+from ..frame import FieldFrame
+from .numbers import plain, restored
+from .origin import describe_machine, source_digest, versions
+
+LOG_VERSION = 1
+
+
+@dataclass(frozen=True)
+class LoggedBoat:
+    """One boat of the fleet file.
+
+    Attributes:
+        name: of the boat.
+        agent: its place in the game, "" for a boat outside it.
+        team: 0 blue, 1 red, 2 outside the game.
+        platform: name of its platform.
+        ours: whether this process commands it.
+    """
+
+    name: str
+    agent: str
+    team: int
+    platform: str
+    ours: bool
+
+
+@dataclass(frozen=True)
+class LogHeader:
+    """First message of a log.
+
+    Attributes:
+        config: settings the shield was built with.
+        surroundings: fixed things it was built with.
+        platforms: parameters of the platforms, by name.
+        boats: of the fleet file, in its order.
+        frame: where the field is, None when it is nowhere on earth.
+        field_size_m: of the field along x and y, m.
+        fleet_text: the FLEET.yaml, word for word.
+        preset: rules of the game.
+        policy: name of the policy.
+        notes: anything else worth keeping, such as checks that were accepted.
+        clock_s: time on the loop's clock when the log began, s.
+        unix_ns: wall clock at that moment, ns since 1970; all times in the log are counted from it on the loop's clock.
+        versions: of Python and the packages that decisions depend on.
+        sources: digest of the sources of the shield, the game and the policies.
+        machine: processor architecture, system and C library, which sines and cosines come from.
+        version: of the log's format.
+    """
+
+    config: ShieldConfig
+    surroundings: Surroundings = OPEN_WATER
+    platforms: Mapping[str, Platform] = field(default_factory=dict)
+    boats: tuple[LoggedBoat, ...] = ()
+    frame: FieldFrame | None = None
+    field_size_m: tuple[float, float] | None = None
+    fleet_text: str = ""
+    preset: str = ""
+    policy: str = ""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    clock_s: float = 0.0
+    unix_ns: int = field(default_factory=time.time_ns)
+    versions: Mapping[str, str] = field(default_factory=versions)
+    sources: str = field(default_factory=source_digest)
+    machine: str = field(default_factory=describe_machine)
+    version: int = LOG_VERSION
+
+    def time_ns(self, clock_s: float) -> int:
+        """Nanoseconds since 1970 of a time of the loop's clock, never before 1970."""
+        return max(0, self.unix_ns + round((clock_s - self.clock_s) * 1e9))
+
+    def to_message(self) -> dict[str, Any]:
+        """The message; what has no fixed form is JSON in a text, so that log viewers can show it."""
+        shown = {
+            "version": self.version,
+            "fleet_yaml": self.fleet_text,
+            "preset": self.preset,
+            "policy": self.policy,
+            "clock_s": plain(self.clock_s),
+            "unix_ns": str(self.unix_ns),
+            "sources": self.sources,
+            "machine": self.machine,
+        }
+        hidden = {
+            "shield": asdict(self.config),
+            "surroundings": asdict(self.surroundings),
+            "platforms": {name: asdict(kind) for name, kind in self.platforms.items()},
+            "boats": [asdict(boat) for boat in self.boats],
+            "frame": None if self.frame is None else asdict(self.frame),
+            "field_size_m": self.field_size_m,
+            "notes": dict(self.notes),
+            "versions": dict(self.versions),
+        }
+        return shown | {name: json.dumps(plain(value), allow_nan=False) for name, value in hidden.items()}
+
+    @classmethod
+    def from_message(cls, message: Mapping[str, Any]) -> LogHeader:
+        """The header such a message came from.
+
+        Raises:
+            LogError: the message is of another version, or a part is missing or makes no sense.
+        """
+        found = message.get("version")
+        if found != LOG_VERSION:
+            raise LogError(
+                f"the log is of version {found}, this program reads version {LOG_VERSION}; use the one that wrote it"
+            )
+        try:
+            return cls(**_parts(message))
+        except SteerclearError as error:
+            used = json.loads(str(message.get("versions", "{}"))).get("steerclear", "unknown")
+            raise LogError(f"the log's header does not fit this version ({error}); it was written by {used}") from None
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise LogError(f"the log's header is damaged ({type(error).__name__}: {error})") from None
+
+
+def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `LogHeader` from its message."""
+    size = json.loads(message["field_size_m"])
+    frame = json.loads(message["frame"])
+    return {
+        "config": ShieldConfig.of(**restored(json.loads(message["shield"]))),
+        "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
+        "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
+        "boats": tuple(LoggedBoat(**row) for row in json.loads(message["boats"])),
+        "frame": None if frame is None else FieldFrame(**frame),
+        "field_size_m": None if size is None else (float(size[0]), float(size[1])),
+        "fleet_text": str(message["fleet_yaml"]),
+        "preset": str(message["preset"]),
+        "policy": str(message["policy"]),
+        "notes": json.loads(message["notes"]),
+        "clock_s": restored(message["clock_s"]),
+        "unix_ns": int(message["unix_ns"]),
+        "versions": json.loads(message["versions"]),
+        "sources": str(message["sources"]),
+        "machine": str(message["machine"]),
+    }
+
+
+def platform_to_text(kind: Platform) -> str:
+    """A platform's parameters as JSON."""
+    return json.dumps(plain(asdict(kind)), allow_nan=False)
+
+
+def platform_from(row: Mapping[str, Any]) -> Platform:
+    """The platform with such parameters.
+
+    Raises:
+        LogError: they are not a platform's.
+        PlatformError: a value makes no sense.
+    """
+    values = restored(dict(row))
+    try:
+        values["speed_pid"], values["heading_pid"] = Gains(**values["speed_pid"]), Gains(**values["heading_pid"])
+        values["thrust_map"] = tuple((float(thrust), float(speed)) for thrust, speed in values["thrust_map"])
+        return Platform(**values)
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, SteerclearError):
+            raise
+        raise LogError(f"the log holds a platform that does not fit this version ({error})") from None
+
+
+def platforms_of(kinds: Iterable[str | Platform]) -> dict[str, Platform]:
+    """Platforms by name, for a header.
+
+    Raises:
+        PlatformError: one is unknown.
+    """
+    return {kind.name: kind for kind in map(get_platform, kinds)}

@@ -1,0 +1,126 @@
+"""The MCAP file of a black box: topics, their schemas, and what is written of a tick."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from mcap.writer import CompressionType, Writer
+
+from ..tick import Action, Tick
+from . import foxglove as fg
+from .disk import Disk
+from .drawing import field_of, fixes_of, scene_of
+from .encode import tick_to_json
+from .header import LogHeader
+from .numbers import plain
+from .schemas import HEADER, TICK, Schema
+
+TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC = "/tick", "/header", "/log"
+SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
+SCENE_EVERY_S, FIX_EVERY_S, FIELD_EVERY_S = 0.2, 1.0, 10.0
+CHUNK_BYTES = 1 << 20
+
+_KEPT = plain  # what JSON itself cannot write
+
+
+class McapFile:
+    """Writes a log; used by one thread.
+
+    Args:
+        disk: the file.
+        header: first message; on the disk when this returns.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+
+    def __init__(self, disk: Disk, header: LogHeader) -> None:
+        self._disk, self._header = disk, header
+        self._writer = Writer(disk, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._writer.start(profile="", library="steerclear")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
+        self._last_ns = header.unix_ns
+        self._due_s = {SCENE_TOPIC: -1e18, FIX_TOPIC: -1e18, FIELD_TOPIC: -1e18}
+        self._active: dict[tuple[str, str, str], Action] = {}
+        self._add(HEADER_TOPIC, HEADER, header.to_message(), header.unix_ns)
+        self.flush()
+
+    def add_tick(self, tick: Tick) -> None:
+        """Write a tick, and what shows it in a viewer."""
+        time_ns = self._header.time_ns(tick.began_s)
+        self._add(TICK_TOPIC, TICK, tick_to_json(tick, self._header.platforms), time_ns)
+        self._add_lines(tick, time_ns)
+        if self._due(SCENE_TOPIC, tick.began_s, SCENE_EVERY_S):
+            scene = scene_of(tick, time_ns, self._header.config.separation_m)
+            if scene is not None:
+                self._add(SCENE_TOPIC, fg.SCENE_UPDATE, scene, time_ns)
+        if self._due(FIELD_TOPIC, tick.began_s, FIELD_EVERY_S):
+            self._add(FIELD_TOPIC, fg.SCENE_UPDATE, field_of(self._header, tick.surroundings, time_ns), time_ns)
+        if self._due(FIX_TOPIC, tick.began_s, FIX_EVERY_S):
+            for name, fix in fixes_of(tick, self._header, time_ns).items():
+                self._add(FIX_TOPIC + name, fg.LOCATION_FIX, fix, time_ns)
+
+    def add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
+        """Write a line of the log, at the time of the last message when none is given."""
+        at_ns = self._last_ns if time_ns is None else time_ns
+        self._add(LOG_TOPIC, fg.LOG, fg.log_message(at_ns, level, name, text), at_ns)
+
+    def flush(self) -> None:
+        """Bring everything to the disk."""
+        self._writer.flush()
+        self._disk.sync()
+
+    def finish(self) -> None:
+        """Write the index, close the file."""
+        self._writer.finish()
+        self._disk.flush()
+        self._disk.sync()
+        self._disk.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        self._disk.close()
+
+    def _add_lines(self, tick: Tick, time_ns: int) -> None:
+        """Actions that begin and end, what autopilots said, what links refused."""
+        now = {(action.subject, action.condition, action.response): action for action in tick.actions}
+        for key, action in now.items():
+            if key not in self._active:
+                self.add_line(fg.WARNING, action.subject, f"{action.condition}: {action.text}", time_ns)
+        for key, action in self._active.items():
+            if key not in now:
+                self.add_line(fg.INFO, action.subject, f"{action.condition}: {action.response} is over", time_ns)
+        self._active = now
+        for reading in tick.readings.values():
+            for text in reading.texts:
+                self.add_line(fg.INFO, reading.boat, text, time_ns)
+            for kind, count in reading.faults.items():
+                self.add_line(fg.WARNING, reading.boat, f"refused: {kind} ({count})", time_ns)
+
+    def _due(self, topic: str, now_s: float, every_s: float) -> bool:
+        """Whether it is time for a topic again; times are kept in step so that ticks a little early count."""
+        due = now_s >= self._due_s[topic] - 0.01
+        if due:
+            self._due_s[topic] = now_s + every_s
+        return due
+
+    def _add(self, topic: str, schema: Schema, message: dict[str, Any], time_ns: int) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._open(topic, schema)
+        self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
+        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=_KEPT).encode()
+        self._counts[topic] += 1
+        self._writer.add_message(channel, self._last_ns, data, self._last_ns, self._counts[topic])
+
+    def _open(self, topic: str, schema: Schema) -> int:
+        title = schema["title"]
+        if title not in self._schemas:
+            text = json.dumps(schema, separators=(",", ":")).encode()
+            self._schemas[title] = self._writer.register_schema(title, "jsonschema", text)
+        self._counts[topic] = 0
+        self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[title])
+        return self._channels[topic]

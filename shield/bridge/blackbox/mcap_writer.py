@@ -1,0 +1,175 @@
+"""`McapWriter`: the black box, a sink of ticks that keeps every one of them on disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from ...commands import Commands
+from ...decision import Decisions
+from ...exceptions import BridgeError
+from ...fleet import Fleet
+from ..tick import Tick
+from . import foxglove as fg
+from .disk import Disk, explain
+from .header import LogHeader
+from .mcap_file import McapFile
+from .spool import Spool
+
+_Line = tuple[int, str, str]
+
+
+class _Store:
+    """What the spool's thread does with ticks and lines, and with the count of those dropped."""
+
+    def __init__(self, file: McapFile) -> None:
+        self._file = file
+        self._told = 0
+        self.dropped: Callable[[], int] = lambda: 0
+
+    def keep(self, item: Tick | _Line) -> None:
+        if isinstance(item, Tick):
+            self._file.add_tick(item)
+        else:
+            self._file.add_line(*item)
+
+    def flush(self) -> None:
+        self._tell_dropped()
+        self._file.flush()
+
+    def finish(self) -> None:
+        self._tell_dropped()
+        self._file.finish()
+
+    def abandon(self) -> None:
+        self._file.abandon()
+
+    def _tell_dropped(self) -> None:
+        dropped = self.dropped()
+        if dropped > self._told:
+            text = f"the disk is too slow: {dropped - self._told} ticks before this are missing, {dropped} in all"
+            self._file.add_line(fg.ERROR, "black box", text)
+            self._told = dropped
+
+
+class McapWriter:
+    """Keeps ticks in an MCAP file, at most ``flush_s`` and the disk's own delay behind.
+
+    The header is on the disk when this returns. A log proves the shield's decisions from the first tick that was
+    decided by a fresh shield or after `Shield.reset` (``Tick.shield_reset``), so begin it with the first decision.
+
+    Args:
+        path: of the new file, ``.mcap``.
+        header: what the shield was built with.
+        flush_s: longest time between flushes to the disk, s.
+        capacity: ticks that may wait for the disk; more are dropped and counted.
+        give_up_s: when the disk has taken nothing for so long, s, `take` raises.
+        open_disk: makes the file.
+
+    Raises:
+        BridgeError: the file cannot be made, or not even the header fits on the disk.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        header: LogHeader,
+        *,
+        flush_s: float = 0.5,
+        capacity: int = 300,
+        give_up_s: float = 10.0,
+        open_disk: Callable[[Path], Disk] = Disk,
+    ) -> None:
+        self.path, self.header = path, header
+        disk = open_disk(path)
+        try:
+            store = _Store(McapFile(disk, header))
+        except OSError as error:
+            disk.close()
+            raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
+        self._spool: Spool[Tick | _Line] = Spool(
+            path.name, store, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s
+        )
+        store.dropped = lambda: self._spool.dropped
+
+    def take(self, tick: Tick) -> None:
+        """Keep a tick; never waits. Its arrays may be changed afterwards, its mappings may not.
+
+        Raises:
+            BridgeError: ticks can no longer be kept; the text says why and what to do.
+        """
+        self._spool.put(_snapshot(tick))
+
+    def note(self, text: str, *, name: str = "steerclear", warning: bool = False) -> None:
+        """Keep a line of text at the time of the last tick.
+
+        Raises:
+            BridgeError: as `take`.
+        """
+        self._spool.put((fg.WARNING if warning else fg.INFO, name, text))
+
+    def close(self) -> None:
+        """Write what waits and the index; what went wrong is in ``fault``."""
+        self._spool.close()
+
+    @property
+    def fault(self) -> str:
+        """Why nothing is written any more; empty while all is well."""
+        return self._spool.fault
+
+    @property
+    def dropped(self) -> int:
+        """Ticks that were dropped because the disk was too slow."""
+        return self._spool.dropped
+
+    @property
+    def waiting(self) -> int:
+        """Ticks not yet written."""
+        return self._spool.waiting
+
+
+def log_path(folder: Path, ending: str, unix_s: float | None = None, name: str = "steerclear") -> Path:
+    """A path for a new log, named after the time, UTC.
+
+    Args:
+        folder: the log folder.
+        ending: such as ".mcap" or ".tlog".
+        unix_s: time, s since 1970; None: now.
+        name: first part of the name.
+    """
+    moment = time.gmtime(time.time() if unix_s is None else unix_s)
+    return folder / f"{name}_{time.strftime('%Y%m%dT%H%M%SZ', moment)}{ending}"
+
+
+def _snapshot(tick: Tick) -> Tick:
+    """The tick with its own copies of arrays that the loop may use again."""
+    if tick.fleet is None:
+        return tick
+    fleet = replace(
+        tick.fleet,
+        state=tick.fleet.state.copy(),
+        age_s=None if tick.fleet.age_s is None else tick.fleet.age_s.copy(),
+        position_error_m=None if tick.fleet.position_error_m is None else tick.fleet.position_error_m.copy(),
+    )
+    wanted = None if tick.wanted is None else Commands(tick.wanted.values.copy(), tick.wanted.relative)
+    return replace(tick, fleet=fleet, wanted=wanted, decisions=_copied(tick, fleet, wanted))
+
+
+def _copied(tick: Tick, fleet: Fleet, wanted: Commands | None) -> Decisions | None:
+    decisions = tick.decisions
+    if decisions is None or wanted is None:
+        return None
+    same = decisions.sent is tick.wanted
+    return replace(
+        decisions,
+        fleet=fleet,
+        wanted=wanted,
+        sent=wanted if same else Commands(decisions.sent.values.copy(), decisions.sent.relative),
+        intervened=decisions.intervened.copy(),
+        reason=decisions.reason.copy(),
+        certificate_m=decisions.certificate_m.copy(),
+        slack_m=decisions.slack_m.copy(),
+        bound=decisions.bound.copy(),
+    )

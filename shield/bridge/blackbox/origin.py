@@ -1,0 +1,42 @@
+"""Where decisions come from: versions, sources and the machine, since all of them may change a last bit."""
+
+from __future__ import annotations
+
+import platform as machine
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ...jit import _tree_stamp
+
+PACKAGES = ("steerclear", "numpy", "numba", "llvmlite", "qpsolvers", "daqp", "osqp", "quadprog", "pymavlink", "mcap")
+"""Distributions whose versions a log notes."""
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of Python and of `PACKAGES` as far as they are installed."""
+    found = {"python": machine.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def source_digest() -> str:
+    """Digest of all sources decisions depend on."""
+    return _tree_stamp()[0]
+
+
+@cache
+def describe_machine() -> str:
+    """Architecture, system, C library and processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = names[0] if names else machine.processor()
+    return f"{machine.machine()} {machine.system()} {' '.join(machine.libc_ver())} {processor}".strip()

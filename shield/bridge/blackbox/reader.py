@@ -1,0 +1,165 @@
+"""`LogReader`: ticks out of a black-box log, also of one that was cut off by a crash or is damaged in places."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Footer, Message
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from zstandard import ZstdError
+
+from ...exceptions import LogError
+from ..tick import Tick
+from .decode import tick_from_json
+from .header import LogHeader
+from .mcap_file import HEADER_TOPIC, LOG_TOPIC, TICK_TOPIC
+
+LOG = logging.getLogger(__name__)
+
+LARGEST_RECORD = 64 << 20
+"""Longer records than this are damage, bytes."""
+
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    struct.error,
+    UnicodeDecodeError,
+    MemoryError,
+    OverflowError,
+    ZstdError,
+)
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """A line of text in a log.
+
+    Attributes:
+        time_ns: when, ns since 1970.
+        level: 1 debug, 2 info, 3 warning, 4 error.
+        name: who it is about.
+        text: the line.
+    """
+
+    time_ns: int
+    level: int
+    name: str
+    text: str
+
+
+class LogReader:
+    """Reads a log once, from its beginning. A context manager.
+
+    Args:
+        path: of the log, ``.mcap``.
+
+    Raises:
+        LogError: no such file, no log, of another version, or cut off before its header.
+
+    Attributes:
+        header: what the shield was built with.
+        complete: whether the log was closed properly; known once `entries` is used up.
+        damage: what could not be read, in words; likewise.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.complete = path, False
+        self.damage: list[str] = []
+        self._topics: dict[int, str] = {}
+        try:
+            self._file: IO[bytes] = path.open("rb")
+        except OSError as error:
+            raise LogError(f"cannot open {path} ({error.strerror}); give a log that deploy wrote (.mcap)") from None
+        try:
+            self._messages = self._read()
+            self.header = self._find_header()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def entries(self) -> Iterator[Tick | LogLine]:
+        """Ticks and lines of text, in order.
+
+        Raises:
+            LogError: a tick does not fit this version.
+        """
+        for topic, message in self._messages:
+            if topic == TICK_TOPIC:
+                yield tick_from_json(_object(message), self.header.platforms)
+            elif topic == LOG_TOPIC:
+                row = _object(message)
+                yield LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
+
+    def ticks(self) -> Iterator[Tick]:
+        """Ticks, in order.
+
+        Raises:
+            LogError: a tick does not fit this version.
+        """
+        return (entry for entry in self.entries() if isinstance(entry, Tick))
+
+    def close(self) -> None:
+        """Give the file back."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _find_header(self) -> LogHeader:
+        for topic, message in self._messages:
+            if topic == HEADER_TOPIC:
+                return LogHeader.from_message(_object(message))
+        why = f" ({self.damage[0]})" if self.damage else ""
+        raise LogError(f"{self.path} holds no header of a steerclear log{why}; give a log that deploy wrote (.mcap)")
+
+    def _read(self) -> Iterator[tuple[str, Message]]:
+        """Messages with their topics; ends where the log can no longer be read."""
+        records = StreamReader(self._file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records
+        try:
+            for item in records:
+                self.complete = isinstance(item, Footer)
+                yield from self._messages_of(item)
+        except _DAMAGE as error:
+            self.complete = False
+            self._tell(f"it ends in the middle of a record ({type(error).__name__})")
+
+    def _messages_of(self, item: Any) -> Iterator[tuple[str, Message]]:
+        if isinstance(item, Chunk):
+            try:
+                parts = breakup_chunk(item, validate_crc=True)
+            except _DAMAGE as error:
+                self._tell(f"{item.uncompressed_size} bytes are damaged and left out ({type(error).__name__})")
+                return
+            for part in parts:
+                yield from self._messages_of(part)
+        elif isinstance(item, Channel):
+            self._topics[item.id] = item.topic
+        elif isinstance(item, Message):
+            yield self._topics.get(item.channel_id, ""), item
+
+    def _tell(self, text: str) -> None:
+        LOG.warning("%s: %s", self.path, text)
+        self.damage.append(text)
+
+
+def _object(message: Message) -> Mapping[str, Any]:
+    try:
+        found = json.loads(message.data)
+    except ValueError as error:
+        raise LogError(f"the log holds a message that is not JSON ({error}); it is damaged") from None
+    if not isinstance(found, dict):
+        raise LogError("the log holds a message that is not an object; it is damaged or of another version")
+    return found
