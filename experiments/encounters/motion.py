@@ -10,8 +10,8 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..jit import kernel
 from . import script as S
-from .jit import kernel
 
 NOISE_MEMORY_S = 2.0
 """Time over which a position error is forgotten, s."""

@@ -9,8 +9,8 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..jit import kernel
 from . import script as S
-from .jit import kernel
 
 LONGEST_LEAD_S = 20.0
 """A hunter looks no further ahead than this, s."""

@@ -10,8 +10,8 @@ from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..jit import kernel
 from ..reversals import DEAD_BAND_DEG
-from .jit import kernel
 from .play import Film
 from .scenes import DT_S
 

@@ -12,7 +12,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.step import step_boat
 
-from .jit import kernel
+from ..jit import kernel
 from .ladder import take_escapes
 from .rows import build_rows, set_inputs
 from .values import WAYS, Setup, fill_margins, least_margin, mark_failing, near_pairs, run_on, set_targets

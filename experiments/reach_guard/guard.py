@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
-from steerclear.shield.exceptions import ConfigError, FleetError, TableError
-from steerclear.shield.fleet import LARGEST
+from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.jit import Array, BoolArray, IntArray
-from steerclear.shield.platforms import Platform, get_platform
-from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms import Platform
 from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
 from steerclear.shield.tables.settings import OtherMay
 
+from ..batch_guard import BatchGuard
 from .decide import decide_games
 from .values import Setup
 
@@ -35,12 +34,13 @@ def check_settings(settings: dict[str, Any]) -> None:
     ShieldConfig.of(**settings)
 
 
-class ReachGuard:
+class ReachGuard(BatchGuard):
     """Commands of B games of the same fleet, kept where the value tables promise the separation.
 
     Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 escape, 4 best effort (no rudder and no
-    braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. Fixed things and the
-    field's edge are not kept clear of.
+    braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``certificate_m`` is the
+    least value after this step less the radius kept, m, inf where nobody is within the tables' range. Fixed things and
+    the field's edge are not kept clear of.
 
     Args:
         config: settings; see `SETTINGS`. ``opponent_share`` is what opponents are granted within a step.
@@ -56,63 +56,17 @@ class ReachGuard:
     def __init__(
         self, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
     ) -> None:
-        if config.delay_s > 0:
-            raise ConfigError(f"delay_s is {config.delay_s}; guard {NAME!r} knows no delay, set 0")
-        if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
-            raise ConfigError(f"games is {games!r}; give a whole number >= 1")
-        if len(platforms) != len(team) or not platforms:
-            raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
-        self.config = config
-        self._setup = _setup(config, [get_platform(kind) for kind in platforms], team)
-        shape = (int(games), len(platforms))
-        self._side = np.zeros(shape)
-        self.reason = np.zeros(shape, np.int64)
-        self.certificate_m = np.full(shape, np.inf)
-        self.sent = np.zeros((*shape, 2))
+        super().__init__(NAME, config, games, platforms, team)
+        self._setup = _setup(config, self._platforms, team)
+        self._side = np.zeros(self.reason.shape)
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the escapes of the games in ``mask`` (B,), or of all."""
-        which = slice(None) if mask is None else mask
-        self._side[which] = 0.0
-        self.reason[which] = 0
-        self.certificate_m[which] = np.inf
+        super().reset(mask)
+        self._side[slice(None) if mask is None else mask] = 0.0
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
-        """Filtered commands.
-
-        Args:
-            state: (B, n, N_STATE) boat states.
-            wanted: (B, n, 2) speed m/s and relative heading deg.
-            ours: (B, n) boats to decide for.
-
-        Returns:
-            (B, n, 2) commands, reused by the next call. ``reason`` (B, n) tells why; ``certificate_m`` (B, n) is the
-            least value after this step less the radius kept, m, inf where nobody is within the tables' range.
-
-        Raises:
-            FleetError: an array has the wrong shape or a state is not finite.
-        """
-        state, wanted, ours = np.asarray(state), np.asarray(wanted), np.asarray(ours)
-        for what, array, shape in (
-            ("state", state, (*self.reason.shape, L.N_STATE)),
-            ("wanted", wanted, self.sent.shape),
-            ("ours", ours, self.reason.shape),
-        ):
-            if array.shape != shape:
-                raise FleetError(f"{what} has shape {array.shape}; expected {shape}")
-        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
-            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
-        decide_games(
-            self._setup,
-            np.ascontiguousarray(state, dtype=np.float64),
-            np.ascontiguousarray(wanted, dtype=np.float64),
-            np.ascontiguousarray(ours, dtype=np.bool_),
-            self._side,
-            self.sent,
-            self.reason,
-            self.certificate_m,
-        )
-        return self.sent
+    def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
+        decide_games(self._setup, state, wanted, ours, self._side, self.sent, self.reason, self.certificate_m)
 
 
 def _setup(config: ShieldConfig, platforms: list[Platform], team: tuple[int, ...]) -> Setup:

@@ -11,7 +11,7 @@ from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import turn_of_rudder
 
-from .jit import kernel
+from ..jit import kernel
 from .values import WAYS, Setup, joint, margin_of, run_on
 
 RUDDERS = 9

@@ -18,7 +18,7 @@ from steerclear.shield.platforms.actuator import thrust_after
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import turn_of_rudder
 
-from .jit import kernel
+from ..jit import kernel
 from .values import WAYS, Setup, joint, slope_of
 
 AIM_M = 0.01

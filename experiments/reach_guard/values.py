@@ -17,7 +17,7 @@ from steerclear.shield.platforms.actuator import actuate
 from steerclear.shield.platforms.usv import turn_of_rudder
 from steerclear.shield.tables.lookup import Gradient, Tables, table_gradient, table_range_m, table_value
 
-from .jit import kernel
+from ..jit import kernel
 
 WAYS = 3
 """Ways an opponent may move in a step: straight, to port, to starboard."""
@@ -73,11 +73,9 @@ def run_on(setup: Setup, state: Array, steps: int, ways: Array) -> None:
 
 
 @kernel
-def value_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> float:
-    """V of the pair, m."""
-    return table_value(
-        setup.tables,
-        setup.table[i, j],
+def _seen_from(own: Array, other: Array) -> tuple[float, float, float, float, float, float]:
+    """What a table is asked with: offset of the other boat, m, both headings, rad, and speeds, m/s."""
+    return (
         other[L.X] - own[L.X],
         other[L.Y] - own[L.Y],
         math.radians(own[L.HEADING]),
@@ -88,18 +86,15 @@ def value_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> float:
 
 
 @kernel
+def value_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> float:
+    """V of the pair, m."""
+    return table_value(setup.tables, setup.table[i, j], *_seen_from(own, other))
+
+
+@kernel
 def slope_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> Gradient:
     """V of the pair and its derivatives."""
-    return table_gradient(
-        setup.tables,
-        setup.table[i, j],
-        other[L.X] - own[L.X],
-        other[L.Y] - own[L.Y],
-        math.radians(own[L.HEADING]),
-        math.radians(other[L.HEADING]),
-        own[L.SPEED],
-        other[L.SPEED],
-    )
+    return table_gradient(setup.tables, setup.table[i, j], *_seen_from(own, other))
 
 
 @kernel

@@ -22,7 +22,7 @@ import math
 
 from steerclear.shield.jit import Array
 
-from .jit import kernel
+from ..jit import kernel
 
 DISTANCE = 0
 EXPONENTIAL = 1

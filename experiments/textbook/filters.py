@@ -9,9 +9,9 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..jit import kernel
 from .barriers import DISTANCE
 from .inputs import command_of_inputs
-from .jit import kernel
 from .program import RELAXED, SOLVED, UNSOLVED, holds, solve
 from .rows import FACETS, Setup, least, limit_rows, pair_row, wanted_inputs
 

@@ -20,7 +20,7 @@ from steerclear.shield.platforms.actuator import actuate, command_for_turn, larg
 from steerclear.shield.platforms.limits import cruise
 from steerclear.shield.platforms.usv import clamp, fresh_state, wrap_degrees
 
-from .jit import kernel
+from ..jit import kernel
 
 LONGEST_S = 60.0
 

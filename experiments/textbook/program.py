@@ -15,7 +15,7 @@ import numpy as np
 from steerclear.shield.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 
-from .jit import kernel
+from ..jit import kernel
 
 SOLVED = 1
 RELAXED = 2

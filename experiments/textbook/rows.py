@@ -14,9 +14,9 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import clamp
 
+from ..jit import kernel
 from .barriers import DISTANCE, barrier
 from .inputs import inputs_of_command
-from .jit import kernel
 
 FACETS = 16
 """Sides of the polygon within the disc of speeds; one corner lies in the wanted direction."""

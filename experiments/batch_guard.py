@@ -1,0 +1,93 @@
+"""What guards of a batch of games share: the checks of what they are given, and the arrays they answer with."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError, FleetError
+from steerclear.shield.fleet import LARGEST
+from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.platforms import Platform, get_platform
+from steerclear.shield.platforms import layout as L
+
+
+class BatchGuard(ABC):
+    """Commands of B games of the same fleet, filtered in the place where the batched shield stands.
+
+    Args:
+        name: of the guard, for messages.
+        config: settings.
+        games: number of games B.
+        platforms: platforms of the n boats.
+        team: team of the n boats.
+
+    Attributes:
+        reason: (B, n) why each command is what it is.
+        certificate_m: (B, n) margin left, m, inf where nobody is near.
+        sent: (B, n, 2) the commands of the last decision.
+
+    Raises:
+        ConfigError: a fleet that does not fit, or a delay.
+    """
+
+    def __init__(
+        self, name: str, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
+    ) -> None:
+        if config.delay_s > 0:
+            raise ConfigError(f"delay_s is {config.delay_s}; guard {name!r} knows no delay, set 0")
+        if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
+            raise ConfigError(f"games is {games!r}; give a whole number >= 1")
+        if len(platforms) != len(team) or not platforms:
+            raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
+        self.name, self.config = name, config
+        self._platforms = [get_platform(kind) for kind in platforms]
+        shape = (int(games), len(platforms))
+        self.reason = np.zeros(shape, np.int64)
+        self.certificate_m = np.full(shape, np.inf)
+        self.sent = np.zeros((*shape, 2))
+
+    def reset(self, mask: BoolArray | None = None) -> None:
+        """Forget the last decisions of the games in ``mask`` (B,), or of all."""
+        which = slice(None) if mask is None else mask
+        self.reason[which] = 0
+        self.certificate_m[which] = np.inf
+
+    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+        """Filtered commands.
+
+        Args:
+            state: (B, n, N_STATE) boat states.
+            wanted: (B, n, 2) speed m/s and relative heading deg.
+            ours: (B, n) boats to decide for.
+
+        Returns:
+            (B, n, 2) commands, reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why.
+
+        Raises:
+            FleetError: an array has the wrong shape, a state is not finite, or what else the guard cannot decide on.
+        """
+        state, wanted, ours = np.asarray(state), np.asarray(wanted), np.asarray(ours)
+        self._check(state, wanted, ours)
+        self._decide(
+            np.ascontiguousarray(state, dtype=np.float64),
+            np.ascontiguousarray(wanted, dtype=np.float64),
+            np.ascontiguousarray(ours, dtype=np.bool_),
+        )
+        return self.sent
+
+    def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
+        for what, array, shape in (
+            ("state", state, (*self.reason.shape, L.N_STATE)),
+            ("wanted", wanted, self.sent.shape),
+            ("ours", ours, self.reason.shape),
+        ):
+            if array.shape != shape:
+                raise FleetError(f"{what} has shape {array.shape}; expected {shape}")
+        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
+            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
+
+    @abstractmethod
+    def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
+        """Write ``sent``, ``reason`` and ``certificate_m``; the arrays are checked and contiguous."""
