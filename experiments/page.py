@@ -33,6 +33,26 @@ def fill(page: str, parts: Mapping[str, str]) -> str:
     return "".join(parts[piece] if place % 2 else piece for place, piece in enumerate(pieces))
 
 
+def html_page(name: str, parts: Mapping[str, str], sources: str = "") -> str:
+    """Put a body into the frame that all pages share.
+
+    Args:
+        name: Template of the body.
+        parts: Text by name, ``TITLE`` and ``STYLE`` among them.
+        sources: What the page may load besides its own style, as further directives of its security policy.
+
+    Returns:
+        The page.
+    """
+    body = fill(template(name), parts).removesuffix("\n")
+    return fill(template("page.html"), {**parts, "BODY": body, "SOURCES": sources})
+
+
+def report_page(name: str, parts: Mapping[str, str]) -> str:
+    """As `html_page`, for reports: their title, headlines, replays and bars stand at ``TOP``."""
+    return html_page(name, {**parts, "TOP": fill(template("report_top.html"), parts).removesuffix("\n")})
+
+
 def as_json(content: Any) -> str:
     """Return JSON that may stand inside a script element whatever texts it holds."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)

@@ -10,10 +10,12 @@ from typing import Any
 from steerclear.env.record import Record, read_meta
 from steerclear.shield.exceptions import ConfigError
 
-from .page import as_json, as_text, fill, template, write_page
+from .page import as_json, as_text, html_page, template, write_page
 from .replay_data import pack
 
 SCRIPTS = tuple(f"replay_{part}.js" for part in ("data", "labels", "draw", "timeline", "pane", "app"))
+SOURCES = "; script-src 'unsafe-inline'; img-src data:"
+"""What a replay may use: the scripts in the page itself."""
 
 
 def write_replay(
@@ -52,7 +54,7 @@ def write_replay(
         "SCRIPT": "\n".join(template(name) for name in SCRIPTS),
         "DATA": as_json({"games": packed}),
     }
-    return write_page(path, fill(template("replay.html"), parts))
+    return write_page(path, html_page("replay.html", parts, SOURCES))
 
 
 def _titles(metas: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
-from .page import as_text, fill, template, write_page
+from .page import as_text, report_page, template, write_page
 from .report_parts import bars_table, games_table, headlines, legend, pairing_tables, replay_links, values_table
 from .report_plots import closest_plot, figure_plot, reason_plot
 from .report_verdicts import breaches_table, verdict_tables
@@ -57,7 +57,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         "GAMES": games_table(results["games"]),
         "FAILED": games_table(results["failed"]) if results.get("failed") else "<p>None.</p>",
     }
-    return write_page(path, fill(template("report.html"), parts))
+    return write_page(path, report_page("report.html", parts))
 
 
 def separation_of(results: Mapping[str, Any]) -> float:

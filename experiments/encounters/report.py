@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..page import as_text, fill, template, write_page
+from ..page import as_text, report_page, template, write_page
 from ..report_parts import bars_table, legend, replay_links, values_table
 from ..tables import number_text
 from .cdf import Curve, distribution_plot
@@ -87,7 +87,7 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
         "SETTINGS": values_table(results["settings"]),
         "VERSIONS": values_table({**results["versions"], **results["machine"]}),
     }
-    return write_page(path, fill(template("encounters.html"), parts))
+    return write_page(path, report_page("encounters.html", parts))
 
 
 def subtitle(results: Mapping[str, Any]) -> str:
