@@ -102,9 +102,12 @@ def _check_agents(fleet: FleetSettings) -> None:
     expected = [f"agent_{i}" for i in range(len(agents))]
     if agents != expected or len(agents) % 2:
         raise FleetFileError(
-            f"agents are {', '.join(agents) or 'missing'}; give an even number of boats agent_0, agent_1, ... in that "
+            f"agents are {', '.join(agents)}; give an even number of boats agent_0, agent_1, ... in that "
             "order, blue first, and boats outside the game no agent"
         )
+    for boat in fleet.boats:
+        if boat.agent is not None and boat.team is not None:
+            raise FleetFileError(f"boat {boat.name!r} has an agent, which says its team; leave its team out")
 
 
 def _check_unique(values: list[str], what: str) -> None:

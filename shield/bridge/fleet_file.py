@@ -20,7 +20,7 @@ from .fleet_settings import BoatSettings, FleetSettings
 from .frame import FieldFrame
 
 OUTSIDE_TEAM = 2
-"""Team number of boats outside the game."""
+"""Team number of boats outside the game that are nobody's."""
 
 
 class FleetFile(FleetSettings):
@@ -73,12 +73,13 @@ class FleetFile(FleetSettings):
 
     @cached_property
     def team_of(self) -> Mapping[str, int]:
-        """0 blue, 1 red, 2 outside the game, by boat's name: the first half of the agents is blue."""
-        half = len(self.agent_ids) // 2
-        return {
-            boat.name: OUTSIDE_TEAM if boat.agent is None else int(int(boat.agent.removeprefix("agent_")) >= half)
-            for boat in self.boats
-        }
+        """0 blue, 1 red, 2 nobody's, by boat's name: the first half of the agents is blue."""
+        return {boat.name: self._team_of(boat) for boat in self.boats}
+
+    def _team_of(self, boat: BoatSettings) -> int:
+        if boat.agent is None:
+            return OUTSIDE_TEAM if boat.team is None else int(boat.team == "red")
+        return int(int(boat.agent.removeprefix("agent_")) >= len(self.agent_ids) // 2)
 
     @property
     def team_number(self) -> int:

@@ -78,7 +78,8 @@ class LinkSettings(Section):
 class BoatSettings(Section):
     """One boat.
 
-    ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``contact``:
+    ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``team``: side
+    of a boat outside the game, else nobody's. ``contact``:
     how this boat is known to a process that does not command it: "feed" (UDP positions) or "telemetry" (its own link);
     None: "feed" when the file has a feed, else "telemetry". ``commanded``: false for a boat with a link that somebody
     else steers. ``feed_listen``: HOST:PORT at which this boat's own process hears the feed (coordination per_boat).
@@ -86,6 +87,7 @@ class BoatSettings(Section):
 
     name: Name
     agent: Annotated[str, Field(pattern=r"^agent_\d+$", description="give agent_0, agent_1, ...")] | None = None
+    team: Literal["blue", "red"] | None = Field(None, description="give blue or red")
     platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron")]
     link: LinkSettings | None = None
     contact: Literal["feed", "telemetry"] | None = Field(None, description="give feed or telemetry")

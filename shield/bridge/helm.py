@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,17 +33,21 @@ TALK_EVERY_S = 5.0
 """The same failure of the decision is logged again after this long, s."""
 
 
+ROOM_M = 10.0
+"""Room left behind a boat outside the geofence, m, at least."""
+
+
 @dataclass(frozen=True)
 class Steered:
     """What went in and out of one decision; see `tick.Tick`."""
 
-    fleet: Fleet | None
-    wanted: Commands | None
-    surroundings: Surroundings | None
-    decisions: Decisions | None
-    shield_reset: bool
-    sent: Mapping[str, Sent]
-    actions: tuple[Action, ...]
+    fleet: Fleet | None = None
+    wanted: Commands | None = None
+    surroundings: Surroundings | None = None
+    decisions: Decisions | None = None
+    shield_reset: bool = False
+    sent: Mapping[str, Sent] = field(default_factory=dict)
+    actions: tuple[Action, ...] = ()
 
 
 class Helm:
@@ -75,19 +79,20 @@ class Helm:
             mates: team-mates another process commands behind a shield of their own.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
-        fleet: Fleet | None = None
-        wanted: Commands | None = None
+        so_far = Steered()
         try:
             fleet = assemble(roster, {*commanded, *mates}, verdict.dropped)
+            so_far = Steered(fleet)
             if fleet is None or not commanded:
-                return self._finish(fleet, None, None, False, verdict, {}, ())
+                return self._finish(so_far, verdict)
             wanted = self._wanted(fleet, commanded, answer, verdict)
+            so_far = Steered(fleet, wanted, water_of(self._file, fleet))
             reset = self._reset_if_due()
-            decisions = self._shield.decide(fleet, wanted, self._file.surroundings)
+            decisions = self._shield.decide(fleet, wanted, so_far.surroundings)
         except Exception as error:  # whatever broke, no boat may go on with an old command
-            return self._failed(fleet, wanted, verdict, commanded, error)
+            return self._finish(self._failed(so_far, commanded, error), verdict)
         sent = {name: self._send(name, decisions, fleet) for name in commanded}
-        return self._finish(fleet, wanted, decisions, reset, verdict, sent, ())
+        return self._finish(replace(so_far, decisions=decisions, shield_reset=reset, sent=sent), verdict)
 
     def stop_all(self, names: Collection[str]) -> dict[str, Sent]:
         """Tell boats to stop by their links' surest way, past the shield."""
@@ -128,48 +133,45 @@ class Helm:
             LOG.error("%s: command (%s rad, %s m/s) not sent: %s; told to stop", name, heading, speed, error)
             return self._links[name].stop()
 
-    def _failed(
-        self,
-        fleet: Fleet | None,
-        wanted: Commands | None,
-        verdict: Verdict,
-        commanded: Collection[str],
-        error: Exception,
-    ) -> Steered:
+    def _failed(self, so_far: Steered, commanded: Collection[str], error: Exception) -> Steered:
         self._fresh = True
         text = f"no decision ({type(error).__name__}: {error}); boats told to stop"
         now = self._clock.now_s()
         if text != self._failure[0] or now - self._failure[1] >= TALK_EVERY_S:
             self._failure = text, now
             LOG.error(text, exc_info=not isinstance(error, FleetError))
-        sent = self.stop_all(commanded)
-        return self._finish(fleet, wanted, None, False, verdict, sent, (Action("shield", "decision", "stop", text),))
+        action = Action("shield", "decision", "stop", text)
+        return replace(so_far, sent=self.stop_all(commanded), actions=(action,))
 
-    def _finish(
-        self,
-        fleet: Fleet | None,
-        wanted: Commands | None,
-        decisions: Decisions | None,
-        reset: bool,
-        verdict: Verdict,
-        sent: Mapping[str, Sent],
-        actions: tuple[Action, ...],
-    ) -> Steered:
+    def _finish(self, steered: Steered, verdict: Verdict) -> Steered:
         """Stop boats whose state is unknown; leave alone those that somebody else steers."""
-        everything = dict(sent)
+        sent = dict(steered.sent)
         for name in self._links:
-            if name in everything:
+            if name in sent:
                 continue
             if name in verdict.idle:
-                everything[name] = Sent(name, self._clock.now_s(), math.nan, math.nan, "none: does not obey", False)
+                sent[name] = Sent(name, self._clock.now_s(), math.nan, math.nan, "none: does not obey", False)
             else:
-                everything[name] = self._links[name].stop()
-        return Steered(
-            fleet,
-            wanted,
-            None if decisions is None else self._file.surroundings,
-            decisions,
-            reset,
-            everything,
-            actions,
-        )
+                sent[name] = self._links[name].stop()
+        return replace(steered, sent=sent)
+
+
+def water_of(file: FleetFile, fleet: Fleet) -> Surroundings:
+    """The geofence, wider where a boat of ours is outside: it needs room to turn back, and a wall has none behind it.
+
+    It grows in whole steps of `ROOM_M`, so that the shield packs few of them.
+    """
+    xmin, ymin, xmax, ymax = file.geofence.box
+    own = fleet.position_m[fleet.controlled]
+    if len(own) == 0:
+        return file.surroundings
+    (left, low), (right, high) = own.min(axis=0), own.max(axis=0)
+    grown = (_beyond(xmin - left), _beyond(ymin - low), _beyond(right - xmax), _beyond(high - ymax))
+    if not any(grown):
+        return file.surroundings
+    return Surroundings(field=(xmin - grown[0], ymin - grown[1], xmax + grown[2], ymax + grown[3]))
+
+
+def _beyond(outside_m: float) -> float:
+    """By how much an edge gives way to a boat that far outside, m."""
+    return ROOM_M * (math.ceil(outside_m / ROOM_M) + 1) if outside_m > 0.0 else 0.0

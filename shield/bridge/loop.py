@@ -179,8 +179,7 @@ class Loop:
         if self.operator.stopped:
             verdict.responses.update(dict.fromkeys(self.parts.links, "stop"))
         if self.operator.hard:
-            sent = self._helm.stop_all(tuple(self.parts.links))
-            return Steered(None, None, None, None, False, sent, ())
+            return Steered(sent=self._helm.stop_all(tuple(self.parts.links)))
         limit = self.fleet.limits.contact.max_age_s
         mates = {name for name in self._mates if self.roster.contact_age_s(name) <= limit}
         return self._helm.steer(self.roster, answer, verdict, mates)

@@ -1,0 +1,346 @@
+"""Fault drills of the whole loop on simulated boats: what the remaining information can prevent is prevented."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from bridge_fakes import World, fleet_of, straight
+from steerclear.shield import Shield
+from steerclear.shield.platforms import layout as L
+
+NORTH = 0.0
+
+
+def pair(rule=None, shield=None, **settings):
+    """Two own boats head on, 40 m apart, both told to go on."""
+
+    def head_on(snapshot):
+        return np.array([[2.0, 0.0], [2.0, math.pi]])
+
+    starts = [(20.0, 0.0, 0.0, 2.0), (20.3, 40.0, 180.0, 2.0)]
+    return World(fleet_of(blue=2, red=0, **settings), starts, rule or head_on, shield=shield)
+
+
+def duel(rule=None, **settings):
+    """One own boat, one other coming straight at it."""
+    world = World(
+        fleet_of(blue=1, red=1, **settings),
+        [(20.0, 0.0, 0.0, 2.0)],
+        rule or straight(NORTH),
+        others=[("red_1", 20.3, 40.0, 180.0, 2.0)],
+    )
+    return world
+
+
+def test_two_boats_told_to_collide_do_not():
+    world = pair().run(20.0)
+    assert 2.5 <= world.closest_m < 10.0
+    assert any(tick.decisions is not None and tick.decisions.count_intervened for tick in world.sink.ticks)
+
+
+class Unheeded(Shield):
+    """Decides, and sends what was wanted."""
+
+    def decide(self, fleet, wanted, surroundings=None):
+        return dataclasses.replace(super().decide(fleet, wanted, surroundings), sent=wanted)
+
+
+def test_without_the_shield_they_would():
+    assert pair(shield=Unheeded()).run(20.0).closest_m < 1.0
+
+
+@pytest.mark.parametrize("fault", ["hangs", "dies", "NaN", "1e9"])
+def test_a_policy_that_fails_is_answered_as_declared_and_breaks_no_distance(fault):
+    world = pair()
+
+    def strike(world):
+        if world.clock.now_s() < 1003.0:
+            return
+        if fault == "hangs":
+            world.policy.hung = True
+        elif fault == "dies":
+            world.policy.answer, world.policy.fault = None, "the policy's process died"
+            world.policy.hung = True
+        else:
+            world.policy.rule = lambda snapshot: np.full((2, 2), float(fault))
+
+    world.run(3.9, strike)
+    assert ("policy", "hold_course") in world.responses("blue_1")
+    world.run(10.0, strike)
+    assert ("policy", "hold_station") in world.responses("blue_1")
+    assert world.closest_m >= 2.5
+    commands = np.array([entry[1:] for link in world.links.values() for entry in link.sent])
+    assert np.isfinite(commands).all()
+    assert np.abs(commands).max() < 10.0
+
+
+def test_the_policys_fault_is_told():
+    world = pair()
+    world.policy.fault, world.policy.hung = "its process died with exit code 1", True
+    world.run(0.5)
+    assert any("exit code 1" in action.text for action in world.last.actions)
+
+
+def test_telemetry_that_stops_stops_the_boat_by_its_link_and_the_other_keeps_clear():
+    world = pair()
+
+    def strike(world):
+        if world.clock.now_s() >= 1004.0 and world.links["blue_1"].silent_since_s is None:
+            world.links["blue_1"].silent_since_s = world.clock.now_s()
+
+    world.run(4.7, strike)
+    assert ("navigation", "stop") in world.responses("blue_1")
+    assert world.links["blue_1"].stops == 0
+    world.run(1.6, strike)
+    assert world.links["blue_1"].stops > 0, "after lost_after_s its state is unknown"
+    fleet = world.last.fleet
+    assert fleet.names == ("blue_1", "blue_2")
+    assert fleet.controlled.tolist() == [False, True]
+    world.run(20.0, strike)
+    assert world.closest_m >= 2.5
+    grown = [tick.fleet.position_error_m[0] for tick in world.sink.ticks if tick.fleet is not None]
+    assert grown[-1] > 2.0
+    assert max(grown) < 20.0
+
+
+def test_a_boat_that_hears_nothing_any_more_is_kept_clear_of():
+    """Both directions of its link are lost: it goes on with its last command, then stops by its own time-out."""
+    world = pair()
+
+    def strike(world):
+        link, now = world.links["blue_1"], world.clock.now_s()
+        if now >= 1003.0 and link.silent_since_s is None:
+            link.silent_since_s, link.deaf = now, True
+        if now >= 1006.0:
+            link.command = (link.row[L.HEADING], 0.0)
+
+    world.run(25.0, strike)
+    assert ("link", "stop") in world.responses("blue_1")
+    assert world.closest_m >= 2.5
+
+
+def test_frozen_telemetry_is_old_telemetry():
+    """A link that finds its position frozen gives it its true age, whatever the time stamps say."""
+    world = pair()
+
+    def strike(world):
+        if world.clock.now_s() >= 1004.0:
+            link = world.links["blue_1"]
+            link.changed = {"position_m": (20.0, 8.0), "position_age_s": world.clock.now_s() - 1004.0}
+
+    world.run(20.0, strike)
+    assert world.links["blue_1"].stops > 0
+    assert world.closest_m >= 2.5
+
+
+def test_a_jump_of_30_m_is_not_followed_and_believed_only_after_a_while():
+    world = pair()
+
+    def strike(world):
+        if 1004.0 <= world.clock.now_s() < 1004.4:
+            world.links["blue_1"].offset_m = (30.0, 0.0)
+        else:
+            world.links["blue_1"].offset_m = (0.0, 0.0)
+
+    world.run(4.3, strike)
+    assert world.last.fleet.state[0, L.X] < 21.5
+    assert world.loop.roster.faults["blue_1"] == "position jumped 30 m"
+    world.run(20.0, strike)
+    assert world.closest_m >= 2.5
+    assert world.links["blue_1"].stops == 0
+
+
+def test_a_boat_that_stays_where_it_jumped_to_is_believed_in_the_end():
+    world = pair()
+    world.run(2.0)
+    world.links["blue_1"].offset_m = (30.0, 0.0)
+    world.run(1.5)
+    assert abs(world.last.fleet.state[0, L.X] - 20.0) < 3.0
+    world.run(2.0)
+    assert world.last.fleet.state[0, L.X] == pytest.approx(world.links["blue_1"].row[L.X] + 30.0, abs=0.5)
+
+
+def test_telemetry_a_second_late_is_run_on_by_the_model():
+    more = "limits: {navigation: {max_age_s: 1.5, then: stop}}"
+    world = pair(more=more)
+    world.links["blue_1"].late_s = world.links["blue_2"].late_s = 1.0
+    world.run(8.0)
+    truth = np.array([link.row[:2] for link in world.links.values()])
+    believed = world.last.fleet.state[:, :2]
+    assert np.abs(truth - believed).max() < 0.6
+    assert world.run(12.0).closest_m >= 2.5
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e9])
+@pytest.mark.parametrize("field", ["position_m", "heading_rad", "speed_mps"])
+def test_impossible_telemetry_never_reaches_the_shield(field, value):
+    world = pair()
+
+    def strike(world):
+        bad = (value, 3.0) if field == "position_m" else value
+        wrong = 1003.0 <= world.clock.now_s() < 1004.5
+        world.links["blue_1"].changed = {field: bad} if wrong and not (field == "heading_rad" and value == 1e9) else {}
+
+    world.run(15.0, strike)
+    assert world.closest_m >= 2.5
+    for tick in world.sink.ticks:
+        assert np.isfinite(tick.fleet.state[:, :4]).all()
+
+
+def test_a_lost_contact_slows_then_stops_us_and_is_kept_clear_of():
+    world = duel()
+
+    def strike(world):
+        if world.clock.now_s() >= 1002.0:
+            world.contacts.silent.add("red_1")
+
+    world.run(3.5, strike)
+    assert ("contact", "slow") in world.responses("red_1")
+    world.run(4.0, strike)
+    assert ("contact", "stop") in world.responses("red_1")
+    assert world.closest_m >= 2.5
+    ages = [tick.fleet.age_s[1] for tick in world.run(8.0, strike).sink.ticks]
+    assert max(ages) <= world.fleet.shield_config.max_track_age_s
+
+
+def test_an_override_of_a_lost_contact_leaves_it_out_and_says_so():
+    world = duel()
+    world.contacts.silent.add("red_1")
+    world.contacts.read()
+    world.run(1.0)
+    assert ("contact", "stop") in world.responses("red_1")
+    world.operator.override("contact", "red_1", 30.0, world.clock.now_s())
+    world.run(1.0)
+    assert ("override", "contact") in world.responses("red_1")
+    assert ("contact", "stop") not in world.responses()
+    assert "red_1" not in world.last.fleet.names
+    world.run(31.0)
+    assert ("contact", "stop") in world.responses("red_1")
+
+
+def test_a_link_that_comes_back_is_steered_again():
+    world = pair()
+    link = world.links["blue_1"]
+    world.run(2.0)
+    link.silent_since_s, link.deaf = world.clock.now_s(), True
+    world.run(5.0)
+    assert not world.last.fleet.controlled[0]
+    link.silent_since_s, link.deaf, link._silent = None, False, None
+    world.run(4.0)
+    assert world.last.fleet.controlled[0]
+    assert world.responses("blue_1") == set()
+
+
+def test_a_boat_in_another_mode_is_left_alone_and_kept_clear_of():
+    world = pair()
+    world.run(2.0)
+    link = world.links["blue_1"]
+    link.changed = {"ready": False, "why_not": "mode is MANUAL"}
+    before = len(link.sent)
+    link.command = (0.0, 2.0)
+    world.run(15.0)
+    assert len(link.sent) == before
+    assert link.stops == 0
+    assert ("mode", "none") in world.responses("blue_1")
+    assert not world.last.sent["blue_1"].delivered
+    assert world.closest_m >= 2.5
+
+
+def test_a_second_commander_is_answered_as_declared_and_told():
+    world = pair()
+    world.links["blue_1"].changed = {"faults": {"second_commander": 3}}
+    world.run(0.3)
+    world.links["blue_1"].changed = {}
+    world.run(1.0)
+    assert ("commander", "stop") in world.responses("blue_1")
+    world.run(3.0)
+    assert ("commander", "stop") not in world.responses("blue_1")
+
+
+def test_a_full_disk_is_answered_as_declared_until_it_is_not():
+    world = pair()
+    world.run(0.5)
+    world.sink.full = True
+    world.run(0.5)
+    world.sink.full = False
+    world.run(0.2)
+    assert ("log", "hold_station") in {(a.condition, a.response) for a in world.sink.ticks[-2].actions}
+    assert "free some" in next(a.text for a in world.sink.ticks[-2].actions if a.condition == "log")
+    assert ("log", "hold_station") not in world.responses()
+
+
+def test_stop_all_stops_all_through_the_shield_and_a_second_one_past_it():
+    world = pair()
+    world.run(1.0)
+    world.operator.stop_all("key")
+    world.run(2.0)
+    assert all(entry[2] == 0.0 for link in world.links.values() for entry in link.sent[-10:])
+    assert not any(link.stops for link in world.links.values())
+    assert ("stop_all", "stop") in world.responses("all")
+    world.operator.stop_all("key")
+    world.run(0.3)
+    assert all(link.stops == 3 for link in world.links.values())
+    world.operator.resume()
+    world.run(0.3)
+    assert world.links["blue_1"].sent[-1][2] > 0.0
+
+
+class Broken:
+    """A shield that raises."""
+
+    def __init__(self, error):
+        self.error = error
+        self.resets = 0
+
+    def reset(self):
+        self.resets += 1
+
+    def decide(self, *_):
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [ValueError("wrong"), ZeroDivisionError(), MemoryError("no memory")])
+def test_whatever_breaks_in_the_decision_all_are_told_to_stop_and_the_loop_goes_on(error):
+    fleet = fleet_of(blue=2, red=0)
+    shield = Broken(error)
+    world = World(fleet, [(0.0, 0.0, 0.0, 1.0), (30.0, 0.0, 0.0, 1.0)], straight(NORTH), shield=shield)
+    world.run(1.0)
+    assert len(world.sink.ticks) == 10
+    assert [link.stops for link in world.links.values()] == [10, 10]
+    assert shield.resets == 10
+    assert any(action.condition == "decision" and type(error).__name__ in action.text for action in world.last.actions)
+    assert world.last.decisions is None
+
+
+def test_a_link_that_breaks_the_turn_leaves_all_told_to_stop():
+    world = pair()
+    world.run(0.5)
+    world.links["blue_2"].read = lambda: 1 / 0
+    world.run(0.5)
+    assert world.links["blue_1"].stops == 5
+
+
+def test_a_sink_that_breaks_stops_nobody():
+    world = pair()
+    world.sink.take = lambda tick: 1 / 0
+    world.run(1.0)
+    assert len(world.links["blue_1"].sent) == 10
+
+
+def test_no_decision_no_command_before_the_first_fix():
+    world = pair()
+    for link in world.links.values():
+        link.changed = {"position_m": (math.nan, math.nan), "position_age_s": math.inf}
+    world.run(0.3)
+    assert world.last.fleet is None
+    assert [link.stops for link in world.links.values()] == [3, 3]
+    assert all(not link.sent for link in world.links.values())
+
+
+def test_a_boat_outside_the_geofence_is_steered_back():
+    world = World(fleet_of(blue=1, red=0), [(20.0, 62.0, 0.0, 0.0)], straight(NORTH))
+    world.run(1.0)
+    assert ("geofence", "return") in world.responses("blue_1")
+    world.run(40.0)
+    assert world.fleet.geofence.holds(*world.links["blue_1"].row[:2])
