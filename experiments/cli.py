@@ -16,6 +16,7 @@ from .commands.parity import parity
 from .commands.play import play
 from .commands.reach import app as reach_app
 from .commands.render import render
+from .commands.replay import replay
 from .provenance import package_version
 
 app = typer.Typer(
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, docs):
+for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, replay, docs):
     app.command()(function)
 app.add_typer(reach_app, name="reach")
 

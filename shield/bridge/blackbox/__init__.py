@@ -2,8 +2,7 @@
 
 How to use it::
 
-    header = LogHeader(config=config, surroundings=surroundings, platforms=platforms_of(kinds), boats=boats,
-                       frame=fleet.frame, fleet_text=text, policy="medium", clock_s=clock.now_s())
+    header = header_of_fleet(fleet, text, policy="medium", commanded=links, clock_s=clock.now_s())
     box = McapWriter(log_path(folder, ".mcap"), header)      # a TickSink
     box.take(tick)                                           # every turn; BridgeError: ticks can no longer be kept
     box.note("override of blue_1 by the operator")           # a line of text
@@ -15,6 +14,7 @@ How to use it::
 """
 
 from .disk import Disk
+from .fleet_header import header_of_fleet
 from .header import LoggedBoat, LogHeader, platforms_of
 from .mcap_writer import McapWriter, log_path
 from .reader import LogLine, LogReader
@@ -30,6 +30,7 @@ __all__ = [
     "McapWriter",
     "TlogWriter",
     "check_disk",
+    "header_of_fleet",
     "log_path",
     "platforms_of",
 ]

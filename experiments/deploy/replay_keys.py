@@ -1,0 +1,37 @@
+"""Keys of the JSON that `steerclear replay` writes, with meaning and unit."""
+
+from __future__ import annotations
+
+REPLAY = {
+    "log": "the log",
+    "began": "when it began, UTC",
+    "seconds": "its length, s",
+    "policy": "name of the policy",
+    "complete": "whether it was closed properly; false after a crash",
+    "damage[]": "what could not be read",
+    "origin[]": "what differs between the log's program and this one and may change a last bit",
+    "ticks": "turns of the loop in the log",
+    "decisions": "decisions run again",
+    "same": "of those, the same bit for bit",
+    "different": "of those, not the same, with everything before them known: 0 is the proof",
+    "unproven": "of those, not the same, but after missing ticks, so that the shield's memory is not known",
+    "missing[][]": "numbers of the ticks before and after each stretch of missing ones",
+    "first_difference": "null, or:",
+    "first_difference.tick": "number of the tick",
+    "first_difference.time_s": "since the log began, s",
+    "first_difference.boat": "whose decision",
+    "first_difference.what": "which value",
+    "first_difference.recorded": "as recorded",
+    "first_difference.replayed": "as decided again",
+    "reasons.*": "decisions of own boats by reason",
+    "actions[].condition": "what happened, such as telemetry or stop_all",
+    "actions[].response": "what was done",
+    "actions[].subject": "boat, contact, policy or link it was about",
+    "actions[].ticks": "turns of the loop in which it was in effect",
+    "stretches": "times a boat left its recorded track when steered by what was wanted",
+    "sides.*.closest_teammate_m": "closest distance of two own boats, m, with and without the shield",
+    "sides.*.closest_opponent_m": "closest distance of an own boat to another, m",
+    "sides.*.breaches_teammate": "entries of two own boats into the separation radius",
+    "sides.*.breaches_opponent": "entries of an own boat and another into the separation radius",
+    "files[]": "what was written",
+}

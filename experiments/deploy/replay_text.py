@@ -1,0 +1,123 @@
+"""What a replay found, on the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from .replaying_report import Replay
+
+MOST_ROWS = 12
+"""Rows of a table; the rest is counted."""
+
+
+def show(console: Console, replay: Replay) -> None:
+    """Print the whole report."""
+    _show_log(console, replay)
+    _show_proof(console, replay)
+    _show_actions(console, replay)
+    if replay.without is not None:
+        _show_sides(console, replay)
+        for side, title in (("with", "Breaches that happened"), ("without", "Breaches without the shield")):
+            _show_breaches(console, title, replay.breaches[side])
+
+
+def _show_log(console: Console, replay: Replay) -> None:
+    header, proof = replay.header, replay.proof
+    ours = [boat.name for boat in header.boats if boat.ours]
+    console.print(
+        f"{replay.began}, {replay.seconds:.1f} s, {proof.ticks} ticks"
+        + (f", policy {header.policy}" if header.policy else "")
+        + (f", own boats {', '.join(ours)}" if ours else "")
+    )
+    if not replay.complete:
+        console.print("The log was not closed (crash, power or kill); read up to its last whole second.")
+    for text in replay.damage:
+        console.print(f"Damage: {text}.")
+    for line in replay.lines[:MOST_ROWS]:
+        console.print(f"  {line.name}: {line.text}", markup=False)
+    _rest(console, len(replay.lines))
+
+
+def _show_proof(console: Console, replay: Replay) -> None:
+    proof = replay.proof
+    if proof.decisions == 0:
+        console.print("The log holds no decision of the shield.")
+        return
+    if proof.holds and proof.unproven == 0:
+        console.print(f"{proof.same} of {proof.decisions} decisions made again, the same bit for bit.", style="green")
+    else:
+        console.print(
+            f"{proof.same} of {proof.decisions} decisions are the same, {proof.different} differ, {proof.unproven} "
+            f"differ after missing ticks and prove nothing ({len(proof.missing)} gaps).",
+            style="red" if proof.different else "yellow",
+        )
+    if proof.first is not None:
+        first = proof.first
+        console.print(
+            f"First difference: tick {first.tick} at {first.time_s:.2f} s, {first.boat or 'all boats'}, {first.what}: "
+            f"recorded {first.recorded}, now {first.replayed}",
+            markup=False,
+        )
+        for text in replay.origin:
+            console.print(f"  {text}", markup=False)
+    total = sum(replay.reasons.values())
+    shares = ", ".join(f"{name} {count / total:.1%}" for name, count in replay.reasons.most_common())
+    console.print(f"Reasons: {shares}" if total else "No boat was covered.")
+
+
+def _show_actions(console: Console, replay: Replay) -> None:
+    if not replay.actions:
+        return
+    table = Table("condition", "response", "subject", "ticks", title="Declared and in effect", title_justify="left")
+    for (condition, response, subject), count in replay.actions.most_common(MOST_ROWS):
+        table.add_row(condition, response, subject, str(count))
+    console.print(table)
+    _rest(console, len(replay.actions))
+
+
+def _show_sides(console: Console, replay: Replay) -> None:
+    table = Table("", "with the shield", "without", title="Own boats", title_justify="left")
+    sides = [replay.sides[side] for side in ("with", "without")]
+    for key, name in (
+        ("closest_teammate_m", "closest team-mate, m"),
+        ("closest_opponent_m", "closest other boat, m"),
+        ("breaches_teammate", "breaches with team-mates"),
+        ("breaches_opponent", "breaches with others"),
+    ):
+        table.add_row(name, *(_number(side[key]) for side in sides))
+    console.print(table)
+    stretches = 0 if replay.without is None else replay.without.stretches
+    console.print(
+        f"Radius {replay.header.config.separation_m:g} m. Boats left their track {stretches} times to do what was "
+        "wanted; others stay on theirs."
+    )
+
+
+def _show_breaches(console: Console, title: str, breaches: list[dict[str, Any]]) -> None:
+    if not breaches:
+        return
+    judged = any(entry["responsible"] for entry in breaches)
+    table = Table("time, s", "boats", "closest, m", title=title, title_justify="left")
+    for name in ("verdict", "last chance, s before", "responsible") if judged else ():
+        table.add_column(name)
+    for entry in breaches[:MOST_ROWS]:
+        row = [f"{entry['time_s']:.1f}", ", ".join(entry["boats"]), f"{entry['closest_m']:.2f}"]
+        if judged:
+            row += [entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-"]
+        table.add_row(*row)
+    console.print(table)
+    _rest(console, len(breaches))
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _rest(console: Console, count: int) -> None:
+    if count > MOST_ROWS:
+        console.print(f"  and {count - MOST_ROWS} more")

@@ -1,0 +1,151 @@
+"""Running the shield again on what a log holds, to prove that it decides the same, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from steerclear.shield import Decisions, Shield, SteerclearError
+from steerclear.shield.bridge.blackbox import LogHeader
+from steerclear.shield.bridge.tick import Tick
+
+FIELDS = ("intervened", "reason", "certificate_m", "slack_m", "bound")
+"""Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where a decision differs from the recorded one.
+
+    Attributes:
+        tick: its number.
+        time_s: since the log began, s.
+        boat: whose; "" when it is about all.
+        what: which value.
+        recorded, replayed: the two, to the last bit.
+    """
+
+    tick: int
+    time_s: float
+    boat: str
+    what: str
+    recorded: str
+    replayed: str
+
+
+@dataclass
+class Proof:
+    """What the replay found.
+
+    Attributes:
+        ticks: in the log.
+        decisions: decided again.
+        same: of those, the same bit for bit.
+        unproven: of those, not the same, but after ticks that are missing, so that the shield's memory is not known.
+        different: of those, not the same though everything before is known.
+        first: the first of these.
+        missing: (number before, number after) of each stretch of missing ticks.
+    """
+
+    ticks: int = 0
+    decisions: int = 0
+    same: int = 0
+    unproven: int = 0
+    different: int = 0
+    first: Difference | None = None
+    missing: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def holds(self) -> bool:
+        """Whether no decision differs that could be proved."""
+        return self.different == 0
+
+
+class Prover:
+    """Decides again tick by tick.
+
+    The shield remembers escapes from tick to tick, so that after missing ticks its answer is only known again from the
+    next reset on, or from the next change of the fleet's boats, which makes it forget as well.
+
+    Args:
+        header: of the log.
+    """
+
+    def __init__(self, header: LogHeader) -> None:
+        self.proof = Proof()
+        self._header = header
+        self._shield = Shield(header.config, header.surroundings)
+        self._known = False
+        self._last: int | None = None
+        self._boats: Any = None
+
+    def add(self, tick: Tick) -> None:
+        """Decide a tick again and compare."""
+        self._follow(tick)
+        if tick.fleet is None or tick.wanted is None or tick.decisions is None:
+            return
+        boats = (tick.fleet.platforms, tick.fleet.names, tick.fleet.team.tobytes())
+        self._known |= tick.shield_reset or (self._boats is not None and boats != self._boats)
+        self._boats = boats
+        if tick.shield_reset:
+            self._shield.reset()
+        difference = self._compare(tick, tick.decisions)
+        self.proof.decisions += 1
+        if difference is None:
+            self.proof.same += 1
+        elif self._known:
+            self.proof.different += 1
+            self.proof.first = self.proof.first or difference
+        else:
+            self.proof.unproven += 1
+
+    def _follow(self, tick: Tick) -> None:
+        self.proof.ticks += 1
+        if self._last is None:
+            self._known = tick.number == 0
+        elif tick.number != self._last + 1:
+            self.proof.missing.append((self._last, tick.number))
+            self._known, self._boats = False, None
+        self._last = tick.number
+
+    def _compare(self, tick: Tick, recorded: Decisions) -> Difference | None:
+        time_s = tick.began_s - self._header.clock_s
+        try:
+            replayed = self._shield.decide(recorded.fleet, recorded.wanted, tick.surroundings)
+        except SteerclearError as error:
+            return Difference(tick.number, time_s, "", "decision", "decided", f"refused: {error}")
+        for boat, what, a, b in _differing(recorded, replayed):
+            return Difference(tick.number, time_s, boat, what, exact(a), exact(b))
+        return None
+
+
+def prove(header: LogHeader, ticks: Iterable[Tick]) -> Proof:
+    """Decide all ticks of a log again."""
+    prover = Prover(header)
+    for tick in ticks:
+        prover.add(tick)
+    return prover.proof
+
+
+def exact(value: Any) -> str:
+    """A value so that two that differ in a bit read differently."""
+    return f"{value!r} ({value.hex()})" if isinstance(value, float) else repr(value)
+
+
+def _differing(recorded: Decisions, replayed: Decisions) -> Iterator[tuple[str, str, Any, Any]]:
+    """Boat, name of the value and the two values, for every value that differs in a bit."""
+    if recorded.sent.relative != replayed.sent.relative:
+        yield "", "frame of the command", recorded.sent.relative, replayed.sent.relative
+    pairs = [("sent speed, m/s", recorded.sent.values[:, 0], replayed.sent.values[:, 0])]
+    pairs += [("sent heading", recorded.sent.values[:, 1], replayed.sent.values[:, 1])]
+    pairs += [(name, getattr(recorded, name), getattr(replayed, name)) for name in FIELDS]
+    for name, a, b in pairs:
+        for i in np.flatnonzero(_bits(a) != _bits(b)):
+            yield recorded.fleet.names[i], name, a[i].item(), b[i].item()
+
+
+def _bits(values: Any) -> Any:
+    array = np.ascontiguousarray(values)
+    return array.view(np.uint64) if array.dtype == np.float64 else array
