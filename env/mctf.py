@@ -123,7 +123,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         self.agents = self.possible_agents[:]
         if self.render_mode == "human":
             self.render()
-        return self._observations(), self._info_writer.infos()
+        return self._observations(), self.infos()
 
     def step(
         self, actions: Mapping[str, Any]
@@ -150,7 +150,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             self._rewards(rewards[0], before),
             dict.fromkeys(ids, bool(terminated[0])),
             dict.fromkeys(ids, bool(truncated[0])),
-            self._info_writer.infos(),
+            self.infos(),
         )
         if terminated[0] or truncated[0]:
             self.agents = []
@@ -169,6 +169,10 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
     def state(self) -> np.ndarray:
         """Raw global state vector (n_global,) float32, in the order of ``global_state_normalizer.keys``."""
         return self._info_writer.global_vector().astype(np.float32)
+
+    def infos(self) -> dict[str, dict[str, Any]]:
+        """Infos by agent id of the game as it stands, as `reset` and `step` answer them."""
+        return self._info_writer.infos()
 
     def view(self) -> GameView:
         """A frozen copy of the game as it stands."""

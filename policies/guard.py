@@ -53,6 +53,8 @@ class GuardedTeam:
     def __init__(self, name: str, code: ForeignCode) -> None:
         self.name = name
         self.code = code
+        self.held: dict[str, str] = {}
+        """Boats that hold in this step, and why."""
         self._ids: list[str] = []
         self._reporter = Reporter(name)
 
@@ -83,6 +85,7 @@ class GuardedTeam:
         if not self._ids:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
         answer = self.code.prepare(observations, infos)
+        self.held = {}
         with self.code.around():
             answers = {agent_id: self._ask(answer, agent_id) for agent_id in self._ids}
         actions = {agent_id: self._checked(agent_id, *answers[agent_id]) for agent_id in self._ids}
@@ -108,11 +111,12 @@ class GuardedTeam:
 
     def _checked(self, agent_id: str, action: Any, error: BaseException | None) -> Action:
         if error is not None:
-            self._reporter.failed(agent_id, f"raised {type(error).__name__}", describe_error(error))
-            return HOLD
-        found = self._reader.problem(agent_id, action)
+            found: tuple[str, str] | None = (f"raised {type(error).__name__}", describe_error(error))
+        else:
+            found = self._reader.problem(agent_id, action)
         if found is None:
             return action
+        self.held[agent_id] = f"{found[0]}: {found[1]}"
         self._reporter.failed(agent_id, *found)
         return HOLD
 

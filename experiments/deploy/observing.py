@@ -1,0 +1,160 @@
+"""The game as a policy sees it: an env set to what the loop saw, whose own code makes the observations."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.motion import is_on_side
+from steerclear.shield.bridge.feed import GameState, game_state
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.exceptions import FleetError
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import wrap_degrees
+
+from .rules import game_config
+
+RESTART_S = 1.0
+"""A game whose clock goes back by more than this is a new one."""
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Which boat of a fleet plays which agent.
+
+    Attributes:
+        config: settings of the game.
+        names: all boats of the file, in its order.
+        rows: number in ``names`` of each agent's boat, agent_0 first.
+        ours: agents the policy plays.
+    """
+
+    config: GameConfig
+    names: tuple[str, ...]
+    rows: tuple[int, ...]
+    ours: tuple[str, ...]
+
+    @property
+    def players(self) -> tuple[str, ...]:
+        """Names of the boats that play, agent_0 first."""
+        return tuple(self.names[row] for row in self.rows)
+
+
+def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None) -> Cast:
+    """The cast of a fleet file.
+
+    Args:
+        fleet: the file.
+        boats: the boats the policy plays; None: all that a process commands for our team, see `FleetFile.commanded`.
+
+    Raises:
+        FleetFileError: the file has no game, or one of the boats does not play.
+    """
+    config = game_config(fleet)
+    wanted = [boat.name for boat in fleet.commanded()] if boats is None else list(boats)
+    ours = tuple(boat.agent for boat in map(fleet.boat, wanted) if boat.agent is not None)
+    rows = tuple(i for i, boat in enumerate(fleet.boats) if boat.agent is not None)
+    return Cast(config, fleet.names, rows, ours)
+
+
+class Observer:
+    """An `MctfEnv` that shows what the loop saw; nothing in it moves by itself.
+
+    A boat never seen is shown at its start, tagged, at rest. Without word from a referee the game is as at its start.
+    Speeds astern are shown as 0, since boats of the game have none.
+
+    Args:
+        cast: who plays.
+    """
+
+    def __init__(self, cast: Cast) -> None:
+        self.cast = cast
+        self.env = MctfEnv(cast.config)
+        self.env.reset()
+        self._start = self.env.view()
+        self._time_s = 0.0
+        self._positions: Array | None = None
+
+    def show(self, snapshot: Snapshot) -> bool:
+        """Set the env to a snapshot.
+
+        Returns:
+            Whether this begins a new game: the first snapshot, or the game's clock went back.
+
+        Raises:
+            FleetError: the snapshot is of other boats.
+            FeedError: the state of the game in it cannot be used.
+        """
+        seen = self._agents_seen(snapshot)
+        game = game_state(snapshot.game) if snapshot.game else None
+        time_s = 0.0 if game is None else game.time_s
+        begins = self._positions is None or time_s < self._time_s - RESTART_S
+        lost = np.isnan(seen[:, 0])
+        state = self._start.state.copy()
+        state[~lost, L.X], state[~lost, L.Y] = seen[~lost, 0], seen[~lost, 1]
+        state[~lost, L.HEADING] = [wrap_degrees(heading) for heading in seen[~lost, 2]]
+        state[~lost, L.SPEED] = np.maximum(seen[~lost, 3], 0.0)
+        position = state[:, [L.X, L.Y]]
+        view = dataclasses.replace(
+            self._start,
+            state=state,
+            previous_position=position if begins or self._positions is None else self._positions,
+            is_tagged=lost,
+            on_side=self._sides(position),
+            time_s=time_s,
+        )
+        self.env.core.restore(view if game is None else self._with_game(view, game, lost))
+        self._positions, self._time_s = position, time_s
+        return begins
+
+    def observations(self) -> dict[str, np.ndarray]:
+        """Observations of all agents, as `MctfEnv.step` answers them."""
+        rows = self.env.core.observe()[0].copy()
+        return {agent_id: rows[i] for i, agent_id in enumerate(self.env.possible_agents)}
+
+    def infos(self) -> dict[str, dict[str, Any]]:
+        """Infos of all agents, as `MctfEnv.step` answers them."""
+        return self.env.infos()
+
+    def _agents_seen(self, snapshot: Snapshot) -> Array:
+        seen = np.asarray(snapshot.seen, dtype=np.float64)
+        if seen.shape != (len(self.cast.names), 4):
+            raise FleetError(f"seen has shape {seen.shape}; give ({len(self.cast.names)}, 4), a row per boat")
+        rows = seen[list(self.cast.rows)]
+        rows[~np.isfinite(rows).all(axis=1)] = np.nan
+        return rows
+
+    def _sides(self, position: Array) -> Array:
+        rules = self.env.core.rules
+        sides = [is_on_side(rules.scrimmage, rules.side_sign[rules.team[i]], x, y) for i, (x, y) in enumerate(position)]
+        return np.array(sides, dtype=np.bool_)
+
+    def _with_game(self, view: Any, game: GameState, lost: Array) -> Any:
+        """The view with the referee's word; a flag carried by a boat in sight is where that boat is."""
+        arrays = {
+            name: np.array(getattr(view, name))
+            for name in ("is_tagged", "has_flag", "oob", "on_side", "driven", "tagging_cooldown_s")
+        }
+        for i, name in enumerate(self.cast.players):
+            status = game.boats.get(name)
+            if status is None or lost[i]:
+                continue
+            arrays["is_tagged"][i], arrays["has_flag"][i] = status.tagged, status.has_flag
+            arrays["oob"][i], arrays["on_side"][i] = status.oob, status.on_side
+            arrays["driven"][i] = status.driven
+            arrays["tagging_cooldown_s"][i] = min(status.cooldown_s, self.cast.config.tagging_cooldown_s)
+        flags = np.array([(flag.x_m, flag.y_m) for flag in game.flags])
+        for i in np.flatnonzero(arrays["has_flag"]):
+            flags[1 - view.team[i]] = view.state[i, [L.X, L.Y]]
+        counts = {name: np.array(getattr(game, name), dtype=np.int64) for name in ("captures", "grabs", "tags")}
+        taken = np.array([flag.taken for flag in game.flags])
+        return dataclasses.replace(
+            view, flag_position=flags, flag_taken=taken, terminated=game.over, **arrays, **counts
+        )

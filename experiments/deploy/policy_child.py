@@ -1,0 +1,96 @@
+"""The policy's own process: ``python -m steerclear.experiments.deploy.policy_child READ_FD WRITE_FD``.
+
+Reads pickled `Orders`, then snapshots; answers JSON. It ends when the runner does, also while the policy is busy.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import pickle
+import sys
+import threading
+from typing import Any
+
+from .frames import read_message, write_message
+
+FAILED = 3
+"""Exit status when the policy could not be loaded; the answer before it says why."""
+
+
+class Slot:
+    """Holds the latest snapshot, filled by a thread, so that a slow policy skips those it was too late for."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._ready = threading.Condition()
+        self._message: bytes | None = None
+        threading.Thread(target=self._fill, name="snapshots", daemon=True).start()
+
+    def take(self) -> bytes:
+        """The latest message not taken yet, waiting for it."""
+        with self._ready:
+            self._ready.wait_for(lambda: self._message is not None)
+            message, self._message = self._message, None
+        return message or b""
+
+    def _fill(self) -> None:
+        while True:
+            message = None
+            with contextlib.suppress(OSError):
+                message = read_message(self._descriptor)
+            if message is None:
+                os._exit(0)  # the runner is gone; the policy may be in the middle of anything
+            with self._ready:
+                self._message = message
+                self._ready.notify()
+
+
+def main(read_fd: int, write_fd: int) -> int:
+    """Load the policy the first message names and answer snapshots until the runner is gone."""
+    _give_way()
+    orders = read_message(read_fd)
+    if orders is None:
+        return 0
+    from steerclear.shield.exceptions import SteerclearError
+
+    from .player import load_player
+
+    try:
+        player = load_player(pickle.loads(orders))
+    except SteerclearError as error:
+        _answer(write_fd, {"failed": str(error)})
+        return FAILED
+    _answer(write_fd, {"ready": True})
+    slot = Slot(read_fd)
+    while True:
+        snapshot = pickle.loads(slot.take())
+        try:
+            play = player.play(snapshot)
+        except (SteerclearError, SystemExit) as error:
+            _answer(write_fd, {"number": snapshot.number, "commands": None, "problems": [_line(error)]})
+            continue
+        rows = [[float(value) for value in row] if math.isfinite(row[0]) else None for row in play.commands]
+        _answer(write_fd, {"number": snapshot.number, "commands": rows, "problems": list(play.problems)})
+
+
+def _give_way() -> None:
+    """Let the runner go first on a busy machine, and be the one to go when memory runs out."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.nice(5)
+    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
+        file.write("1000")
+
+
+def _answer(write_fd: int, content: dict[str, Any]) -> None:
+    write_message(write_fd, json.dumps(content, allow_nan=False).encode())
+
+
+def _line(error: BaseException) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), int(sys.argv[2])))

@@ -1,0 +1,260 @@
+"""`PolicyProcess`: a policy in a process of its own, so that whatever it does the loop goes on in time.
+
+Nothing here waits: each call takes what has come, sends what can be sent and looks after the process.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import pickle
+import time
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from steerclear.shield.bridge.clock import Clock, MonotonicClock
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.wanted import Answer, Snapshot
+from steerclear.shield.commands import Commands
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.jit import Array
+
+from .frames import Broken
+from .observing import cast_of
+from .player import Orders
+from .worker import Worker
+
+logger = logging.getLogger(__name__)
+
+START_WITHIN_S = 60.0
+"""Time a policy has to load and to answer for the first time, s."""
+SLOW_S = 0.3
+"""An answer that takes longer is reported as a fault."""
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 10.0
+"""Pause before a policy that died is started again, doubled each time, s."""
+HEALTHY_S = 30.0
+"""A policy that answered for so long starts with the first pause again, s."""
+
+
+class PolicyProcess:
+    """A `WantedSource`: shows snapshots to a policy elsewhere and gives its latest answer. A context manager.
+
+    At most one snapshot is on its way; of those that come meanwhile the latest waits. A policy that dies or does not
+    answer within ``deadline_s`` is ended, with all processes it started, and started again after a pause.
+
+    Args:
+        fleet: the file.
+        policy: name or path, as `steerclear.policies.make` takes it.
+        deadline_s: time an answer may take, s of the machine; None: the file's limits.policy.give_up_after_s.
+        clock: clock of the snapshots; None: the machine's.
+        boats: names of the boats it plays; None: all that a process commands for our team.
+        options: of the policy.
+        seed: of what the policy draws.
+        start_within_s: time it has to load, s of the machine.
+
+    Raises:
+        FleetFileError: the file has no game, or one of the boats does not play.
+    """
+
+    def __init__(
+        self,
+        fleet: FleetFile,
+        policy: str,
+        deadline_s: float | None = None,
+        *,
+        clock: Clock | None = None,
+        boats: Sequence[str] | None = None,
+        options: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        start_within_s: float = START_WITHIN_S,
+    ) -> None:
+        self.policy = policy
+        self._orders = pickle.dumps(Orders(cast_of(fleet, boats), policy, dict(options or {}), seed))
+        self._shape = (len(fleet.names), 2)
+        self._deadline_s = fleet.limits.policy.give_up_after_s if deadline_s is None else deadline_s
+        self._start_within_s = start_within_s
+        self._clock: Clock = MonotonicClock() if clock is None else clock
+        self._worker: Worker | None = None
+        self._buried: list[Worker] = []
+        self._ready = self._answered = self._closed = False
+        self._pending: Snapshot | None = None
+        self._asked: Snapshot | None = None
+        self._since_s = self._again_s = -math.inf
+        self._pause_s = FIRST_PAUSE_S
+        self._healthy_s = math.inf
+        self._commands: Commands | None = None
+        self._taken_s = -math.inf
+        self._fault = ""
+        self.restarts = 0
+        """How often the policy was started again."""
+        self.refused = ""
+        """Why the policy could not be loaded at the last start; empty: it could."""
+
+    def start(self) -> None:
+        """Start the policy and wait until it is loaded; the only call that waits. Without it, `offer` starts it.
+
+        Raises:
+            PolicyError: it cannot be loaded, or not in time.
+        """
+        end_s = time.monotonic() + self._start_within_s
+        self._launch()
+        while not self._ready:
+            time.sleep(0.01)
+            self._turn()
+            late = time.monotonic() > end_s
+            if self._worker is None or late:
+                said = self.refused or (f"not within {self._start_within_s:g} s" if late else self._fault)
+                self.close()
+                raise PolicyError(self.refused or f"policy {self.policy!r} does not start: {said}")
+
+    def offer(self, snapshot: Snapshot) -> None:
+        """Show it the latest snapshot; older ones it has not looked at are dropped."""
+        self._pending = snapshot
+        self._turn()
+
+    def latest(self) -> Answer:
+        """Its latest answer."""
+        self._turn()
+        return Answer(self._commands, self._clock.now_s() - self._taken_s, self._present_fault())
+
+    def output(self) -> str:
+        """The end of what the policy printed."""
+        return "" if self._worker is None else self._worker.output()
+
+    def close(self) -> None:
+        """End the policy's process; may be called again."""
+        self._closed = True
+        self._bury()
+        for worker in self._buried:
+            worker.wait(2.0)
+        self._buried.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _turn(self) -> None:
+        if self._closed:
+            return
+        now_s = time.monotonic()
+        self._buried = [worker for worker in self._buried if not worker.is_gone]
+        if self._worker is None:
+            if now_s >= self._again_s:
+                self._launch()
+            return
+        try:
+            for message in self._worker.messages():
+                self._take(message, now_s)
+            self._show(now_s)
+        except Broken as error:
+            self._lose(self._worker.epitaph(str(error)), now_s)
+            return
+        self._check_time(now_s)
+
+    def _launch(self) -> None:
+        now_s = time.monotonic()
+        try:
+            self._worker = Worker(self._orders)
+        except (OSError, Broken) as error:
+            self._lose(f"cannot be started ({error})", now_s)
+            return
+        self._ready = self._answered = False
+        self._asked = None
+        self._since_s, self._healthy_s = now_s, math.inf
+
+    def _take(self, message: bytes, now_s: float) -> None:
+        content = _content(message)
+        if "failed" in content:
+            self.refused = str(content["failed"])[:500]
+            raise Broken(self.refused)
+        if content.get("ready") is True and not self._ready:
+            self._ready, self.refused = True, ""
+            return
+        asked = self._asked
+        if asked is None or content.get("number") != asked.number:
+            raise Broken("it answers what it was not asked")
+        self._asked = None
+        self._answered = True
+        self._healthy_s = min(self._healthy_s, now_s)
+        problems = content.get("problems")
+        self._fault = "; ".join(map(str, problems))[:300] if isinstance(problems, list) else ""
+        rows = _commands(content.get("commands"), self._shape)
+        if rows is not None:
+            self._commands, self._taken_s = Commands.absolute_rad(rows), asked.taken_s
+
+    def _show(self, now_s: float) -> None:
+        worker = self._worker
+        if worker is None:
+            return
+        worker.flush()
+        if self._ready and self._asked is None and self._pending is not None:
+            worker.send(pickle.dumps(self._pending))
+            self._asked, self._pending = self._pending, None
+            self._since_s = now_s
+
+    def _check_time(self, now_s: float) -> None:
+        waited_s = now_s - self._since_s
+        if not self._ready and waited_s > self._start_within_s:
+            self._lose(f"did not load within {self._start_within_s:g} s", now_s)
+        elif self._asked is not None and waited_s > (self._deadline_s if self._answered else self._start_within_s):
+            self._lose(f"did not answer within {self._deadline_s:g} s", now_s)
+        elif now_s - self._healthy_s > HEALTHY_S:
+            self._pause_s = FIRST_PAUSE_S
+
+    def _lose(self, what: str, now_s: float) -> None:
+        """The process is of no use any more: end it and start another after a pause."""
+        self._bury()
+        self._ready = False
+        self._fault = f"policy {self.policy} {what}; starting it again after {self._pause_s:g} s"
+        self._again_s = now_s + self._pause_s
+        self._pause_s = min(2.0 * self._pause_s, LONGEST_PAUSE_S)
+        self.restarts += 1
+        logger.warning("%s", self._fault)
+
+    def _bury(self) -> None:
+        """End the present process; it is asked for again until the system has taken it."""
+        if self._worker is not None:
+            self._worker.end()
+            self._buried.append(self._worker)
+            self._worker = None
+
+    def _present_fault(self) -> str:
+        waited_s = time.monotonic() - self._since_s
+        if self._worker is None:
+            return self._fault or f"policy {self.policy} is not running"
+        if not self._ready:
+            before = f"; before: {self._fault}" if self._fault else ""
+            return f"policy {self.policy} is loading ({waited_s:.1f} s){before}"
+        if self._asked is not None and waited_s > SLOW_S:
+            return f"policy {self.policy} has not answered for {waited_s:.1f} s"
+        return self._fault
+
+
+def _content(message: bytes) -> Mapping[str, Any]:
+    try:
+        content = json.loads(message)
+    except (ValueError, RecursionError):
+        raise Broken("its answer is not JSON") from None
+    if not isinstance(content, dict):
+        raise Broken("its answer is no object")
+    return content
+
+
+def _commands(rows: Any, shape: tuple[int, int]) -> Array | None:
+    """Commands (n, 2) of an answer, NaN where it has none; None: it has none for any boat."""
+    if rows is None:
+        return None
+    try:
+        values = np.array([[math.nan, math.nan] if row is None else row for row in rows], dtype=np.float64)
+    except (TypeError, ValueError):
+        raise Broken("its answer holds no commands") from None
+    if values.shape != shape:
+        raise Broken(f"its answer has commands of shape {values.shape}, not {shape}")
+    return values

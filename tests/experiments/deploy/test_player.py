@@ -1,0 +1,238 @@
+"""A policy on the water is shown and answers what it is shown and answers in the game."""
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.experiments.deploy.observing import Observer, cast_of
+from steerclear.experiments.deploy.player import Orders, Player, load_player
+from steerclear.experiments.deploy.rules import game_config
+from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError
+from steerclear.shield.platforms import layout as L
+
+ALL_OVER = """
+    import zlib
+"""
+EXACT = """
+    # whatever the submission can read goes into what it answers
+    seen = [full_obs_normalized[a].tobytes() for a in sorted(full_obs_normalized)]
+    seen.append(repr(sorted((str(a), sorted((str(k), float(v)) for k, v in full_obs[a].items())) for a in full_obs)))
+    seen.append(repr(sorted((str(k), np.ravel(v).tolist()) for k, v in global_state.items())))
+    text = repr(seen) + agent_id
+    self.calls += 1
+    return (1.5, zlib.crc32(text.encode()) % 36000 / 100.0 - 180.0)
+"""
+
+
+def play_both(fleet, policy, snapshot_of, steps, seed=5, opponent="medium"):
+    """Play a game in the env and show the same states to a `Player`; yields the commands of both."""
+    env = MctfEnv(game_config(fleet))
+    observations, infos = env.reset(seed=1)
+    ours = list(cast_of(fleet).ours)
+    theirs = [agent_id for agent_id in env.possible_agents if agent_id not in ours]
+    team, other = policies.make(policy), policies.make(opponent)
+    team.reset(env, ours, seed)
+    other.reset(env, theirs, 2)
+    player = load_player(Orders(cast_of(fleet), policy, seed=seed))
+    for step in range(steps):
+        play = player.play(snapshot_of(env, fleet, step))
+        actions = team.act(observations, infos) | other.act(observations, infos)
+        commands = env.core.commands(env.decode(actions)[np.newaxis])[0]
+        yield env, play, commands, [env.possible_agents.index(a) for a in ours], player, observations, infos
+        observations, *_, infos = env.step(actions)
+    player.close()
+    if hasattr(team, "close"):
+        team.close()
+
+
+@pytest.mark.parametrize("policy", ["medium", "hard", "easy", "waypoints", "random", "rammer", "hidden"])
+@pytest.mark.parametrize("side", ["blue", "red"])
+def test_scripted_policies_answer_bit_for_bit_what_they_answer_in_the_game(fleet_of, snapshot_of, policy, side):
+    for _, play, commands, ours, *_ in play_both(fleet_of(team=side), policy, snapshot_of, 150):
+        assert play.problems == ()
+        np.testing.assert_array_equal(play.relative[ours], commands[ours])
+
+
+def test_a_submission_sees_and_answers_bit_for_bit_what_it_does_in_the_game(fleet_of, snapshot_of, write_entry):
+    entry = write_entry(EXACT, start="self.calls = 0", head="import zlib\nimport numpy as np")
+    driven = 0
+    for env, play, commands, ours, player, observations, infos in play_both(fleet_of(), entry, snapshot_of, 400):
+        assert play.problems == ()
+        np.testing.assert_array_equal(play.relative[ours], commands[ours])
+        np.testing.assert_array_equal(play.driven, env.core.driven[0])
+        driven += play.driven[:3].sum()
+        for agent_id, row in player.observer.observations().items():
+            np.testing.assert_array_equal(row, observations[agent_id])
+        assert repr(player.observer.infos()) == repr(infos)
+    assert driven, "boats were tagged or out of bounds, and driven by the game"
+
+
+def test_commands_are_absolute_and_for_all_boats_of_the_file(fleet_of, snapshot_of):
+    fleet = fleet_of()
+    for env, play, commands, *_ in play_both(fleet, "medium", snapshot_of, 5):
+        heading = env.core.state[0, :, L.HEADING]
+        assert play.commands.shape == (7, 2)
+        assert np.isnan(play.commands[[3, 4, 5, 6]]).all(), "rescue and red are not ours"
+        turned = np.degrees(play.commands[:3, 1]) - heading[:3] - commands[:3, 1]
+        assert np.allclose((turned + 180.0) % 360.0 - 180.0, 0.0, atol=1e-9)
+        assert (play.commands[:3, 1] >= 0.0).all()
+        assert (play.commands[:3, 1] < 2.0 * math.pi).all()
+
+
+def test_more_than_top_speed_is_top_speed_on_boats(fleet_of, snapshot_of, write_entry):
+    player = load_player(Orders(cast_of(fleet_of(1)), write_entry("return (5.0, 10.0)")))
+    env = MctfEnv(game_config(fleet_of(1)))
+    play = player.play(snapshot_of(env, fleet_of(1)))
+    assert play.relative[0].tolist() == [5.0, 10.0]
+    assert play.commands[0, 0] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("return float('nan')", "not finite"),
+        ("return (1e9, 0.0)", "too large"),
+        ("return (float('inf'), 0.0)", "not finite"),
+        ("return None", "no answer"),
+        ("return 'nowhere'", "field point"),
+        ("raise KeyError('wall_9')", "KeyError"),
+        ("raise SystemExit(3)", "SystemExit"),
+        ("import sys; sys.exit()", "SystemExit"),
+    ],
+)
+def test_a_boat_without_a_usable_answer_has_no_command_and_the_others_have(
+    fleet_of, snapshot_of, write_entry, body, words
+):
+    fleet = fleet_of()
+    guilty = f"if agent_id == 'agent_1' and float(global_state[('agent_0', 'speed')]) >= 0.0:\n    {body}\nreturn 4"
+    player = load_player(Orders(cast_of(fleet), write_entry(guilty)))
+    env = MctfEnv(game_config(fleet))
+    play = player.play(snapshot_of(env, fleet))
+    assert np.isnan(play.commands[1]).all()
+    assert np.isfinite(play.commands[[0, 2]]).all()
+    (problem,) = play.problems
+    assert problem.startswith("blue_2: ")
+    assert words in problem
+    env.core.is_tagged[0, 1] = True
+    tagged = player.play(snapshot_of(env, fleet, 1))
+    assert np.isfinite(tagged.commands[1]).all(), "the game drives a tagged boat home whatever its policy does"
+
+
+def test_what_a_policy_object_raises_is_a_problem_of_its_boats(fleet_of, snapshot_of):
+    player = load_player(Orders(cast_of(fleet_of(1)), "hold"))
+    env = MctfEnv(game_config(fleet_of(1)))
+
+    def fail(observations, infos):
+        raise RuntimeError("out of\nideas")
+
+    player.policy.act = fail
+    play = player.play(snapshot_of(env, fleet_of(1)))
+    assert play.problems == ("blue_1: raised RuntimeError: out of ideas",)
+    assert np.isnan(play.commands).all()
+
+
+def test_a_game_that_starts_again_is_a_new_game_for_the_policy(fleet_of, snapshot_of, write_entry):
+    entry = write_entry("self.calls += 1\nreturn (1.0, float(self.calls))", start="self.calls = 0")
+    player = load_player(Orders(cast_of(fleet_of(1)), entry))
+    env = MctfEnv(game_config(fleet_of(1)))
+    answers = []
+    for time_s in (0.0, 0.1, 0.2, 30.0, 29.9, 0.0, 0.1):
+        env.core.time_s[0] = time_s
+        answers.append(player.play(snapshot_of(env, fleet_of(1))).relative[0, 1])
+    assert answers == [1.0, 2.0, 3.0, 4.0, 5.0, 1.0, 2.0]
+
+
+def test_without_a_referee_the_game_is_as_at_its_start(fleet_of, snapshot_of):
+    fleet = fleet_of()
+    env = MctfEnv(game_config(fleet))
+    env.core.state[0, 0, :2] = (69.0, 20.0)
+    snapshot = dataclasses.replace(snapshot_of(env, fleet), game={})
+    observer = Observer(cast_of(fleet))
+    assert observer.show(snapshot)
+    core = observer.env.core
+    assert not core.has_flag.any()
+    assert not core.is_tagged.any()
+    assert core.on_side[0].tolist() == [False, True, True, True, True, True]
+    assert observer.env.players["agent_0"].pos.tolist() == [69.0, 20.0]
+    assert not observer.show(snapshot)
+
+
+def test_boats_never_seen_are_shown_out_of_play_and_everything_is_finite(fleet_of, snapshot_of):
+    fleet = fleet_of()
+    env = MctfEnv(game_config(fleet))
+    snapshot = snapshot_of(env, fleet)
+    snapshot.seen[4] = np.nan
+    snapshot.seen[5, 2] = np.inf
+    snapshot.seen[0, 3] = -0.4
+    observer = Observer(cast_of(fleet))
+    observer.show(snapshot)
+    assert observer.env.core.is_tagged[0].tolist() == [False, False, False, True, True, False]
+    assert observer.env.core.state[0, 0, L.SPEED] == 0.0
+    for row in observer.observations().values():
+        assert np.isfinite(row).all()
+    with pytest.raises(FleetError, match="a row per boat"):
+        observer.show(Snapshot(0, 0.0, np.zeros((3, 4))))
+
+
+def test_the_flag_goes_with_the_boat_that_carries_it(fleet_of, snapshot_of):
+    fleet = fleet_of()
+    env = MctfEnv(game_config(fleet))
+    env.core.has_flag[0, 1] = env.core.flag_taken[0, 1] = True
+    snapshot = snapshot_of(env, fleet)
+    snapshot.seen[1, :2] = (50.0, 30.0)
+    observer = Observer(cast_of(fleet))
+    observer.show(snapshot)
+    assert observer.env.core.flag_position[0, 1].tolist() == [50.0, 30.0]
+
+
+def test_one_boat_of_a_team_can_be_played_alone(fleet_of, snapshot_of):
+    fleet = fleet_of()
+    cast = cast_of(fleet, ["blue_2"])
+    assert cast.ours == ("agent_1",)
+    play = Player(Orders(pickle.loads(pickle.dumps(cast)), "medium")).play(snapshot_of(MctfEnv(cast.config), fleet))
+    assert np.isfinite(play.commands[1]).all()
+    assert np.isnan(play.commands[[0, 2, 3, 4, 5, 6]]).all()
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [("mediun", "did you mean medium"), ("no/such/file.zip", "no/such/file.zip"), ("keyboard", "keyboard")],
+)
+def test_policies_that_cannot_play_are_refused_when_loaded(fleet_of, policy, words):
+    with pytest.raises(PolicyError, match=words):
+        load_player(Orders(cast_of(fleet_of()), policy))
+
+
+@pytest.mark.parametrize("start", ["raise MemoryError", "import sys; sys.exit(2)", "1 / 0"])
+def test_a_policy_that_cannot_be_built_is_refused_with_its_reason(fleet_of, write_entry, start):
+    with pytest.raises(PolicyError, match="cannot be built"):
+        load_player(Orders(cast_of(fleet_of()), write_entry("return 4", start=start)))
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("rules: {dt_s: 0.2}", r"rules.dt_s is what rate_hz says"),
+        ("rules: {max_tim_s: 20}", "max_time_s"),
+        ("preset: aamas2023", "aamas2024"),
+        ("rules: {max_score: 0}", "max_score"),
+    ],
+)
+def test_rules_that_make_no_game_are_refused(fleet_of, more, words):
+    with pytest.raises(FleetFileError, match=words):
+        game_config(fleet_of(more=more))
+
+
+def test_the_game_is_that_of_the_file(fleet_of):
+    config = game_config(
+        fleet_of(2, more="rate_hz: 5\nrules: {max_time_s: 90, flag_keepout_m: 0}", platform="surveyor")
+    )
+    assert config.env_bounds_m == (80.0, 40.0)
+    assert (config.dt_s, config.max_time_s, config.team_size, config.flag_keepout_m) == (0.2, 90.0, 2, 0.0)
+    assert {platform.name for platform in config.platforms} == {"surveyor"}
+    assert config.tagging_cooldown_s == 10.0
