@@ -14,7 +14,7 @@ from .parameters import Parameters
 from .sensing import Snapshot
 from .setpoints import SETPOINTS, Situation
 from .settings import AutopilotSettings
-from .signing import accept_unsigned, sign
+from .signing import Gate, sign_outgoing
 from .streams import Streams
 from .telemetry import CAN_SEND, Telemetry
 from .vehicle import Vehicle
@@ -74,9 +74,10 @@ class Autopilot:
         self.streams.reset()
         self.telemetry.origin = None
         self._mav = mavlink.MAVLink(self, self.system_id, COMPONENT)
+        self._reader = mavlink.MAVLink(None)
+        self._gate = None if self._key is None else Gate(self._key)
         if self._key is not None:
-            sign(self._mav, self._key)
-            self._mav.signing.allow_unsigned_callback = accept_unsigned
+            sign_outgoing(self._mav, self._key)
 
     def write(self, packet: bytes) -> None:
         """Where pymavlink writes to."""
@@ -107,9 +108,8 @@ class Autopilot:
     def receive(self, packet: bytes, now_s: float) -> None:
         """Take one packet; what is damaged, wrongly signed or for others has no effect."""
         self.now_s = now_s
-        try:
-            message = self._mav.decode(bytearray(packet))
-        except mavlink.MAVError:
+        message = self._read(packet)
+        if message is None:
             self.counts["refused"] += 1
             return
         target = getattr(message, "target_system", 0)
@@ -119,6 +119,13 @@ class Autopilot:
             return
         self.counts["taken"] += 1
         handler(self, message)
+
+    def _read(self, packet: bytes) -> Any | None:
+        try:
+            message = self._reader.decode(bytearray(packet))
+        except mavlink.MAVError:
+            return None
+        return message if self._gate is None or self._gate.admits(packet) else None
 
     def situation(self) -> Situation:
         """What it needs to know to read a target."""

@@ -47,6 +47,12 @@ class Boat:
         system_id: of its autopilot.
         setting: what all boats share.
         seed: of its random numbers.
+
+    Attributes:
+        hull, autopilot, faults: its parts.
+        down, up: its radio, to and from the commander.
+        order: what its hull was told last.
+        seen: what its sensors say, from its last step.
         write: takes the packets that reach the commander.
     """
 
@@ -57,7 +63,6 @@ class Boat:
         system_id: int,
         setting: Setting,
         seed: np.random.SeedSequence,
-        write: Callable[[bytes], None],
     ) -> None:
         seeds = [np.random.default_rng(child) for child in seed.spawn(4)]
         platform = get_platform(spec.platform)
@@ -67,13 +72,24 @@ class Boat:
         self.helmsman = Helmsman(self.hull)
         self.down, self.up = Radio(setting.radio, seeds[0]), Radio(setting.radio, seeds[1])
         self._sensors = Sensors(setting.frame, setting.noise, seeds[2])
-        self._write = write
+        self.write: Callable[[bytes], None] = _nowhere
         seen = self._sensors.sense(self.hull, 0.0)
         settings = _with_top_speed(setting.autopilot, platform.max_speed_mps)
         self.autopilot = Autopilot(system_id, settings, setting.frame, seen, self._transmit, setting.key)
         self.faults = Faults(self.autopilot, self.down, self.up, setting.frame, seeds[3])
         self.order: Order = self.autopilot.vehicle.order()
         self.seen = seen
+
+    @property
+    def has_link(self) -> bool:
+        """Whether anybody can command it."""
+        return self.spec.address is not None
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether it obeys a commander at this moment."""
+        vehicle = self.autopilot.vehicle
+        return vehicle.armed and vehicle.target is not None
 
     def step(self, time_s: float, order: Order | None = None) -> None:
         """Move by one step, to ``time_s``, as its autopilot orders or as given."""
@@ -88,10 +104,10 @@ class Boat:
             self.autopilot.receive(packet, now_s)
         if self.autopilot.reboot_wanted:
             self.restart(now_s)
-        if not self.faults.is_dark:
-            self.autopilot.snapshot = self.faults.sensed(self.seen, now_s)
+        self.autopilot.snapshot = self.faults.sensed(self.seen, now_s)
+        if self.has_link and not self.faults.is_dark:
             self.autopilot.tick(now_s)
-        self.deliver(now_s)
+            self.deliver(now_s)
 
     def hear(self, packet: bytes, now_s: float) -> None:
         """A packet leaves for this boat."""
@@ -103,7 +119,7 @@ class Boat:
     def deliver(self, now_s: float) -> None:
         """Hand over what has crossed the radio."""
         for packet in self.down.take(now_s):
-            self._write(packet)
+            self.write(packet)
 
     def restart(self, now_s: float) -> None:
         """The autopilot boots anew; the boat runs on without motors."""
@@ -112,6 +128,10 @@ class Boat:
 
     def _transmit(self, packet: bytes) -> None:
         self.down.put(packet, self.autopilot.now_s)
+
+
+def _nowhere(packet: bytes) -> None:
+    """Where packets go of a boat that nobody hears."""
 
 
 def _with_top_speed(settings: AutopilotSettings, top_mps: float) -> AutopilotSettings:

@@ -29,6 +29,8 @@ class Fault:
         down, up: what becomes of packets to and from the commander.
         change: what becomes of the autopilot's knowledge.
         dark: the autopilot is off.
+        hidden: the position feed leaves the boat out.
+        feed_late_s: age of what the position feed says of the boat.
     """
 
     ends_s: float = math.inf
@@ -36,6 +38,8 @@ class Fault:
     up: Bend | None = None
     change: Change | None = None
     dark: bool = False
+    hidden: bool = False
+    feed_late_s: float = 0.0
 
 
 def _drop(packet: bytes) -> list[tuple[float, bytes]]:
@@ -65,6 +69,16 @@ class Faults:
     def is_dark(self) -> bool:
         """Whether the autopilot is off."""
         return any(fault.dark for fault in self._active.values())
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the position feed leaves the boat out."""
+        return any(fault.hidden for fault in self._active.values())
+
+    @property
+    def feed_late_s(self) -> float:
+        """Age of what the position feed says of the boat, s."""
+        return max((fault.feed_late_s for fault in self._active.values()), default=0.0)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -115,13 +129,13 @@ class Faults:
         self._up.bends = [fault.up for fault in self._active.values() if fault.up is not None]
 
     def _telemetry_stop(self, now_s: float) -> Fault:
-        return Fault(down=_drop)
+        return Fault(down=_drop, hidden=True)
 
     def _commands_lost(self, now_s: float) -> Fault:
         return Fault(up=_drop)
 
     def _link_loss(self, now_s: float) -> Fault:
-        return Fault(down=_drop, up=_drop)
+        return Fault(down=_drop, up=_drop, hidden=True)
 
     def _freeze(self, now_s: float) -> Fault:
         kept = self._autopilot.snapshot
@@ -143,7 +157,7 @@ class Faults:
         return Fault(change=lambda truth, time_s: dataclasses.replace(truth, heading_rad=truth.heading_rad + offset))
 
     def _late(self, now_s: float, delay_s: float = 1.0) -> Fault:
-        return Fault(down=lambda packet: [(delay_s, packet)])
+        return Fault(down=lambda packet: [(delay_s, packet)], feed_late_s=delay_s)
 
     def _out_of_order(self, now_s: float, spread_s: float = 0.3) -> Fault:
         return Fault(down=lambda packet: [(spread_s * self._random.random(), packet)])
@@ -171,7 +185,7 @@ class Faults:
 
     def _power_off(self, now_s: float) -> Fault:
         self._autopilot.reboot_wanted = True
-        return Fault(down=_drop, up=_drop, dark=True)
+        return Fault(down=_drop, up=_drop, dark=True, hidden=True)
 
     def _mode(self, now_s: float, number: int = 4) -> None:
         self._autopilot.vehicle.set_mode(number, now_s)

@@ -2,42 +2,44 @@
 
 from __future__ import annotations
 
-import logging
-import selectors
-import socket
 import threading
-import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
+from steerclear.env.config import GameConfig
+from steerclear.env.record import Record
+from steerclear.env.record_meta import DEFAULT_SEPARATION_M
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
+from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
 
+from .assembly import build_boats, build_world, check_boats
 from .boat import Boat, Setting
-from .frames import target_of
+from .from_file import as_fleet, boats_of, settings_of
+from .hub import PositionHub
 from .hull import STEP_S
-from .places import start_places
+from .pace import Pace
+from .places import game_of
+from .ports import Ports
 from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
 from .signing import check_key
-from .wires import Wire, open_wire
-
-logger = logging.getLogger(__name__)
+from .truth import Approach, record_of
 
 TICK_S = 0.02
-"""How often autopilots look at their clocks and send."""
+"""How often autopilots look at their clocks and send, s."""
 _TICKS_PER_STEP = round(STEP_S / TICK_S)
-_LONGEST_LAG_S = 1.0
-"""A fleet further behind its clock than this lets the time go, instead of living it in a rush."""
 
 
 class SimFleet:
     """Simulated boats. A context manager: entering it starts the thread, leaving it gives everything back.
 
-    Boats move from the moment of their start on; their time is counted from there, in s of ``clock``.
+    Their time begins with the start and is counted in s of ``clock``. Boats without a link are driven by their policy
+    from the moment on at which all other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
 
     Args:
         boats: who they are.
@@ -51,7 +53,13 @@ class SimFleet:
         noise: of the sensors: 0 none, 1 as measured.
         seed: of everything random.
         key: 32 bytes of MAVLink 2 signing; None: unsigned.
-        preset: rules of the game, for start places.
+        preset: rules of the game that the boats play when there are as many red ones as blue ones.
+        rules: settings of the game that differ from the preset's.
+        feed_to: HOST:PORT of each listener of the position feed.
+        record: whether everything is recorded, see `truth_record`.
+        separation_m: radius for breaches in the record.
+        waits: whether policies wait for the other boats to be commanded.
+        random_start: draw start places from ``seed`` instead of taking the game's fixed ones.
         allow_remote: whether links may leave this machine.
 
     Raises:
@@ -72,36 +80,53 @@ class SimFleet:
         noise: float = 0.0,
         seed: int = 0,
         key: bytes | None = None,
-        preset: str = "aamas2024",
+        preset: str | GameConfig = "aamas2024",
+        rules: Mapping[str, Any] | None = None,
+        feed_to: Sequence[str] = (),
+        record: bool = False,
+        separation_m: float = DEFAULT_SEPARATION_M,
+        waits: bool = True,
+        random_start: bool = False,
         allow_remote: bool = False,
     ) -> None:
-        if not boats or len({boat.name for boat in boats}) < len(boats):
-            raise ConfigError("give at least one boat, each with a name of its own")
+        check_boats(boats, noise)
         self.frame = FieldFrame(*origin, y_axis_deg)
-        self.clock: Clock = MonotonicClock(speed) if clock is None else clock
-        self.water = water or Water()
         self._lock = threading.RLock()
-        self._thread: threading.Thread | None = None
-        self._ends = threading.Event()
         self._ticks = 0
-        self._start_s = self.clock.now_s()
-        self.let_go_s = 0.0
+        self._hub: PositionHub | None = None
+        self._ports = Ports(allow_remote)
+        self._pace = Pace(MonotonicClock(speed) if clock is None else clock, TICK_S, self._tick, self._receive)
         setting = Setting(self.frame, autopilot or AutopilotSettings(), radio or RadioSettings(), noise, check_key(key))
-        self._wires: dict[str, Wire] = {}
-        self._aboard: dict[Wire, list[Boat]] = {}
-        self.boats: dict[str, Boat] = {}
-        seeds = np.random.SeedSequence(seed).spawn(len(boats))
+        config = game_of(boats, preset, rules or {})
         try:
-            for i, (spec, place) in enumerate(zip(boats, start_places(boats, preset), strict=True)):
-                self._add(spec, place, spec.system_id or i + 1, setting, seeds[i], allow_remote)
+            self.boats = build_boats(boats, config, setting, self._ports, seed, random_start)
+            self._hub = PositionHub(feed_to, self.frame, noise) if feed_to else None
+            self._world = build_world(self.boats, config, (water or Water(), setting), self._hub, seed, waits)
         except BaseException:
             self.close()
             raise
+        self._world.record_radius_m = separation_m if record else None
+
+    @classmethod
+    def from_file(cls, fleet: FleetFile | str | Path, *, opponents: str = "medium", **settings: Any) -> SimFleet:
+        """The boats of a FLEET.yaml: those with a link obey it, the others are driven.
+
+        Args:
+            fleet: the file, read or to be read.
+            opponents: scripted policy of the boats of the game that have no link.
+            **settings: of `SimFleet`, beside or instead of what the file says.
+
+        Raises:
+            FleetFileError: the file cannot be used.
+            ConfigError: a setting cannot be used.
+        """
+        file = as_fleet(fleet)
+        return cls(boats_of(file, opponents), **{**settings_of(file), **settings})
 
     @property
     def addresses(self) -> dict[str, str]:
         """Address to open for each boat with a link."""
-        return {boat.spec.name: wire.address for wire, aboard in self._aboard.items() for boat in aboard}
+        return self._ports.addresses
 
     @property
     def system_ids(self) -> dict[str, int]:
@@ -109,14 +134,46 @@ class SimFleet:
         return {name: boat.system_id for name, boat in self.boats.items()}
 
     @property
+    def clock(self) -> Clock:
+        """The clock it lives by."""
+        return self._pace.clock
+
+    @property
     def time_s(self) -> float:
         """Simulated time since the start, s."""
         return self._ticks * TICK_S
+
+    @property
+    def let_go_s(self) -> float:
+        """Time that was not lived because the machine was too slow, s."""
+        return self._pace.let_go_s
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether policies drive their boats and the record runs."""
+        return self._world.is_playing
+
+    def play(self) -> None:
+        """Let the policies and the record begin now."""
+        with self._lock:
+            self._world.play()
 
     def states(self) -> dict[str, Array]:
         """True state row (N_STATE,) of each boat, all of the same moment."""
         with self._lock:
             return {name: boat.hull.state.copy() for name, boat in self.boats.items()}
+
+    def place(self, boat: str, x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0.0) -> None:
+        """Put a boat somewhere, its controllers cleared.
+
+        Raises:
+            ConfigError: no such boat.
+        """
+        with self._lock:
+            hull = self._boat(boat).hull
+            hull.forget()
+            hull.astern = False
+            hull.state[[L.X, L.Y, L.HEADING, L.SPEED]] = x_m, y_m, heading_deg, speed_mps
 
     def fault(self, boat: str, kind: str, *, duration_s: float = float("inf"), **options: Any) -> None:
         """Begin a fault of a boat, see `faults.KINDS`; `clear` ends it.
@@ -136,37 +193,56 @@ class SimFleet:
         with self._lock:
             self._boat(boat).faults.stop(kind)
 
+    def closest_approaches(self) -> list[Approach]:
+        """Closest approach of each pair of boats since the start, closest first."""
+        with self._lock:
+            return self._world.closest.all()
+
+    def truth_record(self) -> Record:
+        """Everything since the game began, as a game's record; with the boats' full states as array ``state``.
+
+        Raises:
+            ConfigError: nothing was recorded.
+        """
+        with self._lock:
+            return record_of(self._world.truth).record()
+
+    def judge(self, team: int = 0) -> list[dict[str, Any]]:
+        """Breaches of a team since the game began, with the oracle's verdicts (`experiments.keys.BREACH`).
+
+        Raises:
+            ConfigError: nothing was recorded.
+        """
+        with self._lock:
+            return record_of(self._world.truth).judge(team)
+
     def advance(self, seconds: float) -> None:
         """Live that much simulated time at once, without a thread and without waiting.
 
         Raises:
             ConfigError: the thread is running.
         """
-        if self._thread is not None:
+        if self._pace.is_running:
             raise ConfigError("the fleet runs by itself; call advance only on one that was not started")
         for _ in range(round(seconds / TICK_S)):
             self._receive()
             self._tick()
 
     def start(self) -> None:
-        """Start the thread."""
-        if self._thread is not None:
-            raise ConfigError("the fleet runs already")
-        next(iter(self.boats.values())).hull.warm_up()
-        self._start_s = self.clock.now_s() - self.time_s
-        self._ends.clear()
-        self._thread = threading.Thread(target=self._run, name="sim-boats", daemon=True)
-        self._thread.start()
+        """Start the thread.
+
+        Raises:
+            ConfigError: it runs already.
+        """
+        self._world.warm_up()
+        self._pace.start(self._ports.sockets)
 
     def close(self) -> None:
         """Stop the thread and give the sockets back; may be called again."""
-        self._ends.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        for wire in self._aboard:
-            wire.close()
-        self._aboard.clear()
+        self._pace.stop()
+        self._ports.close()
+        if self._hub is not None:
+            self._hub.close()
 
     def __enter__(self) -> Self:
         self.start()
@@ -177,94 +253,19 @@ class SimFleet:
     ) -> None:
         self.close()
 
-    def _add(
-        self,
-        spec: SimBoat,
-        place: tuple[float, float, float],
-        system_id: int,
-        setting: Setting,
-        seed: np.random.SeedSequence,
-        allow_remote: bool,
-    ) -> None:
-        wire = None if spec.address is None else self._wire(spec.address, allow_remote)
-        aboard = self._aboard.setdefault(wire, []) if wire is not None else []
-        if any(other.system_id == system_id for other in aboard) or not 1 <= system_id <= 255:
-            raise ConfigError(f"boat {spec.name!r} has system id {system_id}; give one of 1..255 of its own")
-        write = wire.write if wire is not None else _nowhere
-        boat = Boat(spec, place, system_id, setting, seed, write)
-        aboard.append(boat)
-        self.boats[spec.name] = boat
-
-    def _wire(self, address: str, allow_remote: bool) -> Wire:
-        """The wire of an address: boats share a port they listen at, and each have their own to call from."""
-        if address in self._wires:
-            return self._wires[address]
-        wire = open_wire(address or "udpout:127.0.0.1:0", allow_remote)
-        self._aboard[wire] = []
-        if address and wire.address.startswith(("udpout", "tcp:")):
-            self._wires[address] = wire
-        return wire
-
     def _boat(self, name: str) -> Boat:
         if name not in self.boats:
             raise ConfigError(f"no simulated boat is named {name!r}; there are {', '.join(self.boats)}")
         return self.boats[name]
 
-    def _run(self) -> None:
-        while not self._ends.is_set():
-            due = self._start_s + (self._ticks + 1) * TICK_S
-            lag = self.clock.now_s() - due
-            if lag < 0.0:
-                self._wait(due)
-                continue
-            if lag > _LONGEST_LAG_S:
-                logger.warning("simulated boats are %.1f s behind and let the time go", lag)
-                self._start_s += lag
-                self.let_go_s += lag
-            self._receive()
-            self._tick()
-
-    def _wait(self, due_s: float) -> None:
-        """Wait for packets until the next tick is due."""
-        speed = getattr(self.clock, "speed", 1.0)
-        patience = (due_s - self.clock.now_s()) / speed
-        sockets = [entry for wire in self._aboard for entry in wire.sockets()]
-        if patience <= 0.0:
-            return
-        if not sockets:
-            time.sleep(patience)
-        elif _readable(sockets, patience):
-            self._receive()
-
     def _receive(self) -> None:
-        """Hand what came in to the boats it is for."""
         with self._lock:
-            for wire, aboard in self._aboard.items():
-                for packet in wire.read():
-                    target = target_of(packet)
-                    for boat in aboard:
-                        if target in (0, boat.system_id):
-                            boat.hear(packet, self.time_s)
+            self._ports.receive(self.time_s)
 
     def _tick(self) -> None:
         with self._lock:
             self._ticks += 1
             if self._ticks % _TICKS_PER_STEP == 0:
-                self._step()
+                self._world.step(self.time_s)
             for boat in self.boats.values():
                 boat.tick(self.time_s)
-
-    def _step(self) -> None:
-        for boat in self.boats.values():
-            boat.step(self.time_s)
-
-
-def _nowhere(packet: bytes) -> None:
-    """Where boats without a link send."""
-
-
-def _readable(sockets: list[socket.socket], patience_s: float) -> bool:
-    with selectors.DefaultSelector() as selector:
-        for entry in sockets:
-            selector.register(entry, selectors.EVENT_READ)
-        return bool(selector.select(patience_s))

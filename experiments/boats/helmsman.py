@@ -7,7 +7,7 @@ import math
 from steerclear.shield.platforms import layout as L
 
 from .hull import AT_REST_MPS, Hull
-from .orders import Keep, Order, Reach, Steer, Turn
+from .orders import Bear, Keep, Order, Reach, Steer, Turn
 
 _BACK_UP_PER_S = 0.17
 """Speed of backing up per metre still to go: with 2 m it begins at the measured 0.34 m/s."""
@@ -36,6 +36,8 @@ class Helmsman:
             self._station = self._back_up_m = None
         if isinstance(order, Steer):
             self.hull.steer(order.heading_rad, order.speed_mps)
+        elif isinstance(order, Bear):
+            self.hull.bear(order.error_deg, order.speed_mps)
         elif isinstance(order, Turn):
             self.hull.turn(order.rate_rads, order.speed_mps)
         elif isinstance(order, Reach):

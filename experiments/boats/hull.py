@@ -80,9 +80,12 @@ class Hull:
 
     def steer(self, heading_rad: float, speed_mps: float) -> None:
         """Hold a heading at a speed over ground, m/s, negative astern."""
+        self.bear(self.error_deg(heading_rad), speed_mps)
+
+    def bear(self, error_deg: float, speed_mps: float) -> None:
+        """Turn by an angle from the present heading at a speed over ground, m/s, negative astern."""
         speed = self._through_water(speed_mps)
-        error = self.error_deg(heading_rad)
-        self._run(speed, lambda: step_boat(self.params, self.state, abs(speed), error, self.dt_s))
+        self._run(speed, lambda: step_boat(self.params, self.state, abs(speed), error_deg, self.dt_s))
 
     def turn(self, rate_rads: float, speed_mps: float) -> None:
         """Turn at a rate, rad/s, at a speed over ground, m/s, as far as the actuators allow."""

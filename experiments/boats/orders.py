@@ -14,6 +14,14 @@ class Steer:
 
 
 @dataclass(frozen=True)
+class Bear:
+    """Turn by an angle (deg, clockwise) from the present heading at a speed, m/s, as the game's own boats are told."""
+
+    error_deg: float
+    speed_mps: float
+
+
+@dataclass(frozen=True)
 class Turn:
     """Turn at a rate (rad/s, clockwise) at a speed over ground, m/s, negative astern."""
 
@@ -46,4 +54,4 @@ class Coast:
     """Motors off."""
 
 
-Order = Steer | Turn | Reach | Keep | Coast
+Order = Steer | Bear | Turn | Reach | Keep | Coast

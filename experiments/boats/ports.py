@@ -1,0 +1,76 @@
+"""Which boat is behind which socket, and handing packets to the boats they are for."""
+
+from __future__ import annotations
+
+import socket
+
+from steerclear.shield.exceptions import ConfigError
+
+from .boat import Boat
+from .frames import target_of
+from .wires import Wire, open_wire
+
+_FREE_PORT = "udpout:127.0.0.1:0"
+
+
+class Ports:
+    """The wires of all boats. Boats share a port they listen at; each calls from one of its own.
+
+    Args:
+        allow_remote: whether links may leave this machine.
+    """
+
+    def __init__(self, allow_remote: bool) -> None:
+        self._allow_remote = allow_remote
+        self._shared: dict[str, Wire] = {}
+        self._aboard: dict[Wire, list[Boat]] = {}
+
+    @property
+    def addresses(self) -> dict[str, str]:
+        """Address to open for each boat with a link."""
+        return {boat.spec.name: wire.address for wire, aboard in self._aboard.items() for boat in aboard}
+
+    def plug_in(self, boat: Boat) -> None:
+        """Open a boat's link, if it has one.
+
+        Raises:
+            ConfigError: the address or system id cannot be used.
+        """
+        address = boat.spec.address
+        if address is None:
+            return
+        if not 1 <= boat.system_id <= 255:
+            raise ConfigError(f"boat {boat.spec.name!r} has system id {boat.system_id}; give one of 1..255")
+        wire = self._wire(address)
+        aboard = self._aboard[wire]
+        if any(other.system_id == boat.system_id for other in aboard):
+            raise ConfigError(f"two boats on {address} have system id {boat.system_id}; give each one of its own")
+        boat.write = wire.write
+        aboard.append(boat)
+
+    def sockets(self) -> list[socket.socket]:
+        """Sockets to wait on."""
+        return [entry for wire in self._aboard for entry in wire.sockets()]
+
+    def receive(self, now_s: float) -> None:
+        """Hand what came in to the boats it is for."""
+        for wire, aboard in self._aboard.items():
+            for packet in wire.read():
+                target = target_of(packet)
+                for boat in aboard:
+                    if target in (0, boat.system_id):
+                        boat.hear(packet, now_s)
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        for wire in self._aboard:
+            wire.close()
+
+    def _wire(self, address: str) -> Wire:
+        if address in self._shared:
+            return self._shared[address]
+        wire = open_wire(address or _FREE_PORT, self._allow_remote)
+        self._aboard[wire] = []
+        if address and wire.address.startswith(("udpout", "tcp:")):
+            self._shared[address] = wire
+        return wire

@@ -1,0 +1,143 @@
+"""What really happened to simulated boats: closest approaches always, every state when a record is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from steerclear.env.record import GameRecorder, Record, find_breaches
+from steerclear.env.record_meta import DEFAULT_SEPARATION_M, meta_of
+from steerclear.experiments.judging import StateLog, judge_game
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
+
+from .game import Game
+from .orders import Bear, Order, Steer, Turn
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Closest approach of two boats' centres.
+
+    Attributes:
+        first, second: their names.
+        distance_m: m.
+        time_s: when, simulated s.
+    """
+
+    first: str
+    second: str
+    distance_m: float
+    time_s: float
+
+
+class ClosestApproaches:
+    """The closest approach of each pair so far.
+
+    Args:
+        names: of the boats.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = list(names)
+        self._pairs = np.triu_indices(len(self._names), k=1)
+        self._distance_m = np.full(self._pairs[0].size, np.inf)
+        self._time_s = np.zeros(self._pairs[0].size)
+
+    def see(self, position_m: Array, time_s: float) -> None:
+        """Boats are at (n, 2), m."""
+        first, second = self._pairs
+        apart = np.hypot(*(position_m[first] - position_m[second]).T)
+        closer = apart < self._distance_m
+        self._distance_m[closer] = apart[closer]
+        self._time_s[closer] = time_s
+
+    def all(self) -> list[Approach]:
+        """One for each pair, closest first."""
+        first, second = self._pairs
+        order = np.argsort(self._distance_m, kind="stable")
+        return [
+            Approach(self._names[first[k]], self._names[second[k]], float(self._distance_m[k]), float(self._time_s[k]))
+            for k in order
+        ]
+
+
+class TruthRecord:
+    """Records a game of simulated boats.
+
+    Args:
+        game: the game; begun.
+        separation_m: radius for breaches.
+        seed: for the record.
+    """
+
+    def __init__(self, game: Game, separation_m: float = DEFAULT_SEPARATION_M, seed: int = 0) -> None:
+        self._game = game
+        self._separation_m = separation_m
+        self._recorder = GameRecorder()
+        self._log = StateLog()
+        players = game.players
+        names = {side: _policy_of(players, game.core.team, side) for side in (0, 1)}
+        self._recorder.start(
+            game.core.view(),
+            meta_of(
+                game.core.config,
+                separation_m=separation_m,
+                policies={"blue": names[0], "red": names[1]},
+                seed=seed,
+                title="simulated boats",
+            ),
+        )
+        self._log.start(game.core)
+
+    def step(self, orders: Sequence[Order], headings_deg: Array) -> None:
+        """Boats have moved by a step under these orders from these headings."""
+        told = np.array([_told(order, heading) for order, heading in zip(orders, headings_deg, strict=True)])
+        self._recorder.step(self._game.core.view(), told, told)
+        self._log.step(self._game.core)
+
+    def record(self) -> Record:
+        """Everything so far, see `steerclear.env.record`; with a further array ``state`` (T+1, n, N_STATE)."""
+        record = self._recorder.finish()
+        record["breaches"] = find_breaches(record["position"], self._separation_m)
+        return {**record, "state": self._log.states}
+
+    def judge(self, team: int = 0) -> list[dict[str, Any]]:
+        """What the oracle says of the breaches that a team's boats were in, see `experiments.keys.BREACH`."""
+        return judge_game(self._log, self._game.core.params, self.record(), team)
+
+
+def record_of(truth: TruthRecord | None) -> TruthRecord:
+    """The record.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    if truth is None:
+        raise ConfigError("nothing was recorded; build SimFleet with record=True, with as many red boats as blue ones")
+    return truth
+
+
+def _policy_of(players: Mapping[int, str], team: Array, side: int) -> str:
+    named = list(dict.fromkeys(name for i, name in players.items() if team[i] == side))
+    return ",".join(named) or "mavlink"
+
+
+def _told(order: Order, heading_deg: float) -> tuple[float, float]:
+    """Speed m/s and absolute heading deg of an order."""
+    heading, speed = heading_deg, 0.0
+    if isinstance(order, Steer):
+        heading, speed = float(np.degrees(order.heading_rad)), order.speed_mps
+    elif isinstance(order, Bear):
+        heading, speed = heading_deg + order.error_deg, order.speed_mps
+    elif isinstance(order, Turn):
+        heading, speed = heading_deg + float(np.degrees(order.rate_rads)), order.speed_mps
+    return speed, (heading + 180.0) % 360.0 - 180.0
+
+
+def positions(states: Sequence[Array]) -> Array:
+    """Positions (n, 2), m, of state rows."""
+    return np.array([(row[L.X], row[L.Y]) for row in states])
