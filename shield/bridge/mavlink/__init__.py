@@ -1,1 +1,1 @@
-"""ArduPilot boats over MAVLink 2."""
+"""Links to ArduPilot boats over MAVLink 2."""

@@ -66,7 +66,9 @@ def read_key(path: str | Path) -> bytes:
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except OSError as error:
-        raise ConfigError(f"cannot read the signing key {path} ({error.strerror}); give the path of a key file") from None
+        raise ConfigError(
+            f"cannot read the signing key {path} ({error.strerror}); give the path of a key file"
+        ) from None
     with os.fdopen(descriptor, "rb") as file:
         _check_safe(path, os.fstat(descriptor))  # of the opened file: what is checked is what is read
         text = file.read(4096)

@@ -1,0 +1,169 @@
+"""`Dialogue`: questions to one autopilot and its answers: commands, parameters, what it can do, what it says."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from ..clock import Clock
+from .routes import Abilities
+from .texts import Texts
+
+ASK_AGAIN_S = 0.7
+SAID_S = 15.0
+"""What an autopilot said so recently belongs to a refusal."""
+_TOP = "WP_SPEED"
+
+
+class Patience:
+    """A deadline on the loop's clock that real time also ends, so that a clock that stands still cannot hang a start.
+
+    Args:
+        clock: the loop's.
+        timeout_s: s.
+    """
+
+    def __init__(self, clock: Clock, timeout_s: float) -> None:
+        self._clock = clock
+        self._end_s = clock.now_s() + timeout_s
+        self._real_end_s = time.monotonic() + timeout_s
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is up."""
+        return self._clock.now_s() >= self._end_s or time.monotonic() >= self._real_end_s
+
+    def part(self, timeout_s: float) -> Patience:
+        """A shorter one that is over with this one."""
+        left = min(self._end_s - self._clock.now_s(), self._real_end_s - time.monotonic())
+        return Patience(self._clock, max(0.0, min(timeout_s, left)))
+
+
+class Dialogue:
+    """Answers are taken in on the link's thread; questions are asked, and waited for, on the caller's.
+
+    Args:
+        target: system and component of the autopilot.
+        send: sends a message, never waits.
+        clock: the loop's.
+
+    Attributes:
+        changed: notified whenever something came in; its lock guards all a link knows of its boat.
+        parameters: by name, as last heard.
+        version, capabilities: of AUTOPILOT_VERSION.
+    """
+
+    def __init__(self, target: tuple[int, int], send: Callable[[Any], bool], clock: Clock) -> None:
+        self.changed = threading.Condition(threading.RLock())
+        self.parameters: dict[str, float] = {}
+        self.version: tuple[int, int, int] | None = None
+        self.capabilities = 0
+        self._target, self._send, self._clock = target, send, clock
+        self._texts = Texts()
+        self._said: deque[tuple[float, str]] = deque(maxlen=50)
+        self._results: dict[int, int] = {}
+        self._unread: deque[str] = deque(maxlen=100)
+
+    @property
+    def abilities(self) -> Abilities:
+        """What is known of the autopilot."""
+        return Abilities(self.version, self.capabilities, self.parameters.get(_TOP))
+
+    def hear(self, message: Any, now_s: float) -> None:
+        """Take an answer in; the caller holds the lock."""
+        name = message.get_type()
+        if name == "COMMAND_ACK":
+            self._results[message.command] = message.result
+        elif name == "PARAM_VALUE":
+            self._hear_parameter(str(message.param_id), message.param_value)
+        elif name == "AUTOPILOT_VERSION":
+            packed = message.flight_sw_version
+            self.version = (packed >> 24, packed >> 16 & 0xFF, packed >> 8 & 0xFF)
+            self.capabilities = message.capabilities
+        elif name == "STATUSTEXT":
+            for text in self._texts.hear(message):
+                self.say(text, now_s)
+
+    def say(self, text: str, now_s: float) -> None:
+        """Keep a text for the next reading and for refusals."""
+        if text:
+            self._said.append((now_s, text))
+            self._unread.append(text)
+
+    def take_texts(self) -> tuple[str, ...]:
+        """Texts since this was last asked."""
+        texts = tuple(self._unread)
+        self._unread.clear()
+        return texts
+
+    def said(self) -> str:
+        """What the autopilot said lately, each text once, for a refusal."""
+        now_s = self._clock.now_s()
+        recent = dict.fromkeys(text for at, text in self._said if now_s - at <= SAID_S)
+        return "; ".join(recent) or "it gave no reason"
+
+    def wait(self, holds: Callable[[], bool], patience: Patience) -> bool:
+        """Wait until something holds; False when the time is up first."""
+        with self.changed:
+            while not holds():
+                if patience.is_over:
+                    return False
+                self.changed.wait(0.02)
+            return True
+
+    def command(self, message: Any, patience: Patience) -> int | None:
+        """Send a command again and again until it is answered.
+
+        Returns:
+            MAV_RESULT, or None when no answer came in time.
+        """
+        with self.changed:
+            self._results.pop(message.command, None)
+        while not patience.is_over:
+            self._send(message)
+            if self.wait(lambda: self._is_answered(message.command), patience.part(ASK_AGAIN_S)):
+                return self._results[message.command]
+        return None
+
+    def _is_answered(self, command: int) -> bool:
+        return self._results.get(command, mavlink.MAV_RESULT_IN_PROGRESS) != mavlink.MAV_RESULT_IN_PROGRESS
+
+    def learn(self, needed: str, others: tuple[str, ...], patience: Patience) -> None:
+        """Ask for parameters and for what the autopilot can do; waits for the needed one, others get a few tries."""
+        for attempt in range(1000):
+            with self.changed:
+                unknown = [name for name in (needed, *others) if name not in self.parameters]
+                done = needed in self.parameters and self.version is not None
+            if (done and (attempt >= 3 or not unknown)) or patience.is_over:
+                return
+            for name in unknown:
+                self.ask_parameter(name)
+            if self.version is None:
+                self._send(self._version_request())
+            self.wait(lambda: self._knows((needed, *others)), patience.part(ASK_AGAIN_S))
+
+    def ask_parameter(self, name: str) -> None:
+        """Ask for one parameter."""
+        self._send(mavlink.MAVLink_param_request_read_message(*self._target, name.encode(), -1))
+
+    def _knows(self, names: tuple[str, ...]) -> bool:
+        return self.version is not None and all(name in self.parameters for name in names)
+
+    def _version_request(self) -> Any:
+        return mavlink.MAVLink_command_long_message(
+            *self._target, mavlink.MAV_CMD_REQUEST_MESSAGE, 0,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0,
+        )  # fmt: skip
+
+    def _hear_parameter(self, name: str, value: float) -> None:
+        name = name.rstrip("\x00")
+        if math.isfinite(value):
+            self.parameters[name] = float(value)
+        elif name in self.parameters:
+            del self.parameters[name]  # what it was is not known any more

@@ -1,0 +1,105 @@
+"""From bytes to whole MAVLink frames with a right checksum; damage never swallows the frames around it."""
+
+from __future__ import annotations
+
+import re
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+_MARKERS = re.compile(b"[\xfd\xfe]")
+_MARKER_2 = 0xFD
+_HEADER = {0xFD: 10, 0xFE: 6}
+_CHECKSUM = 2
+_SIGNATURE = 13
+_SIGNED_FLAG = 0x01
+
+_SHORT = -1
+_BAD = -2
+
+
+class Framer:
+    """Cuts what one sender sends into frames.
+
+    Args:
+        datagrams: bytes come in packets that normally hold whole frames, so that a frame never waits for the rest of a
+            damaged one before it.
+
+    Attributes:
+        damaged: places where a frame began and its checksum or flags were wrong.
+        unknown: frames of messages this dialect does not have.
+    """
+
+    def __init__(self, datagrams: bool) -> None:
+        self._datagrams = datagrams
+        self._rest = b""
+        self.damaged = 0
+        self.unknown = 0
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """The whole frames these bytes complete, in order."""
+        if self._datagrams and self._rest and _measure(data, 0) > 0:
+            self._rest = b""
+            self.damaged += 1
+        buffer = self._rest + data
+        frames: list[bytes] = []
+        at, kept = 0, -1
+        while (found := _MARKERS.search(buffer, at)) is not None:
+            at = found.start()
+            length = _measure(buffer, at)
+            if length > 0:
+                self._keep(buffer[at : at + length], frames)
+                at, kept = at + length, -1
+                continue
+            if length == _SHORT:
+                kept = at if kept < 0 else kept
+                if not self._datagrams:
+                    break
+            else:
+                self.damaged += 1
+            at += 1
+        self._rest = buffer[kept:] if kept >= 0 else b""
+        return frames
+
+    def _keep(self, frame: bytes, frames: list[bytes]) -> None:
+        if message_id(frame) in mavlink.mavlink_map:
+            frames.append(frame)
+        else:
+            self.unknown += 1
+
+
+def message_id(frame: bytes) -> int:
+    """Number of the message in a whole frame."""
+    return int.from_bytes(frame[7:10], "little") if frame[0] == _MARKER_2 else frame[5]
+
+
+def source(frame: bytes) -> tuple[int, int]:
+    """System and component a whole frame says it is from."""
+    return (frame[5], frame[6]) if frame[0] == _MARKER_2 else (frame[3], frame[4])
+
+
+def _measure(buffer: bytes, at: int) -> int:
+    """Length of the right frame that begins here; `_SHORT` when its end is not there yet, `_BAD` when it is none."""
+    if len(buffer) - at < 3:
+        return _SHORT if len(buffer) > at and buffer[at] in _HEADER else _BAD
+    header = _HEADER.get(buffer[at])
+    if header is None:
+        return _BAD
+    signed = 0
+    if buffer[at] == _MARKER_2:
+        if buffer[at + 2] & ~_SIGNED_FLAG:
+            return _BAD
+        signed = _SIGNATURE if buffer[at + 2] else 0
+    length = header + buffer[at + 1] + _CHECKSUM + signed
+    if len(buffer) - at < length:
+        return _SHORT
+    return length if _is_right(buffer, at, header + buffer[at + 1], at + length) else _BAD
+
+
+def _is_right(buffer: bytes, at: int, covered: int, end: int) -> bool:
+    """Whether the checksum is; of messages we do not know, whether another frame or nothing follows."""
+    kind = mavlink.mavlink_map.get(message_id(buffer[at : at + 10]))
+    if kind is None:
+        return end == len(buffer) or buffer[end] in _HEADER
+    checksum = mavlink.x25crc(buffer[at + 1 : at + covered])
+    checksum.accumulate(bytes([kind.crc_extra]))
+    return checksum.crc == int.from_bytes(buffer[at + covered : at + covered + _CHECKSUM], "little")
