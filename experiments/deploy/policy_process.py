@@ -29,7 +29,7 @@ from .worker import Worker
 
 logger = logging.getLogger(__name__)
 
-START_WITHIN_S = 60.0
+START_WITHIN_S = 120.0
 """Time a policy has to load and to answer for the first time, s."""
 SLOW_S = 0.3
 """An answer that takes longer is reported as a fault."""

@@ -104,7 +104,7 @@ class Worker:
         self._read_output()
         status = self._process.poll()
         if status is None or otherwise != GONE:
-            return f"failed: {otherwise}"
+            return f"failed: {'it gave its pipes away' if otherwise == GONE else otherwise}"
         how = f"was ended by {_signal_name(-status)}" if status < 0 else f"ended itself with exit status {status}"
         last = self.output().strip().splitlines()[-1:]
         return how + (f', its last words: "{last[0][:160]}"' if last else "")

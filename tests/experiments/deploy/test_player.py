@@ -15,9 +15,6 @@ from steerclear.shield.bridge.wanted import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError
 from steerclear.shield.platforms import layout as L
 
-ALL_OVER = """
-    import zlib
-"""
 EXACT = """
     # whatever the submission can read goes into what it answers
     seen = [full_obs_normalized[a].tobytes() for a in sorted(full_obs_normalized)]
@@ -229,9 +226,8 @@ def test_rules_that_make_no_game_are_refused(fleet_of, more, words):
 
 
 def test_the_game_is_that_of_the_file(fleet_of):
-    config = game_config(
-        fleet_of(2, more="rate_hz: 5\nrules: {max_time_s: 90, flag_keepout_m: 0}", platform="surveyor")
-    )
+    more = "rate_hz: 5\nrules: {max_time_s: 90, flag_keepout_m: 0}"
+    config = game_config(fleet_of(2, more=more, platform="surveyor"))
     assert config.env_bounds_m == (80.0, 40.0)
     assert (config.dt_s, config.max_time_s, config.team_size, config.flag_keepout_m) == (0.2, 90.0, 2, 0.0)
     assert {platform.name for platform in config.platforms} == {"surveyor"}
