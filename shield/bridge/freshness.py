@@ -109,8 +109,9 @@ def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict:
     elif age > limits.navigation.max_age_s:
         text = f"{boat}: own navigation {words(age)}{why}"
         verdict.due(Action(boat, "navigation", limits.navigation.then, text), (boat,))
-    if reading.heartbeat_age_s > limits.link.max_age_s:
-        text = f"{boat}: link silent, {words(reading.heartbeat_age_s)}"
+    silent = link_age_s(reading)
+    if silent > limits.link.max_age_s:
+        text = f"{boat}: link silent, {words(silent)}"
         verdict.due(Action(boat, "link", limits.link.then, text), (boat,))
     elif not reading.ready:
         verdict.idle.add(boat)
@@ -159,6 +160,12 @@ def _judge_game(fleet: FleetFile, roster: Roster, seen: Seen, verdict: Verdict) 
     if silent and not seen.overridden("game", ""):
         text = f"state of the game: {words(seen.game_age_s)}"
         verdict.due(Action("game", "game", fleet.limits.game.then, text), roster.commanded)
+
+
+def link_age_s(reading: BoatReading) -> float:
+    """Time since anything came from the boat, s: heartbeats alone are too rare to tell."""
+    ages = (reading.position_age_s, reading.heading_age_s, reading.velocity_age_s, reading.turn_rate_age_s)
+    return min(reading.heartbeat_age_s, *ages)
 
 
 def words(age_s: float) -> str:

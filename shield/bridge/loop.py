@@ -205,7 +205,7 @@ class Loop:
     def _contacts(self) -> tuple[Contact, ...]:
         heard = [contact for source in self.parts.contacts for contact in source.read()]
         error = self.fleet.shield_config.position_error_m
-        told = [_contact_of(link.read(), error) for link in self.parts.ears.values()]
+        told = [contact_of(link.read(), error) for link in self.parts.ears.values()]
         return (*heard, *(contact for contact in told if contact is not None))
 
     def _game(self) -> tuple[GameState | None, float]:
@@ -244,7 +244,7 @@ def _mates(fleet: FleetFile, links: Mapping[str, Link]) -> tuple[str, ...]:
     return tuple(boat.name for boat in fleet.ours if boat.name not in links)
 
 
-def _contact_of(reading: BoatReading, error_m: float) -> Contact | None:
+def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
     """A boat's own telemetry as a contact; None while something of it was never received."""
     values = (*reading.position_m, reading.heading_rad, reading.speed_mps, reading.age_s)
     if not np.isfinite(values).all():

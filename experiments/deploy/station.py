@@ -1,0 +1,170 @@
+"""`Station`: every socket and file of a runner, opened from a fleet file and given back together."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import Self
+
+from steerclear.shield.bridge.blackbox import TlogWriter, log_path
+from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.feed import FeedReceiver
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.fleet_settings import BoatSettings
+from steerclear.shield.bridge.loop import contact_of
+from steerclear.shield.bridge.mavlink.endpoint import Endpoint
+from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.mavlink.signing import Signing, read_key
+
+LOG = logging.getLogger(__name__)
+
+CONNECT_S = 15.0
+PREPARE_S = 60.0
+"""An autopilot arms up to 42 s after it was switched on."""
+
+
+class Station:
+    """Links to the boats a process commands, links it only listens to, and the feed. A context manager.
+
+    Nothing is sent to any boat before `connect`. Leaving it stops every boat it prepared, verifies that, and gives
+    everything back.
+
+    Args:
+        fleet: the file.
+        boat: name of this process's boat, or None for all of the team.
+        clock: the loop's.
+        tlog: whether raw packets are kept in the log folder.
+
+    Raises:
+        FleetFileError: there is nothing to command.
+        ConfigError: the signing key cannot be read or others can read it.
+        LinkError: a wire cannot be opened, such as a port that is taken.
+        BridgeError: the feed cannot be heard, or the packet log cannot be made.
+    """
+
+    def __init__(self, fleet: FleetFile, boat: str | None, clock: Clock, *, tlog: bool = True) -> None:
+        self.fleet, self.clock = fleet, clock
+        commanded = fleet.commanded(boat)
+        signing = None
+        if fleet.signing is not None:
+            signing = Signing(read_key(fleet.signing.key_file), fleet.signing.link_id)
+        self._endpoints: dict[str, Endpoint] = {}
+        self._signing = signing
+        self._tlog: TlogWriter | None = None
+        self.feed: FeedReceiver | None = None
+        self.left: tuple[str, ...] = ()
+        """What each boat was left doing, once closed."""
+        try:
+            if tlog:
+                fleet.log_dir.mkdir(parents=True, exist_ok=True)
+                self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog"))
+            self.links = {entry.name: self._link(entry) for entry in commanded}
+            self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
+            listen = fleet.feed_listen(boat)
+            if fleet.feed is not None and listen is not None:
+                self.feed = FeedReceiver(listen, fleet.frame, clock, fleet.feed.allow, fleet.names)
+            for endpoint in self._endpoints.values():
+                endpoint.open()
+        except BaseException:
+            self.close()
+            raise
+
+    def connect(self, timeout_s: float = CONNECT_S) -> None:
+        """Hear every boat and get its streams, all at once.
+
+        Raises:
+            LinkError: a boat does not answer.
+        """
+        self._all({**self.links, **self.ears}, lambda link: link.connect(timeout_s))
+
+    def prepare(self, timeout_s: float = PREPARE_S) -> None:
+        """Bring every commanded boat to where it obeys, all at once.
+
+        Raises:
+            LinkRefused: an autopilot says no.
+            LinkError: no answer.
+        """
+        self._all(self.links, lambda link: link.prepare(timeout_s))
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Boats heard of by the feed and by links that are only listened to."""
+        error = self.fleet.shield_config.position_error_m
+        told = [contact_of(link.read(), error) for link in self.ears.values()]
+        heard = () if self.feed is None else self.feed.read()
+        return (*heard, *(contact for contact in told if contact is not None))
+
+    def close(self) -> None:
+        """Stop every boat, verify it, and give everything back; may be called again."""
+        links: dict[str, MavlinkLink] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
+        ears = getattr(self, "ears", {})
+        if links and not self.left:
+            with ThreadPoolExecutor(len(links)) as pool:
+                texts = list(pool.map(_leave, [link for name, link in links.items() if name not in ears]))
+            for link in ears.values():
+                link.endpoint.detach(link.system_id)
+            self.left = tuple(texts)
+        for endpoint in self._endpoints.values():
+            endpoint.close()
+        if self.feed is not None:
+            self.feed.close()
+        if self._tlog is not None:
+            self._tlog.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _heard_only(self, commanded: Iterable[BoatSettings]) -> list[BoatSettings]:
+        names = {entry.name for entry in commanded}
+        return [
+            entry
+            for entry in self.fleet.boats
+            if entry.link is not None and entry.name not in names and self.fleet.contact_of(entry) == "telemetry"
+        ]
+
+    def _link(self, boat: BoatSettings) -> MavlinkLink:
+        settings = boat.link
+        if settings is None:
+            raise ValueError(f"boat {boat.name} has no link")
+        endpoint = self._endpoints.get(settings.address)
+        if endpoint is None:
+            on_bytes = None if self._tlog is None else self._tlog.on_bytes
+            endpoint = Endpoint(settings.address, self.clock, signing=self._signing, on_bytes=on_bytes)
+            self._endpoints[settings.address] = endpoint
+        return MavlinkLink(
+            boat.name,
+            endpoint,
+            settings.system_id,
+            self.fleet.frame,
+            self.clock,
+            rate_hz=settings.rate_hz,
+            route=settings.route,
+        )
+
+    @staticmethod
+    def _all(links: Mapping[str, MavlinkLink], work: Callable[[MavlinkLink], None]) -> None:
+        """Do something slow with all links at the same time; the first that fails is told, after all are done."""
+        if not links:
+            return
+        with ThreadPoolExecutor(len(links)) as pool:
+            futures = [pool.submit(work, link) for link in links.values()]
+        errors = [error for error in (future.exception() for future in futures) if error is not None]
+        for error in errors[1:]:
+            LOG.error("%s", error)
+        if errors:
+            raise errors[0]
+
+
+def _leave(link: MavlinkLink) -> str:
+    try:
+        return link.close()
+    except Exception as error:  # the other boats must still be stopped
+        LOG.exception("%s: not left in order", link.boat)
+        return f"{link.boat}: not left in order ({error}); it stops by its own time-out"
