@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +16,9 @@ from .routes import Abilities
 from .texts import Texts
 
 ASK_AGAIN_S = 0.7
+LEARN_AGAIN_S = 0.4
+_TRIES = 3
+"""A parameter asked for so often and never answered is one this firmware lacks."""
 SAID_S = 15.0
 """What an autopilot said so recently belongs to a refusal."""
 _TOP = "WP_SPEED"
@@ -68,6 +71,7 @@ class Dialogue:
         self._texts = Texts()
         self._said: deque[tuple[float, str]] = deque(maxlen=50)
         self._results: dict[int, int] = {}
+        self._tries: Counter[str] = Counter()
         self._unread: deque[str] = deque(maxlen=100)
 
     @property
@@ -136,17 +140,20 @@ class Dialogue:
 
     def learn(self, needed: str, others: tuple[str, ...], patience: Patience) -> None:
         """Ask for parameters and for what the autopilot can do; waits for the needed one, others get a few tries."""
-        for attempt in range(1000):
+        while not patience.is_over:
             with self.changed:
-                unknown = [name for name in (needed, *others) if name not in self.parameters]
-                done = needed in self.parameters and self.version is not None
-            if (done and (attempt >= 3 or not unknown)) or patience.is_over:
-                return
+                unknown = [name for name in (needed, *others) if self._is_worth_asking(name, needed)]
+                if not unknown and self.version is not None:
+                    return
+                self._tries.update(unknown)
             for name in unknown:
                 self.ask_parameter(name)
             if self.version is None:
                 self._send(self._version_request())
-            self.wait(lambda: self._knows((needed, *others)), patience.part(ASK_AGAIN_S))
+            self.wait(lambda: self._knows((needed, *others)), patience.part(LEARN_AGAIN_S))
+
+    def _is_worth_asking(self, name: str, needed: str) -> bool:
+        return name not in self.parameters and (name == needed or self._tries[name] < _TRIES)
 
     def ask_parameter(self, name: str) -> None:
         """Ask for one parameter."""

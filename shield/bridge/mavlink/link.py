@@ -15,7 +15,7 @@ from .autopilot import Autopilot
 from .dialogue import Patience
 from .endpoint import Endpoint
 from .health import LinkHealth, health_of
-from .preparation import leave, prepare
+from .preparation import learn, leave, prepare
 from .routes import AttitudeRoute, Encoded, check_route
 
 LOG = logging.getLogger(__name__)
@@ -25,6 +25,10 @@ class MavlinkLink:
     """One boat. `connect`, `prepare`, then `read` and `send` at the loop's rate, then `close`; see `bridge.link.Link`.
 
     Signing is the endpoint's: all boats on a wire have one key.
+
+    Attributes:
+        autopilot: what the boat said.
+        endpoint, system_id: as given.
 
     Args:
         boat: its name.
@@ -53,7 +57,8 @@ class MavlinkLink:
         self.boat = boat
         self.autopilot = Autopilot(boat, endpoint, system_id, frame, clock, rate_hz)
         self._wanted_route = check_route(route)
-        self._endpoint, self._frame, self._clock = endpoint, frame, clock
+        self.endpoint, self.system_id = endpoint, system_id
+        self._frame, self._clock = frame, clock
         self._attached = False
         self._last_rad = math.nan
         self._started_s = clock.now_s()
@@ -67,7 +72,7 @@ class MavlinkLink:
         """
         patience = Patience(self._clock, timeout_s)
         boat, dialogue = self.autopilot, self.autopilot.dialogue
-        self._endpoint.attach(boat.system_id, boat)
+        self.endpoint.attach(boat.system_id, boat)
         self._attached = True
         if not dialogue.wait(lambda: boat.heartbeat is not None, patience):
             raise LinkError(self._silence(timeout_s))
@@ -78,6 +83,10 @@ class MavlinkLink:
                 f"boat {self.boat} sends {boat.streams.missing(self._clock.now_s())} after {timeout_s:g} s; "
                 "give a lower rate_hz, or a faster link"
             )
+
+    def learn(self, timeout_s: float) -> None:
+        """Ask what the autopilot can do and for the parameters that checks look at; what it does not answer is left."""
+        learn(self.autopilot, Patience(self._clock, timeout_s))
 
     def prepare(self, timeout_s: float) -> None:
         """Read what the autopilot can do and choose the route; GUIDED; arm, all checks on.
@@ -159,7 +168,13 @@ class MavlinkLink:
             return leave(self.autopilot, self.stop)
         finally:
             self._attached = False
-            self._endpoint.detach(self.autopilot.system_id)
+            self.endpoint.detach(self.system_id)
+
+    def release(self) -> None:
+        """Give the link back without a word to the boat: for one that was only listened to."""
+        if self._attached:
+            self._attached = False
+            self.endpoint.detach(self.system_id)
 
     def health(self) -> LinkHealth:
         """What the link knows of itself: rates, round trips, the boat's clock, other commanders."""
@@ -190,12 +205,12 @@ class MavlinkLink:
     def _silence(self, timeout_s: float) -> str:
         boat = self.autopilot
         refused = ", ".join(f"{count} {kind}" for kind, count in sorted(boat.refused().items()))
-        start = f"boat {self.boat}: no heartbeat of system id {boat.system_id} on {self._endpoint.address}"
+        start = f"boat {self.boat}: no heartbeat of system id {boat.system_id} on {self.endpoint.address}"
         start += f" in {timeout_s:g} s"
         if not refused:
             return f"{start}; check power, radio, address and SYSID_THISMAV"
         remedy = (
-            "give both sides the same key and check their clocks" if self._endpoint.codec.signs else "check the radio"
+            "give both sides the same key and check their clocks" if self.endpoint.codec.signs else "check the radio"
         )
         return f"{start}; refused: {refused}; {remedy}"
 

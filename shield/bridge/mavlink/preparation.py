@@ -29,6 +29,11 @@ _LEARN_S = 10.0
 _TRY_AGAIN_S = 2.0
 
 
+def learn(boat: Autopilot, patience: Patience) -> None:
+    """Ask for what is not known yet of what the autopilot can do."""
+    boat.dialogue.learn(TOP_SPEED, OTHERS, patience)
+
+
 def prepare(boat: Autopilot, route: str, patience: Patience) -> None:
     """Learn, choose the route, GUIDED, arm.
 
@@ -38,7 +43,7 @@ def prepare(boat: Autopilot, route: str, patience: Patience) -> None:
     """
     if boat.heartbeat is None:
         raise LinkError(f"boat {boat.boat}: not connected; call connect first")
-    boat.dialogue.learn(TOP_SPEED, OTHERS, patience.part(_LEARN_S))
+    learn(boat, patience.part(_LEARN_S))
     boat.route = choose_route(boat.boat, route, boat.dialogue.abilities)
     _reach(boat, mode_request(*boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
     _reach(boat, arm_request(*boat.target), lambda: boat.is_armed, "arming", patience)
