@@ -17,6 +17,7 @@ from .commands.play import play
 from .commands.reach import app as reach_app
 from .commands.render import render
 from .commands.replay import replay
+from .commands.sim_boats import sim_boats
 from .provenance import package_version
 
 app = typer.Typer(
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, replay, docs):
     app.command()(function)
+app.command("sim-boats")(sim_boats)
 app.add_typer(reach_app, name="reach")
 
 

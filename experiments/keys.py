@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .attack.keys import ATTACK as _ATTACK
+from .boats_keys import SIM_BOATS as _SIM_BOATS
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
 
 BREACH = {
@@ -208,6 +209,8 @@ SETS = {
     **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 
+SIM_BOATS = {**_PROVENANCE, **_SIM_BOATS, **{f"breaches[].{name}": words for name, words in BREACH.items()}}
+
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
 KEYS = {
@@ -220,6 +223,7 @@ KEYS = {
     "attack": ATTACK,
     "reach compare": SETS,
     "render": RENDER,
+    "sim-boats": SIM_BOATS,
 }
 
 

@@ -28,7 +28,7 @@ from .places import game_of
 from .ports import Ports
 from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
 from .signing import check_key
-from .truth import Approach, record_of
+from .truth import Approach, TruthRecord, record_of
 
 TICK_S = 0.02
 """How often autopilots look at their clocks and send, s."""
@@ -149,9 +149,24 @@ class SimFleet:
         return self._pace.let_go_s
 
     @property
+    def cpu_s(self) -> float:
+        """Processor time of its thread, s."""
+        return self._pace.cpu_s
+
+    @property
     def is_playing(self) -> bool:
         """Whether policies drive their boats and the record runs."""
         return self._world.is_playing
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its thread is alive."""
+        return self._pace.is_running
+
+    @property
+    def truth(self) -> TruthRecord | None:
+        """The record so far, when one was asked for and the game has begun."""
+        return self._world.truth
 
     def play(self) -> None:
         """Let the policies and the record begin now."""
@@ -170,7 +185,7 @@ class SimFleet:
             ConfigError: no such boat.
         """
         with self._lock:
-            hull = self._boat(boat).hull
+            hull = self.boat(boat).hull
             hull.forget()
             hull.astern = False
             hull.state[[L.X, L.Y, L.HEADING, L.SPEED]] = x_m, y_m, heading_deg, speed_mps
@@ -182,7 +197,7 @@ class SimFleet:
             ConfigError: no such boat, fault or option.
         """
         with self._lock:
-            self._boat(boat).faults.start(kind, self.time_s, duration_s, **options)
+            self.boat(boat).faults.start(kind, self.time_s, duration_s, **options)
 
     def clear(self, boat: str, kind: str | None = None) -> None:
         """End a fault of a boat, or all of them.
@@ -191,7 +206,7 @@ class SimFleet:
             ConfigError: no such boat.
         """
         with self._lock:
-            self._boat(boat).faults.stop(kind)
+            self.boat(boat).faults.stop(kind)
 
     def closest_approaches(self) -> list[Approach]:
         """Closest approach of each pair of boats since the start, closest first."""
@@ -253,7 +268,12 @@ class SimFleet:
     ) -> None:
         self.close()
 
-    def _boat(self, name: str) -> Boat:
+    def boat(self, name: str) -> Boat:
+        """The boat of that name.
+
+        Raises:
+            ConfigError: there is none.
+        """
         if name not in self.boats:
             raise ConfigError(f"no simulated boat is named {name!r}; there are {', '.join(self.boats)}")
         return self.boats[name]

@@ -30,12 +30,14 @@ class Pace:
         receive: reads what came in.
 
     Attributes:
+        cpu_s: processor time of the thread, s.
         let_go_s: time that was not lived because the machine was too slow, s.
     """
 
     def __init__(self, clock: Clock, tick_s: float, tick: Callable[[], None], receive: Callable[[], None]) -> None:
         self.clock = clock
         self.let_go_s = 0.0
+        self.cpu_s = 0.0
         self._tick_s = tick_s
         self._tick = tick
         self._receive = receive
@@ -46,7 +48,7 @@ class Pace:
     @property
     def is_running(self) -> bool:
         """Whether the thread runs."""
-        return self._thread is not None
+        return self._thread is not None and self._thread.is_alive()
 
     def start(self, sockets: Callable[[], list[socket.socket]]) -> None:
         """Start the thread.
@@ -57,7 +59,7 @@ class Pace:
         Raises:
             ConfigError: it runs already.
         """
-        if self._thread is not None:
+        if self.is_running:
             raise ConfigError("the fleet runs already")
         self._sockets = sockets
         self._ends.clear()
@@ -73,6 +75,7 @@ class Pace:
 
     def _run(self) -> None:
         due = self.clock.now_s() + self._tick_s
+        began_s = time.thread_time()
         while not self._ends.is_set():
             lag = self.clock.now_s() - due
             if lag < 0.0:
@@ -85,6 +88,7 @@ class Pace:
             self._receive()
             self._tick()
             due += self._tick_s
+            self.cpu_s = time.thread_time() - began_s
 
     def _wait(self, due_s: float) -> None:
         """Wait until then or until there is something to read, and read it."""

@@ -14,7 +14,7 @@ _FREE_PORT = "udpout:127.0.0.1:0"
 
 
 class Ports:
-    """The wires of all boats. Boats share a port they listen at; each calls from one of its own.
+    """The wires of all boats. Boats of one address share its wire, but each calls over UDP from a port of its own.
 
     Args:
         allow_remote: whether links may leave this machine.
@@ -71,6 +71,6 @@ class Ports:
             return self._shared[address]
         wire = open_wire(address or _FREE_PORT, self._allow_remote)
         self._aboard[wire] = []
-        if address and wire.address.startswith(("udpout", "tcp:")):
+        if address and not wire.address.startswith("udpin"):
             self._shared[address] = wire
         return wire

@@ -75,7 +75,7 @@ class TcpListener:
 
     def sockets(self) -> list[socket.socket]:
         """Sockets to wait on."""
-        return [self._server, *(peer.socket for peer in self._peers)]
+        return [self._server, *(peer.socket for peer in self._peers if peer.is_open)]
 
     def read(self) -> Iterator[bytes]:
         """Whole packets that have come in."""
@@ -112,7 +112,7 @@ class TcpCaller:
 
     def sockets(self) -> list[socket.socket]:
         """Sockets to wait on."""
-        return [self._peer.socket] if self._peer is not None else []
+        return [self._peer.socket] if self._peer is not None and self._peer.is_open else []
 
     def read(self) -> Iterator[bytes]:
         """Whole packets that have come in."""

@@ -99,6 +99,16 @@ class TruthRecord:
         self._recorder.step(self._game.core.view(), told, told)
         self._log.step(self._game.core)
 
+    @property
+    def captures(self) -> list[int]:
+        """Flags captured by blue and red."""
+        return [int(count) for count in self._game.core.captures[0]]
+
+    @property
+    def tags(self) -> list[int]:
+        """Tags made by blue and red."""
+        return [int(count) for count in self._game.core.tags[0]]
+
     def record(self) -> Record:
         """Everything so far, see `steerclear.env.record`; with a further array ``state`` (T+1, n, N_STATE)."""
         record = self._recorder.finish()
