@@ -1,0 +1,125 @@
+"""`Drill`: a short drive of one boat after the other, all of them behind the shield, to see how they respond.
+
+It stands where a policy stands: the loop asks it what boats should do, the shield filters that, and the ticks it gets
+back hold what was really sent and what the boats did.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...commands import Commands
+from ...jit import Array
+from ..fleet_file import FleetFile
+from ..link import BoatReading
+from ..tick import Tick
+from ..wanted import Answer, Snapshot
+
+AHEAD_S = 8.0
+TURN_S = 7.0
+STOP_S = 5.0
+EACH_S = AHEAD_S + TURN_S + STOP_S
+"""How long the drill of one boat takes, s."""
+
+TURN_RAD = math.radians(60.0)
+TOP_SHARE = 0.6
+FASTEST_MPS = 1.5
+NEAR_M = 5.0
+
+
+@dataclass(frozen=True)
+class DrillSample:
+    """One turn of the loop.
+
+    Attributes:
+        time_s: of the turn.
+        reading: of the boat.
+        heading_rad, speed_mps: as sent; NaN when nothing was.
+    """
+
+    time_s: float
+    reading: BoatReading
+    heading_rad: float
+    speed_mps: float
+
+
+class Drill:
+    """A `WantedSource` and a `TickSink`.
+
+    Args:
+        fleet: the file.
+        boats: to drill, in order; all others of the process lie still.
+
+    Attributes:
+        seconds: how long it takes.
+        samples: by boat's name, of its own turn only.
+    """
+
+    def __init__(self, fleet: FleetFile, boats: Sequence[str]) -> None:
+        self.samples: dict[str, list[DrillSample]] = {name: [] for name in boats}
+        self.seconds = EACH_S * len(self.samples)
+        self._fleet = fleet
+        self._boats = tuple(self.samples)
+        self._began_s = math.nan
+        self._courses: dict[str, tuple[float, float]] = {}
+        self._commands: Commands | None = None
+
+    def offer(self, snapshot: Snapshot) -> None:
+        """See `WantedSource`."""
+        if math.isnan(self._began_s):
+            self._began_s = snapshot.taken_s
+        values = np.column_stack([np.zeros(len(snapshot.seen)), np.radians(snapshot.seen[:, 2])])
+        boat, into_s = self._turn_of(snapshot.taken_s)
+        if boat:
+            i = self._fleet.names.index(boat)
+            values[i] = self._wanted(boat, snapshot.seen[i], into_s)
+        self._commands = Commands.absolute_rad(values)
+
+    def latest(self) -> Answer:
+        """See `WantedSource`."""
+        return Answer() if self._commands is None else Answer(self._commands, 0.0)
+
+    def take(self, tick: Tick) -> None:
+        """See `TickSink`."""
+        boat, _ = self._turn_of(tick.began_s)
+        reading, sent = tick.readings.get(boat), tick.sent.get(boat)
+        if reading is not None:
+            told = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
+            self.samples[boat].append(DrillSample(tick.began_s, reading, *told))
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _turn_of(self, time_s: float) -> tuple[str, float]:
+        """Whose turn it is and for how long already, s; no name before and after."""
+        into_s = time_s - self._began_s
+        if not 0.0 <= into_s < self.seconds:
+            return "", 0.0
+        return self._boats[int(into_s / EACH_S)], into_s % EACH_S
+
+    def _wanted(self, boat: str, row: Array, into_s: float) -> tuple[float, float]:
+        """Speed m/s and heading rad; speed 0 for a boat nobody sees."""
+        if not np.isfinite(row).all():
+            return 0.0, 0.0
+        if boat not in self._courses:
+            self._courses[boat] = self._courses_of(row)
+        first, second = self._courses[boat]
+        speed = min(FASTEST_MPS, TOP_SHARE * self._fleet.platform_of[boat].max_speed_mps)
+        if into_s < AHEAD_S:
+            return speed, first
+        return (speed if into_s < AHEAD_S + TURN_S else 0.0), second
+
+    def _courses_of(self, row: Array) -> tuple[float, float]:
+        """Towards the middle of the geofence, then a turn to the side that stays nearer to it."""
+        xmin, ymin, xmax, ymax = self._fleet.geofence.box
+        east, north = 0.5 * (xmin + xmax) - row[0], 0.5 * (ymin + ymax) - row[1]
+        far = math.hypot(east, north) > NEAR_M
+        first = math.atan2(east, north) if far else math.radians(row[2])
+        east, north = east - FASTEST_MPS * AHEAD_S * math.sin(first), north - FASTEST_MPS * AHEAD_S * math.cos(first)
+        sides = (first + TURN_RAD, first - TURN_RAD)
+        second = max(sides, key=lambda side: east * math.sin(side) + north * math.cos(side))
+        return first % (2.0 * math.pi), second % (2.0 * math.pi)

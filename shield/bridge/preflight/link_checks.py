@@ -1,0 +1,198 @@
+"""Checks of the links alone: rates, latency, clock, position at rest, the autopilot's settings, signing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from ...platforms import Platform
+from ..clock import Clock
+from ..link import BoatReading
+from ..mavlink.health import LinkHealth
+from .result import Check, CheckResult
+from .watch import WATCH_S, Watch, Watched
+
+LONGEST_TRIP_S = 0.2
+OLDEST_S = 0.5
+"""No field may get older than this while watched."""
+WALL_S = 30.0
+"""Signing refuses a clock a minute off; half of that is worth a word."""
+REST_MPS = 0.3
+SPREAD_M = 1.5
+RMS_M = 0.5
+STANDARD_TIMEOUT_S = 3.0
+TOP_SPEED_TOLERANCE = 1.02
+_REFUSED = ("bad_checksum", "clock", "jump", "frozen", "impossible_position", "impossible_speed", "impossible_attitude")
+
+
+def link_checks(
+    links: Mapping[str, Watched], platforms: Mapping[str, Platform], clock: Clock, seconds: float = WATCH_S
+) -> list[Check]:
+    """All of them; they move no boat. The first to run watches all links for ``seconds``.
+
+    Args:
+        links: connected, by boat's name.
+        platforms: of each boat, by name.
+        clock: the loop's.
+        seconds: how long links are watched.
+    """
+    watch = Watch(links, clock, seconds)
+    checks: list[Check] = []
+    for boat in links:
+        checks += [
+            Check(f"rates:{boat}", partial(_rates, watch, boat)),
+            Check(f"latency:{boat}", partial(_latency, watch, boat)),
+            Check(f"clock:{boat}", partial(_clock, watch, boat)),
+            Check(f"spread:{boat}", partial(_spread, watch, boat)),
+            Check(f"autopilot:{boat}", partial(_autopilot, watch, boat, platforms[boat])),
+            Check(f"commanders:{boat}", partial(_commanders, watch, boat, clock)),
+        ]
+    return checks
+
+
+def _rates(watch: Watch, boat: str) -> CheckResult:
+    return check_rates(boat, watch.readings(boat), watch.health(boat))
+
+
+def _latency(watch: Watch, boat: str) -> CheckResult:
+    return check_latency(boat, watch.health(boat))
+
+
+def _clock(watch: Watch, boat: str) -> CheckResult:
+    return check_clock(boat, watch.health(boat))
+
+
+def _spread(watch: Watch, boat: str) -> CheckResult:
+    return check_spread(boat, watch.readings(boat))
+
+
+def _autopilot(watch: Watch, boat: str, platform: Platform) -> CheckResult:
+    return check_autopilot(boat, watch.health(boat), platform)
+
+
+def _commanders(watch: Watch, boat: str, clock: Clock) -> CheckResult:
+    watch.readings(boat)
+    return check_commanders(boat, watch.health(boat), clock.now_s())
+
+
+def check_rates(boat: str, readings: list[BoatReading], health: LinkHealth) -> CheckResult:
+    """Needed messages arrive at the rate asked for, never late, and none is refused."""
+    ages = [max(reading.age_s, reading.turn_rate_age_s) for reading in readings]
+    refused = {kind: sum(r.faults.get(kind, 0) for r in readings) for kind in _REFUSED}
+    figures = {
+        "position_rate_hz": health.rates_hz.get("GLOBAL_POSITION_INT", 0.0),
+        "attitude_rate_hz": health.rates_hz.get("ATTITUDE", 0.0),
+        "oldest_s": max(ages, default=math.inf),
+        "refused": float(sum(refused.values())),
+    }
+    name = f"rates:{boat}"
+    if health.missing:
+        return CheckResult(name, False, f"{health.missing}; lower rate_hz or take a faster link", figures)
+    if not figures["oldest_s"] <= OLDEST_S:
+        text = (
+            f"telemetry was {figures['oldest_s']:.2f} s old, more than {OLDEST_S:g} s; wait for GPS, or check the radio"
+        )
+        return CheckResult(name, False, text, figures)
+    if figures["refused"]:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in refused.items() if count)
+        return CheckResult(name, False, f"refused while watched: {kinds}; check GPS, radio and cables", figures)
+    text = f"position {figures['position_rate_hz']:.0f} Hz, heading {figures['attitude_rate_hz']:.0f} Hz"
+    return CheckResult(name, True, f"{text}, never older than {figures['oldest_s']:.2f} s", figures)
+
+
+def check_latency(boat: str, health: LinkHealth, limit_s: float = LONGEST_TRIP_S) -> CheckResult:
+    """Round trips are short: 95 of 100 within the limit."""
+    name = f"latency:{boat}"
+    if not health.round_trips_s:
+        text = "it answers no TIMESYNC, so delays cannot be measured; update its firmware, or accept this check"
+        return CheckResult(name, False, text)
+    median, high = (float(q) for q in np.quantile(health.round_trips_s, [0.5, 0.95]))
+    figures = {"round_trip_median_s": median, "round_trip_p95_s": high, "telemetry_delay_s": health.shortest_delay_s}
+    if not high <= limit_s:
+        text = f"round trip {high:.2f} s (95 of 100), more than {limit_s:g} s; take a faster radio or fewer messages"
+        return CheckResult(name, False, text, figures)
+    return CheckResult(name, True, f"round trip {median * 1e3:.0f} ms, 95 of 100 within {high * 1e3:.0f} ms", figures)
+
+
+def check_clock(boat: str, health: LinkHealth) -> CheckResult:
+    """The boat's clock ran on since it was connected; with signing, wall clocks agree."""
+    name = f"clock:{boat}"
+    figures = {"starts": float(health.clock_starts), "wall_ahead_s": health.wall_ahead_s}
+    if health.clock_starts == 0:
+        return CheckResult(name, False, "no time-stamped telemetry heard; wait for a position, then run again", figures)
+    if health.clock_starts > 1:
+        return CheckResult(name, False, "the autopilot restarted while connected; check its power, run again", figures)
+    if health.signs and abs(health.wall_ahead_s) > WALL_S:
+        text = (
+            f"this machine's clock is {health.wall_ahead_s:+.0f} s from the boat's GPS time, and signing needs it right"
+        )
+        return CheckResult(name, False, f"{text}; set this machine's clock", figures)
+    return CheckResult(name, True, "the boat's clock runs on", figures)
+
+
+def check_spread(boat: str, readings: list[BoatReading]) -> CheckResult:
+    """At rest the position hardly wanders."""
+    name = f"spread:{boat}"
+    fixes = np.array([r.position_m for r in readings if math.isfinite(r.position_m[0]) and r.position_age_s < OLDEST_S])
+    speeds = [abs(r.speed_mps) for r in readings if math.isfinite(r.speed_mps)]
+    if len(fixes) < 10 or not speeds:
+        return CheckResult(name, False, "no position to watch; wait for GPS, then run again")
+    off = np.hypot(*(fixes - fixes.mean(axis=0)).T)
+    rms, most, speed = float(np.sqrt(np.mean(off**2))), float(off.max()), float(np.median(speeds))
+    figures = {"spread_rms_m": rms, "spread_max_m": most, "speed_mps": speed}
+    if speed > REST_MPS:
+        text = f"it moves at {speed:.1f} m/s, so its spread at rest cannot be seen; let it lie still, then run again"
+        return CheckResult(name, False, text, figures)
+    if rms > RMS_M or most > SPREAD_M:
+        text = f"at rest its position wanders {rms:.2f} m rms, {most:.2f} m at most; wait for a better fix"
+        return CheckResult(name, False, text, figures)
+    return CheckResult(name, True, f"at rest {rms:.2f} m rms, {most:.2f} m at most", figures)
+
+
+def check_autopilot(boat: str, health: LinkHealth, platform: Platform) -> CheckResult:
+    """Firmware and parameters fit: top speed as the platform file's, own time-out, our heartbeats counted."""
+    known = health.parameters
+    top = known.get("WP_SPEED", math.nan)
+    timeout = known.get("GUID_TIMEOUT", STANDARD_TIMEOUT_S)
+    figures = {"wp_speed_mps": top, "timeout_s": timeout}
+    faults = []
+    if not top > 0.0:
+        faults.append("WP_SPEED is not known or 0: set it to the boat's top speed")
+    elif top * TOP_SPEED_TOLERANCE < platform.max_speed_mps:
+        faults.append(
+            f"WP_SPEED {top:g} m/s is below the platform's {platform.max_speed_mps:g} m/s, so the boat is slower than "
+            f"the shield thinks: set it to {platform.max_speed_mps:g}"
+        )
+    if not 0.0 < timeout <= STANDARD_TIMEOUT_S:
+        faults.append(f"GUID_TIMEOUT is {timeout:g} s: set it to {STANDARD_TIMEOUT_S:g} or less")
+    if known.get("ARMING_CHECK", 1.0) == 0.0:
+        faults.append("ARMING_CHECK is 0, all checks off: set it to 1")
+    ground = known.get("SYSID_MYGCS", 255.0)
+    if ground != 255.0 and (known.get("SYSID_ENFORCE", 0.0) or known.get("FS_GCS_ENABLE", 0.0)):
+        faults.append(f"SYSID_MYGCS is {ground:g} and ours is 255: set it to 255")
+    version = "unknown" if health.version is None else ".".join(map(str, health.version))
+    text = "; ".join(faults) or f"firmware {version}, WP_SPEED {top:g} m/s, own time-out {timeout:g} s"
+    return CheckResult(f"autopilot:{boat}", not faults, text, figures)
+
+
+def check_commanders(boat: str, health: LinkHealth, now_s: float) -> CheckResult:
+    """Nobody else was seen to command the boat or to be ready to, and packets are signed where the file says so."""
+    name = f"commanders:{boat}"
+    figures = {"other_stations": float(len(health.stations)), "unsigned": float(health.faults.get("unsigned", 0))}
+    who = ", ".join(f"system {system} component {component}" for system, component in sorted(health.stations))
+    if math.isfinite(health.other_commander_s):
+        text = f"somebody else commanded it {now_s - health.other_commander_s:.0f} s ago; end that program"
+        return CheckResult(name, False, text, figures)
+    if health.stations:
+        text = f"another ground station is on the link ({who}); end it, or accept this check if it only listens"
+        return CheckResult(name, False, text, figures)
+    refused = [f"{health.faults[k]} {k}" for k in ("bad_signature", "second_sender") if health.faults.get(k)]
+    if refused:
+        text = f"refused {', '.join(refused)}: somebody sends in this boat's name; find them before you start"
+        return CheckResult(name, False, text, figures)
+    return CheckResult(
+        name, True, "nobody else; packets signed" if health.signs else "nobody else; not signed", figures
+    )

@@ -1,0 +1,175 @@
+"""What a drill shows: heading against course, and the boat's response against its platform file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...jit import Array
+from ...platforms import Platform, fresh_state, step_boat
+from ...platforms import layout as L
+from .drill import Drill, DrillSample
+from .result import Check, CheckResult
+
+COURSE_DEG = 15.0
+COURSE_MPS = 0.8
+STEADY_DPS = 5.0
+FEWEST = 10
+HEADING_DEG = 12.0
+SPEED_MPS = 0.35
+LONGEST_DELAY_STEPS = 8
+LONGEST_DELAY_S = 0.6
+TURNED_DEG = 15.0
+
+
+def drill_checks(drill: Drill, platforms: dict[str, Platform], dt_s: float) -> list[Check]:
+    """Checks of a drill that has been driven.
+
+    Args:
+        drill: with its samples.
+        platforms: by boat's name.
+        dt_s: step of the loop, s.
+    """
+    checks = []
+    for boat, samples in drill.samples.items():
+        checks.append(Check(f"course:{boat}", partial(check_course, boat, samples)))
+        checks.append(Check(f"response:{boat}", partial(check_response, boat, samples, platforms[boat], dt_s)))
+    return checks
+
+
+def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:
+    """On straight runs the boat goes where it points."""
+    name = f"course:{boat}"
+    off = [
+        s.reading.heading_rad - s.reading.course_rad
+        for s in samples
+        if s.reading.speed_mps > COURSE_MPS and abs(s.reading.turn_rate_rads) < math.radians(STEADY_DPS)
+    ]
+    off = [value for value in off if math.isfinite(value)]
+    if len(off) < FEWEST:
+        text = (
+            f"it ran straight at more than {COURSE_MPS:g} m/s for too short; see its response, give it room, run again"
+        )
+        return CheckResult(name, False, text, {"samples": float(len(off))})
+    mean = math.degrees(math.atan2(np.mean(np.sin(off)), np.mean(np.cos(off))))
+    figures = {"heading_less_course_deg": mean, "samples": float(len(off))}
+    if not abs(mean) <= COURSE_DEG:
+        text = f"it points {mean:+.0f} deg off its course; calibrate its compass, or wait for less current"
+        return CheckResult(name, False, text, figures)
+    return CheckResult(name, True, f"points {mean:+.1f} deg off its course", figures)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """How one delay fits: delay s, rms of heading deg and speed m/s, highest turn rates measured and foretold deg/s."""
+
+    delay_s: float
+    heading_deg: float
+    speed_mps: float
+    measured_dps: float
+    foretold_dps: float
+
+    @property
+    def cost(self) -> float:
+        return self.heading_deg / HEADING_DEG + self.speed_mps / SPEED_MPS
+
+
+def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform, dt_s: float) -> CheckResult:
+    """The boat did what its platform file foretells of the commands sent."""
+    name = f"response:{boat}"
+    told = [s for s in samples if math.isfinite(s.heading_rad) and math.isfinite(s.speed_mps)]
+    measured = np.array([_measured(s) for s in told])
+    if len(told) < 5.0 / dt_s or not np.isfinite(measured).all():
+        text = "commands or telemetry were missing during the drill; see the other checks, then run again"
+        return CheckResult(name, False, text)
+    fit = min((_fit(told, measured, platform, dt_s, k) for k in range(LONGEST_DELAY_STEPS + 1)), key=lambda f: f.cost)
+    figures = {
+        "delay_s": fit.delay_s,
+        "heading_rms_deg": fit.heading_deg,
+        "speed_rms_mps": fit.speed_mps,
+        "turn_rate_dps": fit.measured_dps,
+        "turn_rate_foretold_dps": fit.foretold_dps,
+    }
+    fault = _fault(fit, measured, told, platform)
+    text = fault or (
+        f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
+        f"effect after {fit.delay_s:.1f} s"
+    )
+    return CheckResult(name, not fault, text, figures)
+
+
+def _measured(sample: DrillSample) -> tuple[float, float]:
+    """Heading deg and speed m/s, run on to the turn where they may be."""
+    reading = sample.reading
+    turned = reading.turn_rate_rads * reading.heading_age_s
+    return math.degrees(reading.heading_rad + (turned if math.isfinite(turned) else 0.0)), reading.speed_mps
+
+
+def _fit(told: Sequence[DrillSample], measured: Array, platform: Platform, dt_s: float, steps: int) -> _Fit:
+    """Run the platform's model on the commands sent, taking effect ``steps`` later."""
+    params = platform.pack()
+    row = fresh_state(0.0, 0.0, _half_turn(measured[0, 0]), measured[0, 1])
+    foretold = np.empty_like(measured)
+    for i in range(len(told)):
+        foretold[i] = row[L.HEADING], row[L.SPEED]
+        if i >= steps:
+            command = told[i - steps]
+            error = _half_turn(math.degrees(command.heading_rad) - row[L.HEADING])
+            step_boat(params, row, command.speed_mps, error, dt_s)
+    heading = _half_turn(measured[:, 0] - foretold[:, 0])
+    speed = measured[:, 1] - foretold[:, 1]
+    return _Fit(
+        steps * dt_s,
+        float(np.sqrt(np.mean(heading**2))),
+        float(np.sqrt(np.mean(speed**2))),
+        _fastest_dps(measured[:, 0], dt_s),
+        _fastest_dps(foretold[:, 0], dt_s),
+    )
+
+
+def _fastest_dps(headings_deg: Array, dt_s: float) -> float:
+    """Highest turn rate over half a second, deg/s."""
+    apart = max(1, round(0.5 / dt_s))
+    return float(np.abs(_half_turn(headings_deg[apart:] - headings_deg[:-apart])).max()) / (apart * dt_s)
+
+
+def _fault(fit: _Fit, measured: Array, told: Sequence[DrillSample], platform: Platform) -> str:
+    if float(np.median(measured[:, 1])) < -0.2:
+        return "it goes astern when told to go ahead; check the motors' direction"
+    if _turned_away(measured, told):
+        return "it turns away from the heading it is told; check the steering's direction"
+    if not fit.heading_deg <= HEADING_DEG:
+        faster = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
+        return (
+            f"it turns {faster} than {platform.name} ({fit.measured_dps:.0f} against {fit.foretold_dps:.0f} deg/s, "
+            f"{fit.heading_deg:.0f} deg rms); give the platform that fits it, or tune its steering"
+        )
+    if not fit.speed_mps <= SPEED_MPS:
+        return (
+            f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; give the platform that fits it, "
+            "or tune its speed"
+        )
+    if fit.delay_s > LONGEST_DELAY_S:
+        return f"commands take {fit.delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that"
+    return ""
+
+
+def _turned_away(measured: Array, told: Sequence[DrillSample]) -> bool:
+    """Whether it ended farther from the heading told than it was when that was first told."""
+    turn = next((i for i in range(1, len(told)) if _apart(told[i], told[i - 1]) > TURNED_DEG), 0)
+    wanted = math.degrees(told[-1].heading_rad)
+    first, last = (abs(_half_turn(measured[i, 0] - wanted)) for i in (turn, -1))
+    return bool(last > first + TURNED_DEG)
+
+
+def _apart(one: DrillSample, other: DrillSample) -> float:
+    return abs(float(_half_turn(math.degrees(one.heading_rad - other.heading_rad))))
+
+
+def _half_turn(deg: Any) -> Any:
+    return (deg + 180.0) % 360.0 - 180.0
