@@ -35,7 +35,8 @@ def sound(state: Array) -> bool:
 class Fleet:
     """State of n boats, own and others.
 
-    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly.
+    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly. The arrays are kept, not
+    copied, and decisions are read off them: hand over a copy of what a simulator goes on changing.
 
     Attributes:
         state: (n, N_STATE) rows as in `platforms.layout`; autopilot memory may be NaN where it is not known.

@@ -30,7 +30,8 @@ class MctfReader:
         controlled = core.team == team
         if not shield_autopilot:
             controlled = controlled & ~core.driven[0]
-        return Fleet(core.state[0], core.team, self._platforms, controlled, self.agent_ids)
+        # a copy: decisions are read after the step has moved the boats
+        return Fleet(core.state[0].copy(), core.team, self._platforms, controlled, self.agent_ids)
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind the env understands."""

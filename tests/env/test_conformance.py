@@ -1,11 +1,14 @@
 """PettingZoo's and Gymnasium's own checks of the environment."""
 
+import itertools
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Discrete
 from gymnasium.spaces.utils import flatdim
-from gymnasium.utils.env_checker import check_space_limit
+from gymnasium.utils.env_checker import check_space_limit, data_equivalence
 from steerclear.env import MctfEnv, mctf_v0
 from steerclear.env.config import GameConfig
 
@@ -26,12 +29,59 @@ CONFIGS = {
 @pytest.mark.parametrize("name", CONFIGS)
 @pytest.mark.parametrize("kind", ["discrete", "continuous", "afp"])
 def test_pettingzoo_parallel_api(name, kind):
+    """The suite asserts and warns itself, and warnings are errors here: see the broken games below."""
     parallel_api_test(MctfEnv(CONFIGS[name], action_kind=kind), num_cycles=120)
 
 
 @pytest.mark.parametrize("name", ["mctf2025", "one_each"])
 def test_pettingzoo_parallel_seed(name):
+    """The suite asserts itself, but compares the first step only (``any`` of a dict is of its keys); more below."""
     parallel_seed_test(lambda: mctf_v0.parallel_env(CONFIGS[name]), num_cycles=60)
+
+
+class Forgetful(MctfEnv):
+    """Leaves out one boat's observation."""
+
+    def step(self, actions):
+        observations, *rest = super().step(actions)
+        return dict(list(observations.items())[1:]), *rest
+
+
+class Copying(MctfEnv):
+    """Gives out a new space each time."""
+
+    def action_space(self, agent):
+        return Discrete(17)
+
+
+class Undying(MctfEnv):
+    """Ends the game for one boat alone, and plays on with it."""
+
+    def step(self, actions):
+        observations, rewards, terminated, *rest = super().step(actions)
+        return observations, rewards, terminated | {self.possible_agents[0]: True}, *rest
+
+
+class Unseeded(MctfEnv):
+    """Starts elsewhere each time, whatever the seed."""
+
+    drawn = itertools.count()
+
+    def reset(self, seed=None, options=None):
+        return super().reset(seed=next(self.drawn), options=options)
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"), [(Forgetful, "not given observation"), (Copying, "same space object"), (Undying, "!=")]
+)
+def test_the_api_suite_notices_broken_games(broken, words):
+    with pytest.raises((AssertionError, UserWarning), match=words):
+        parallel_api_test(broken(CONFIGS["one_each"]), num_cycles=5)
+
+
+def test_the_seed_suite_notices_a_game_without_seed():
+    with pytest.raises(AssertionError, match="Incorrect observations"):
+        parallel_seed_test(lambda: Unseeded(CONFIGS["one_each"]), num_cycles=5)
 
 
 # the space is Pyquaticus' own: m/s and deg, not [-1, 1]
@@ -50,16 +100,16 @@ def test_gymnasium_spaces(name, kind):
         assert env.observation_space(agent).contains(observations[agent])
 
 
-def test_the_same_seed_plays_the_same_game():
+@pytest.mark.parametrize("name", ["mctf2025", "one_each", "mixed"])
+def test_the_same_seed_plays_the_same_game(name):
     def play(seed):
-        env = MctfEnv(GameConfig.preset("aamas2024", default_start=False))
-        env.reset(seed=seed)
+        env = MctfEnv(replace(CONFIGS[name], default_start=False))
+        seen = [env.reset(seed=seed)]
         random = np.random.default_rng(0)
-        seen = []
-        for _ in range(50):
-            observations, *_ = env.step({a: int(random.integers(17)) for a in env.agents})
-            seen.append(np.concatenate(list(observations.values())))
-        return np.array(seen)
+        for _ in range(60):
+            seen.append(env.step({agent: int(random.integers(17)) for agent in env.agents}))
+        return seen
 
-    np.testing.assert_array_equal(play(3), play(3))
-    assert not np.array_equal(play(3), play(4))
+    same, again, other = play(3), play(3), play(4)
+    assert data_equivalence(same, again)
+    assert not data_equivalence([step[0] for step in same], [step[0] for step in other])

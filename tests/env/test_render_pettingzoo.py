@@ -16,8 +16,37 @@ def _no_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
 
-def test_pettingzoos_own_render_test_passes():
-    def make(render_mode):
-        return parallel_to_aec(MctfEnv(GameConfig.preset("aamas2024", team_size=1), render_mode=render_mode))
+class Dark(MctfEnv):
+    """Draws nothing."""
 
-    render_test(make, {"rgb_array": lambda picture: isinstance(picture, np.ndarray) and picture.std() > 5})
+    def render(self, overlay=None):
+        picture = super().render(overlay)
+        return None if picture is None else np.zeros_like(picture)
+
+
+class Flat(MctfEnv):
+    """Draws without colours."""
+
+    def render(self, overlay=None):
+        picture = super().render(overlay)
+        return None if picture is None else picture.mean(axis=2).astype(np.uint8)
+
+
+def check(game):
+    """PettingZoo's suite, which asserts itself, and that a picture shows something."""
+
+    def make(render_mode):
+        return parallel_to_aec(game(GameConfig.preset("aamas2024", team_size=1), render_mode=render_mode))
+
+    render_test(make, {"rgb_array": lambda picture: picture.std() > 5})
+
+
+def test_pettingzoos_own_render_test_passes():
+    """Every render mode is asserted by the suite: see the broken games below."""
+    check(MctfEnv)
+
+
+@pytest.mark.parametrize("broken", [Dark, Flat])
+def test_the_render_suite_notices_broken_games(broken):
+    with pytest.raises(AssertionError):
+        check(broken)

@@ -261,9 +261,22 @@ def test_a_team_decides_in_less_than_60_us(name, game):
     assert best < 60e-6
 
 
-def test_plays_in_a_shielded_env():
+@pytest.mark.parametrize("team", [policies.make("medium"), policies.from_callable(lambda obs: "CC")])
+def test_plays_in_a_shielded_env(team):
+    """The shield is asked about what the policy wants, and the boats get under way."""
     env = ShieldedParallelEnv(MctfEnv("aamas2024"), Shield(ShieldConfig()))
     observations, infos = env.reset(seed=1)
-    for team in (policies.make("medium"), policies.from_callable(lambda obs: "CC")):
-        team.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
-        observations, *_, infos = env.step(team.act(observations, infos))
+    game, own = env.unwrapped, ["agent_0", "agent_1", "agent_2"]
+    team.reset(env, own, 0)
+    start = game.view().position
+    for _ in range(20):
+        actions, heading_deg = team.act(observations, infos), game.view().heading_deg
+        wanted = game.decode(actions)
+        assert list(actions) == own
+        observations, *_, infos = env.step(actions)
+        for boat, agent in enumerate(own):
+            decision = infos[agent]["shield"]
+            asked = decision.wanted_speed_mps, math.degrees(decision.wanted_heading_rad) - heading_deg[boat]
+            assert asked[0] == pytest.approx(wanted[boat, 0])
+            assert (asked[1] - wanted[boat, 1] + 180.0) % 360.0 == pytest.approx(180.0)
+    assert (np.hypot(*(game.view().position - start)[:3].T) > 0.2).all()
