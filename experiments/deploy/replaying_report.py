@@ -115,7 +115,7 @@ def origin_of(header: LogHeader) -> list[str]:
         if header.versions.get(name) != versions().get(name)
     ]
     if header.sources != source_digest():
-        found.append("the sources of shield, game or policies are others")
+        found.append("the sources of the shield are others")
     if header.machine != describe_machine():
         found.append(f"machine {header.machine} there, {describe_machine()} here")
     return found

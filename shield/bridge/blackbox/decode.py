@@ -101,11 +101,10 @@ def _fleet(rows: list[dict[str, Any]], platforms: Mapping[str, Platform]) -> Fle
 
 def _platform(text: str, known: Mapping[str, Platform]) -> str | Platform:
     """By name where this version's platform is the log's, else with the log's parameters."""
-    if text.startswith("{"):
-        return platform_from(json.loads(text))
-    if text in known and PLATFORMS.get(text) != known[text]:
-        return known[text]
-    return text
+    kind = platform_from(json.loads(text)) if text.startswith("{") else known.get(text)
+    if kind is None:
+        return text
+    return kind.name if PLATFORMS.get(kind.name) == kind else kind
 
 
 def _table(rows: list[dict[str, Any]], name: str, width: int) -> Array:

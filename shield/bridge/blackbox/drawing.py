@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...decision import Decisions, Reason
-from ...fleet import Fleet
+from ...fleet import LARGEST, Fleet
 from ...platforms import layout as L
 from ...surroundings import Surroundings
 from ..tick import Tick
@@ -29,7 +31,7 @@ def scene_of(tick: Tick, time_ns: int, separation_m: float) -> Message | None:
     """All boats of a tick; None when it has no fleet."""
     if tick.fleet is None:
         return None
-    boats = range(len(tick.fleet))
+    boats = [i for i in range(len(tick.fleet)) if _placed(tick.fleet, i)]
     return fg.scene_update([_boat(tick.fleet, tick.decisions, i, time_ns, separation_m) for i in boats])
 
 
@@ -85,12 +87,19 @@ def fixes_of(tick: Tick, header: LogHeader, time_ns: int) -> dict[str, Message]:
     fleet, found = tick.fleet, {}
     error = fleet.position_error_m
     for i, name in enumerate(fleet.names):
+        if not _placed(fleet, i):
+            continue
         latitude_deg, longitude_deg = header.frame.to_geodetic_deg(
             float(fleet.state[i, L.X]), float(fleet.state[i, L.Y])
         )
         error_m = header.config.position_error_m if error is None else float(error[i])
         found[name] = fg.location_fix(time_ns, latitude_deg, longitude_deg, error_m)
     return found
+
+
+def _placed(fleet: Fleet, i: int) -> bool:
+    """Whether a boat can be drawn; what a broken source says may be anything."""
+    return bool((np.abs(fleet.state[i, : L.SPEED + 1]) <= LARGEST).all())
 
 
 def _pose(x_m: float, y_m: float, heading_rad: float, z_m: float) -> Message:

@@ -56,7 +56,7 @@ class LogHeader:
         clock_s: time on the loop's clock when the log began, s.
         unix_ns: wall clock at that moment, ns since 1970; all times in the log are counted from it on the loop's clock.
         versions: of Python and the packages that decisions depend on.
-        sources: digest of the sources of the shield, the game and the policies.
+        sources: digest of the sources of the shield.
         machine: processor architecture, system and C library, which sines and cosines come from.
         version: of the log's format.
     """

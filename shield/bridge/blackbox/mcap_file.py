@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from typing import Any
 
 from mcap.writer import CompressionType, Writer
@@ -16,12 +17,13 @@ from .header import LogHeader
 from .numbers import plain
 from .schemas import HEADER, TICK, Schema
 
+LOG = logging.getLogger(__name__)
+
 TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC = "/tick", "/header", "/log"
 SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
 SCENE_EVERY_S, FIX_EVERY_S, FIELD_EVERY_S = 0.2, 1.0, 10.0
 CHUNK_BYTES = 1 << 20
-
-_KEPT = plain  # what JSON itself cannot write
+"""A chunk is closed at every flush; this only bounds one."""
 
 
 class McapFile:
@@ -44,6 +46,7 @@ class McapFile:
         self._counts: dict[str, int] = {}
         self._last_ns = header.unix_ns
         self._due_s = {SCENE_TOPIC: -1e18, FIX_TOPIC: -1e18, FIELD_TOPIC: -1e18}
+        self._undrawn = False
         self._active: dict[tuple[str, str, str], Action] = {}
         self._add(HEADER_TOPIC, HEADER, header.to_message(), header.unix_ns)
         self.flush()
@@ -53,15 +56,10 @@ class McapFile:
         time_ns = self._header.time_ns(tick.began_s)
         self._add(TICK_TOPIC, TICK, tick_to_json(tick, self._header.platforms), time_ns)
         self._add_lines(tick, time_ns)
-        if self._due(SCENE_TOPIC, tick.began_s, SCENE_EVERY_S):
-            scene = scene_of(tick, time_ns, self._header.config.separation_m)
-            if scene is not None:
-                self._add(SCENE_TOPIC, fg.SCENE_UPDATE, scene, time_ns)
-        if self._due(FIELD_TOPIC, tick.began_s, FIELD_EVERY_S):
-            self._add(FIELD_TOPIC, fg.SCENE_UPDATE, field_of(self._header, tick.surroundings, time_ns), time_ns)
-        if self._due(FIX_TOPIC, tick.began_s, FIX_EVERY_S):
-            for name, fix in fixes_of(tick, self._header, time_ns).items():
-                self._add(FIX_TOPIC + name, fg.LOCATION_FIX, fix, time_ns)
+        try:
+            self._draw(tick, time_ns)
+        except Exception as error:  # a picture is no reason to lose the record
+            self._tell_undrawn(error)
 
     def add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
         """Write a line of the log, at the time of the last message when none is given."""
@@ -100,6 +98,26 @@ class McapFile:
             for kind, count in reading.faults.items():
                 self.add_line(fg.WARNING, reading.boat, f"refused: {kind} ({count})", time_ns)
 
+    def _draw(self, tick: Tick, time_ns: int) -> None:
+        if self._due(SCENE_TOPIC, tick.began_s, SCENE_EVERY_S):
+            scene = scene_of(tick, time_ns, self._header.config.separation_m)
+            if scene is not None:
+                self._add(SCENE_TOPIC, fg.SCENE_UPDATE, scene, time_ns)
+        if self._due(FIELD_TOPIC, tick.began_s, FIELD_EVERY_S):
+            self._add(FIELD_TOPIC, fg.SCENE_UPDATE, field_of(self._header, tick.surroundings, time_ns), time_ns)
+        if self._due(FIX_TOPIC, tick.began_s, FIX_EVERY_S):
+            for name, fix in fixes_of(tick, self._header, time_ns).items():
+                self._add(FIX_TOPIC + name, fg.LOCATION_FIX, fix, time_ns)
+
+    def _tell_undrawn(self, error: Exception) -> None:
+        """Once, since it may happen at every tick."""
+        if not self._undrawn:
+            LOG.warning("drawing in the log failed", exc_info=error)
+            self.add_line(
+                fg.WARNING, "black box", f"drawing failed ({type(error).__name__}: {error}); the ticks are whole"
+            )
+        self._undrawn = True
+
     def _due(self, topic: str, now_s: float, every_s: float) -> bool:
         """Whether it is time for a topic again; times are kept in step so that ticks a little early count."""
         due = now_s >= self._due_s[topic] - 0.01
@@ -112,7 +130,7 @@ class McapFile:
         if channel is None:
             channel = self._open(topic, schema)
         self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
-        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=_KEPT).encode()
+        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=plain).encode()
         self._counts[topic] += 1
         self._writer.add_message(channel, self._last_ns, data, self._last_ns, self._counts[topic])
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform as machine
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-
-from ...jit import _tree_stamp
 
 PACKAGES = ("steerclear", "numpy", "numba", "llvmlite", "qpsolvers", "daqp", "osqp", "quadprog", "pymavlink", "mcap")
 """Distributions whose versions a log notes."""
@@ -25,9 +24,14 @@ def versions() -> dict[str, str]:
     return found
 
 
+@cache
 def source_digest() -> str:
-    """Digest of all sources decisions depend on."""
-    return _tree_stamp()[0]
+    """Digest of the shield's sources, the same wherever they are installed."""
+    folder = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
 
 
 @cache

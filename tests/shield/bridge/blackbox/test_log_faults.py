@@ -1,0 +1,276 @@
+"""Drills of the black box: killed, disk full, disk slow, disk stuck. Nothing waits, and every failure has a text."""
+
+import dataclasses
+import errno
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from logged_runs import Encounter, header_of, write_log
+from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, TlogWriter, mcap_file
+from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.exceptions import BridgeError
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def ticks():
+    return list(Encounter(header_of(), 40))
+
+
+def numbered(ticks, number):
+    return Tick(**(vars(ticks[number % len(ticks)]) | {"number": number, "began_s": 1000.25 + 0.1 * number}))
+
+
+def until(condition, timeout_s=20.0):
+    """Wait for something that another thread does."""
+    last = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < last, "it did not happen in time"
+        time.sleep(0.01)
+
+
+def kept(path):
+    with LogReader(path) as log:
+        return [tick.number for tick in log.ticks()], log.complete
+
+
+class FullDisk(Disk):
+    """Takes so many bytes, then there is no more space."""
+
+    room = 30_000
+
+    def put(self, data):
+        if self.size + len(data) > self.room:
+            if self.size < self.room:
+                return super().put(data[: self.room - self.size])
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().put(data)
+
+
+class StuckDisk(Disk):
+    """Takes nothing more once it is told to, until it is let go."""
+
+    def __init__(self, path):
+        super().__init__(path)
+        self.free = threading.Event()
+        self.free.set()
+
+    def put(self, data):
+        self.free.wait(30.0)
+        return super().put(data)
+
+
+def opened(kind, found):
+    """An opener that leaves the disk it made in ``found``."""
+
+    def open_disk(path):
+        found.append(kind(path))
+        return found[0]
+
+    return open_disk
+
+
+def take_until_it_fails(writer, ticks, limit=20_000):
+    """Take ticks until the writer says no; returns the error and the longest take, s."""
+    longest_s = 0.0
+    for number in range(limit):
+        began = time.perf_counter()
+        try:
+            writer.take(numbered(ticks, number))
+        except BridgeError as error:
+            return error, max(longest_s, time.perf_counter() - began)
+        longest_s = max(longest_s, time.perf_counter() - began)
+        time.sleep(0.001)
+    pytest.fail("the full disk was never noticed")
+    return None, 0.0
+
+
+def test_killed_in_the_middle_at_most_a_second_is_lost(tmp_path):
+    write_log(tmp_path / "source.mcap", 40)
+    path = tmp_path / "run.mcap"
+    command = [sys.executable, str(HERE / "killed_writer.py"), str(tmp_path / "source.mcap"), str(path), "20"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        lines = [process.stdout.readline() for _ in range(50)]
+        process.send_signal(signal.SIGKILL)
+        lines += process.stdout.readlines()
+    assert process.returncode == -signal.SIGKILL
+    taken = [(int(line.split()[0]), float(line.split()[1])) for line in lines if line.endswith("\n") and line.strip()]
+    found, complete = kept(path)
+    assert found == list(range(len(found)))
+    assert not complete
+    lost_s = taken[-1][1] - dict(taken)[found[-1]]
+    assert lost_s <= 1.0
+
+
+def test_a_log_being_written_can_be_read(tmp_path, ticks):
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.05)
+    for number in range(10):
+        writer.take(numbered(ticks, number))
+    until(lambda: len(kept(tmp_path / "run.mcap")[0]) == 10)
+    assert not kept(tmp_path / "run.mcap")[1]
+    writer.close()
+    assert kept(tmp_path / "run.mcap") == (list(range(10)), True)
+
+
+def test_a_full_disk_is_said_at_once_in_words_and_what_was_written_is_read(tmp_path, ticks):
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.05, open_disk=FullDisk)
+    error, longest_s = take_until_it_fails(writer, ticks)
+    assert str(error) == (
+        "the log run.mcap cannot be written: the disk is full; free space on it or set log_dir to another disk. What "
+        "was written before can be read"
+    )
+    assert longest_s < 5.0  # the loop never hangs on it
+    with pytest.raises(BridgeError, match="the disk is full"):
+        writer.take(ticks[0])
+    writer.close()
+    assert "the disk is full" in writer.fault
+    found, complete = kept(tmp_path / "run.mcap")
+    assert found == list(range(len(found)))
+    assert len(found) > 20
+    assert not complete
+    assert not any(thread.name == "log run.mcap" for thread in threading.enumerate())
+
+
+def test_a_limit_of_the_system_on_file_sizes_is_said(tmp_path, ticks):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.05)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, before[1]))
+    try:
+        error, _ = take_until_it_fails(writer, ticks)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "the file may not grow any further; raise the limit" in str(error)
+    writer.close()
+    assert len(kept(tmp_path / "run.mcap")[0]) > 20
+
+
+def test_a_disk_too_full_for_the_header_is_said_before_anything_starts(tmp_path):
+    class NoRoom(FullDisk):
+        room = 10
+
+    with pytest.raises(BridgeError, match=r"cannot begin the log .*run\.mcap: the disk is full"):
+        McapWriter(tmp_path / "run.mcap", header_of(), open_disk=NoRoom)
+
+
+def test_a_disk_that_fills_up_while_closing_is_said(tmp_path, ticks):
+    found = []
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=30.0, open_disk=opened(FullDisk, found))
+    writer.take(ticks[0])
+    found[0].room = found[0].size
+    writer.close()
+    assert "the disk is full" in writer.fault
+
+
+def test_a_slow_disk_delays_no_tick_and_what_is_dropped_is_counted(tmp_path, ticks):
+    found = []
+    writer = McapWriter(
+        tmp_path / "run.mcap", header_of(), flush_s=0.02, capacity=20, open_disk=opened(StuckDisk, found)
+    )
+    found[0].free.clear()  # nothing is written until all was taken: whoever waits for the disk waits for ever
+    for number in range(300):
+        writer.take(numbered(ticks, number))
+    assert writer.waiting == 20
+    dropped = writer.dropped
+    assert 200 < dropped <= 280
+    found[0].free.set()
+    until(lambda: writer.waiting == 0)
+    writer.take(numbered(ticks, 300))
+    writer.close()
+    with LogReader(tmp_path / "run.mcap") as log:
+        entries = list(log.entries())
+    numbers = [entry.number for entry in entries if isinstance(entry, Tick)]
+    assert len(numbers) == 301 - dropped
+    assert numbers == sorted(numbers)
+    told = [entry.text for entry in entries if not isinstance(entry, Tick) and entry.name == "black box"]
+    assert told == [f"the disk is too slow: {dropped} ticks before this are missing, {dropped} in all"]
+
+
+def test_a_stuck_disk_is_said_and_forgiven_when_it_goes_on(tmp_path, ticks):
+    found = []
+    writer = McapWriter(
+        tmp_path / "run.mcap", header_of(), flush_s=0.02, give_up_s=0.3, open_disk=opened(StuckDisk, found)
+    )
+    found[0].free.clear()
+    error, longest_s = take_until_it_fails(writer, ticks)
+    assert "the disk has taken nothing for" in str(error)
+    assert longest_s < 5.0
+    found[0].free.set()
+    until(lambda: writer.waiting == 0)
+    writer.take(numbered(ticks, 5000))
+    writer.close()
+    numbers, complete = kept(tmp_path / "run.mcap")
+    assert numbers[-1] == 5000
+    assert complete
+    assert writer.dropped == 0
+
+
+def test_closing_does_not_wait_for_ever(tmp_path, ticks):
+    found = []
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
+    found[0].free.clear()
+    writer.take(ticks[0])
+    writer._spool.close(timeout_s=0.2)
+    assert "could not be completed within 0.2 s" in writer.fault
+    found[0].free.set()
+    until(lambda: not any(thread.name == "log run.mcap" for thread in threading.enumerate()))
+
+
+def test_a_tick_that_cannot_be_written_is_said(tmp_path, ticks):
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02)
+    writer.take(Tick(**(vars(ticks[0]) | {"number": object()})))
+    until(lambda: writer.fault)
+    with pytest.raises(BridgeError, match=r"cannot be written \(TypeError: .*report this"):
+        writer.take(ticks[0])
+    writer.close()
+
+
+def test_a_fleet_nobody_can_draw_is_recorded(tmp_path, ticks):
+    state = ticks[0].fleet.state.copy()
+    state[0, :4], state[1, 0] = np.nan, np.inf
+    fleet = dataclasses.replace(ticks[0].fleet, state=state)
+    writer = McapWriter(tmp_path / "run.mcap", header_of())
+    writer.take(dataclasses.replace(ticks[0], fleet=fleet, decisions=None))
+    writer.close()
+    assert writer.fault == ""
+    with LogReader(tmp_path / "run.mcap") as log:
+        entries = list(log.entries())
+    assert [entry.fleet.state.tobytes() for entry in entries if isinstance(entry, Tick)] == [state.tobytes()]
+    assert len(entries) == 1
+
+
+def test_a_drawing_that_breaks_does_not_stop_the_record(tmp_path, ticks, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(mcap_file, "scene_of", broken)
+    writer = McapWriter(tmp_path / "run.mcap", header_of())
+    for number in range(5):
+        writer.take(numbered(ticks, number))
+    writer.close()
+    assert writer.fault == ""
+    with LogReader(tmp_path / "run.mcap") as log:
+        entries = list(log.entries())
+    assert [entry.number for entry in entries if isinstance(entry, Tick)] == list(range(5))
+    told = [entry.text for entry in entries if not isinstance(entry, Tick)]
+    assert told == ["drawing failed (ZeroDivisionError: ); the ticks are whole"]
+
+
+def test_a_tlog_on_a_full_disk_raises_nothing_and_says_so(tmp_path):
+    class NoRoom(FullDisk):
+        room = 10
+
+    writer = TlogWriter(tmp_path / "run.tlog", flush_s=0.02, open_disk=NoRoom)
+    packet = bytes([0xFD, 2, 0, 0, 0, 1, 1, 0, 0, 0, 5, 5, 0, 0])
+    writer.on_bytes("in", packet, 1)
+    until(lambda: writer.fault)
+    writer.on_bytes("in", packet, 1)
+    assert "the disk is full" in writer.fault
+    writer.close()
