@@ -15,6 +15,7 @@ from .commands.evaluate import evaluate
 from .commands.parity import parity
 from .commands.play import play
 from .commands.reach import app as reach_app
+from .commands.referee import referee
 from .commands.render import render
 from .commands.replay import replay
 from .commands.sim_boats import sim_boats
@@ -28,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, replay, docs):
+for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, replay, referee, docs):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
 app.add_typer(reach_app, name="reach")

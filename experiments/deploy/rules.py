@@ -102,7 +102,7 @@ class Umpire:
         note = ""
         if not self.began:
             if waiting or np.isnan(seen).any():
-                return self._state(f"waiting for {', '.join(waiting) or 'boats that are lost'}")
+                return self.state(f"waiting for {', '.join(waiting) or 'boats that are lost'}")
             self.core.start_seen(seen[np.newaxis])
             self.began = True
             self.events = ("the game begins",)
@@ -113,7 +113,7 @@ class Umpire:
             lost = [name for name, row in zip(self.names, seen, strict=True) if np.isnan(row[0])]
             note = f"lost, so out of bounds: {', '.join(lost)}" if lost else ""
         self._at_s = now_s
-        return self._state(note)
+        return self.state(note)
 
     def _seen(self, contact: Contact | None, now_s: float) -> tuple[float, float, float, float]:
         """X m, y m, heading deg, speed m/s of a boat now; NaN when it is lost."""
@@ -124,7 +124,8 @@ class Umpire:
         y_m = contact.position_m[1] + ahead_m * math.cos(contact.heading_rad)
         return x_m, y_m, math.degrees(contact.heading_rad), contact.speed_mps
 
-    def _state(self, note: str) -> GameState:
+    def state(self, note: str = "") -> GameState:
+        """How the game stands, as of the last look."""
         if self.began:
             self.core.commands(np.zeros((1, len(self.names), 2)))  # tells which boats the game drives
         return state_of(self.core, self.names, note)
