@@ -37,6 +37,7 @@ class BoatClock:
         self._middle_s = math.nan
         self._trip_s = math.inf
         self._synced_s = -math.inf
+        self._answers_alike: bool | None = None
 
     def hear(self, boot_s: float, received_s: float) -> float | None:
         """A message said this time since boot; when that was on our clock, s, or None when it is not believed yet."""
@@ -56,11 +57,14 @@ class BoatClock:
     def sync(self, boat_s: float, sent_s: float, received_s: float) -> None:
         """The boat answered a TIMESYNC with its clock."""
         trip = received_s - sent_s
-        if not (0.0 <= trip < 10.0 and math.isfinite(boat_s)):
+        if not (self.starts and 0.0 <= trip < 10.0 and math.isfinite(boat_s)):
             return
         middle = 0.5 * (sent_s + received_s) - boat_s
-        if self.starts and abs(middle - self._quickest_s) > _SAME_CLOCK_S:
+        if self._answers_alike is None:
+            self._answers_alike = abs(middle - self._quickest_s) <= _SAME_CLOCK_S
+        if self._answers_alike is False:
             return  # answered from another clock than the one the telemetry is stamped with
+        self._check_lost(sent_s - boat_s, received_s - boat_s, received_s)
         worn = self._trip_s + 2.0 * DRIFT * max(0.0, received_s - self._synced_s)
         if not trip > worn:
             self._middle_s, self._trip_s, self._synced_s = middle, trip, received_s
@@ -76,6 +80,16 @@ class BoatClock:
         """What the quickest message took, s; 0 while no round trip is known."""
         return self._quickest_s - self.offset_s if self.starts else 0.0
 
+    def _check_lost(self, least_s: float, most_s: float, received_s: float) -> None:
+        """An answer cannot come before its question: if it seems to, the boat's clock has lost time since."""
+        lost_s = least_s - (self._quickest_s + DRIFT * max(0.0, received_s - self._heard_s))
+        if lost_s <= 0.0:
+            return
+        if lost_s > AHEAD_S:
+            self._forget()
+        self._quickest_s, self._heard_s = most_s, received_s
+        self._middle_s, self._trip_s = math.nan, math.inf
+
     def _is_odd(self, boot_s: float, difference: float) -> bool:
         return difference < self._quickest_s - AHEAD_S or boot_s < self._latest_boot_s - BEHIND_S
 
@@ -88,5 +102,5 @@ class BoatClock:
     def _forget(self) -> None:
         self.starts += 1
         self._quickest_s, self._latest_boot_s = math.inf, -math.inf
-        self._middle_s, self._trip_s = math.nan, math.inf
+        self._middle_s, self._trip_s, self._answers_alike = math.nan, math.inf, None
         self.round_trip_s = math.nan
