@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .attack.keys import ATTACK as _ATTACK
+from .deploy.replay_keys import REPLAY as _REPLAY
 from .boats_keys import SIM_BOATS as _SIM_BOATS
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
 
@@ -213,6 +214,8 @@ SIM_BOATS = {**_PROVENANCE, **_SIM_BOATS, **{f"breaches[].{name}": words for nam
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
+REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for name, words in BREACH.items()}}
+
 KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
@@ -223,6 +226,7 @@ KEYS = {
     "attack": ATTACK,
     "reach compare": SETS,
     "render": RENDER,
+    "replay": REPLAY,
     "sim-boats": SIM_BOATS,
 }
 

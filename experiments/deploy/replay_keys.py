@@ -16,7 +16,7 @@ REPLAY = {
     "different": "of those, not the same, with everything before them known: 0 is the proof",
     "unproven": "of those, not the same, but after missing ticks, so that the shield's memory is not known",
     "missing[][]": "numbers of the ticks before and after each stretch of missing ones",
-    "first_difference": "null, or:",
+    "first_difference": "null where there is none",
     "first_difference.tick": "number of the tick",
     "first_difference.time_s": "since the log began, s",
     "first_difference.boat": "whose decision",
