@@ -75,7 +75,7 @@ class Gate:
         """Whether the boat can have come from there, whatever it did on the way."""
         seconds = abs(fix.fixed_s - before.fixed_s)
         x, y = before.after(fix.fixed_s)
-        return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M + 2.0 * self._fastest * min(seconds, 60.0)
+        return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M + 2.0 * self._fastest * min(seconds, BELIEVED_AFTER_S)
 
     def _doubt(self, fix: Fix, last: Fix) -> str:
         if self._doubted is None or not self._near(self._doubted, fix):

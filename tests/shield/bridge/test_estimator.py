@@ -1,0 +1,184 @@
+"""Own boats followed by their model: bit for bit while telemetry agrees, corrected where it does not."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.shield.bridge.estimator import Estimator
+from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.platforms import fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+
+DT_S = 0.1
+
+
+def reading(row, now_s, age_s=0.0, **changed):
+    values = {
+        "position_m": (float(row[L.X]), float(row[L.Y])),
+        "position_age_s": age_s,
+        "heading_rad": math.radians(row[L.HEADING]) % (2 * math.pi),
+        "heading_age_s": age_s,
+        "speed_mps": float(row[L.SPEED]),
+        "velocity_age_s": age_s,
+    }
+    return BoatReading("blue_1", now_s, **{**values, **changed})
+
+
+def sail(platform, commands, delay_steps=0, noise=None, heading_deg=90.0, wind_mps=0.0):
+    """Simulated boat and its estimate, step by step; commands (speed, absolute heading deg)."""
+    params, row = get_platform(platform).pack(), fresh_state(3.0, 4.0, heading_deg, 0.0)
+    estimator = Estimator(get_platform(platform), DT_S, delay_steps * DT_S)
+    queue = [None] * delay_steps
+    random = np.random.default_rng(0)
+    pairs = []
+    for k, (speed, heading) in enumerate(commands):
+        now = 50.0 + k * DT_S
+        seen = row.copy()
+        if noise is not None:
+            seen[[L.X, L.Y, L.HEADING, L.SPEED]] += random.normal(size=4) * noise
+        estimator.advance(now)
+        estimator.correct(reading(seen, now))
+        estimate = estimator.estimate(now)
+        pairs.append((row.copy(), estimate.row))
+        estimator.sent(now, math.radians(heading), speed)
+        queue.append((speed, float(np.degrees(math.radians(heading)))))
+        command = queue.pop(0)
+        if command is not None:
+            error = (command[1] - row[L.HEADING] + 180.0) % 360.0 - 180.0
+            step_boat(params, row, command[0], error, DT_S)
+        row[L.X] += wind_mps * DT_S
+    return pairs
+
+
+COMMANDS = st.lists(st.tuples(st.floats(0.0, 2.0), st.integers(-180, 180)), min_size=2, max_size=5)
+
+
+@settings(deadline=None, max_examples=15, derandomize=True)
+@given(COMMANDS, st.integers(0, 3), st.sampled_from(["heron", "surveyor"]))
+def test_a_boat_that_obeys_its_model_is_the_simulators_bit_for_bit(commands, delay, platform):
+    held = [command for command in commands for _ in range(12)]
+    for truth, believed in sail(platform, held, delay):
+        if delay and not truth[L.SPEED]:
+            continue  # before its first command works
+        np.testing.assert_array_equal(believed, truth)
+
+
+def test_the_wrong_delay_is_seen_as_a_difference():
+    """The test above can fail: a model that is a step late is not the boat."""
+    params, row = get_platform("heron").pack(), fresh_state(0.0, 0.0, 0.0, 1.0)
+    estimator = Estimator(get_platform("heron"), DT_S, 0.1)
+    estimator.correct(reading(row, 0.0))
+    for k in range(10):
+        estimator.sent(k * DT_S, math.radians(90.0), 2.0)
+        step_boat(params, row, 2.0, 90.0 - row[L.HEADING], DT_S)
+        estimator.advance((k + 1) * DT_S)
+    assert abs(estimator.estimate(1.0).row[L.HEADING] - row[L.HEADING]) > 2.0
+
+
+def test_noise_is_smoothed_and_memory_stays_the_boats():
+    noise = np.array([0.06, 0.06, 1.0, 0.04])
+    commands = [(2.0, 90.0)] * 60 + [(2.0, 30.0)] * 60 + [(1.0, -60.0)] * 60
+    pairs = sail("heron", commands, 1, noise)[20:]
+    error = np.array([believed - truth for truth, believed in pairs])
+    error[:, L.HEADING] = (error[:, L.HEADING] + 180.0) % 360.0 - 180.0
+    spread = np.sqrt((error[:, [L.X, L.Y, L.HEADING, L.SPEED]] ** 2).mean(axis=0))
+    assert (spread < 0.9 * noise).all()
+    thrust = np.abs([believed[L.THRUST] - truth[L.THRUST] for truth, believed in pairs])
+    assert np.median(thrust) < 5.0
+
+
+def test_a_current_moves_the_estimate_along():
+    pairs = sail("heron", [(2.0, 0.0)] * 100, 0, heading_deg=0.0, wind_mps=0.5)
+    truth, believed = pairs[-1]
+    assert abs(truth[L.X] - believed[L.X]) < 0.1
+    assert truth[L.X] > 4.9
+
+
+def test_without_telemetry_it_is_dead_reckoning_with_a_growing_age():
+    platform = get_platform("heron")
+    params, row = platform.pack(), fresh_state(0.0, 0.0, 0.0, 2.0)
+    row[L.THRUST] = 100.0
+    estimator = Estimator(platform, DT_S, 0.0)
+    estimator.correct(reading(row, 0.0))
+    for k in range(20):
+        estimator.sent(k * DT_S, 0.0, 2.0)
+        step_boat(params, row, 2.0, 0.0, DT_S)
+        estimator.advance((k + 1) * DT_S)
+    estimate = estimator.estimate(2.0)
+    assert estimate.age_s == pytest.approx(2.0)
+    assert np.hypot(*(estimate.row[:2] - row[:2])) < 0.05
+
+
+def test_a_boat_told_to_stop_that_may_not_have_heard_it_may_be_in_either_place():
+    platform = get_platform("heron")
+    row = fresh_state(0.0, 0.0, 0.0, 2.0)
+    estimator = Estimator(platform, DT_S, 0.0)
+    for k in range(5):
+        estimator.advance(k * DT_S)
+        estimator.correct(reading(row, k * DT_S))
+        estimator.sent(k * DT_S, 0.0, 2.0)
+        row[L.Y] += 0.2
+    for k in range(5, 60):
+        estimator.advance(k * DT_S)
+        estimator.sent(k * DT_S, 0.0, 0.0)
+    estimate = estimator.estimate(6.0)
+    assert 1.0 < estimate.spread_m < 4.0
+
+
+def test_late_telemetry_corrects_the_moment_it_was_true():
+    """Late and exact is as good as fresh and exact: the model is not pulled back to where the boat was."""
+    platform = get_platform("heron")
+    params, row = platform.pack(), fresh_state(0.0, 0.0, 0.0, 0.0)
+    estimator, past = Estimator(platform, DT_S, 0.0), []
+    for k in range(80):
+        now = k * DT_S
+        past.append(row.copy())
+        estimator.advance(now)
+        late = min(k, 5)
+        estimator.correct(reading(past[-1 - late], now, late * DT_S))
+        heading = 90.0 if k > 30 else 0.0
+        estimator.sent(now, math.radians(heading), 2.0)
+        if k > 10:
+            assert np.hypot(*(estimator.estimate(now).row[:2] - row[:2])) < 0.05
+        step_boat(params, row, 2.0, (heading - row[L.HEADING] + 180.0) % 360.0 - 180.0, DT_S)
+
+
+def test_the_same_fix_again_is_not_taken_twice():
+    estimator = Estimator(get_platform("heron"), DT_S, 0.0)
+    row = fresh_state(0.0, 0.0, 0.0, 0.0)
+    estimator.correct(reading(row, 0.0))
+    moved = fresh_state(0.4, 0.0, 0.0, 0.0)
+    estimator.advance(DT_S)
+    for _ in range(5):
+        estimator.correct(reading(moved, DT_S))
+    assert estimator.estimate(DT_S).row[L.X] == pytest.approx(0.2)
+
+
+def test_a_surprise_starts_afresh_where_the_boat_is():
+    estimator = Estimator(get_platform("heron"), DT_S, 0.0)
+    estimator.correct(reading(fresh_state(0.0, 0.0, 0.0, 0.0), 0.0))
+    estimator.advance(DT_S)
+    estimator.correct(reading(fresh_state(2.5, 0.0, 70.0, 1.0), DT_S))
+    row = estimator.estimate(DT_S).row
+    assert row[[L.X, L.SPEED]] == pytest.approx([2.5, 1.0])
+    assert row[L.THRUST] == pytest.approx(40.0)
+    assert math.isnan(row[L.HEADING_ERROR])
+
+
+def test_nothing_is_known_before_the_first_fix():
+    estimator = Estimator(get_platform("heron"), DT_S, 0.0)
+    estimator.advance(1.0)
+    estimator.sent(1.0, math.nan, 0.0)
+    assert estimator.estimate(1.0) is None
+    assert not estimator.known
+
+
+def test_a_standstill_of_the_loop_is_made_up_in_bounds():
+    estimator = Estimator(get_platform("heron"), DT_S, 0.0)
+    estimator.correct(reading(fresh_state(0.0, 0.0, 0.0, 2.0), 0.0))
+    estimator.sent(0.0, 0.0, 2.0)
+    estimator.advance(1e6)
+    assert np.isfinite(estimator.estimate(1e6).row[:4]).all()
+    assert estimator.estimate(1e6).row[L.Y] < 2.0 * 5.1

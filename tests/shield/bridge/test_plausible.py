@@ -1,0 +1,61 @@
+"""Fixes that cannot be true are refused; a boat that really is elsewhere is believed in the end."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.shield.bridge.plausible import BELIEVED_AFTER_S, Fix, Gate
+
+
+def test_a_boat_that_goes_its_way_is_let_through():
+    gate = Gate(2.0)
+    assert [gate.refuse(Fix(0.2 * k, 0.0, math.pi / 2, 2.0, 0.1 * k)) for k in range(50)] == [""] * 50
+
+
+@pytest.mark.parametrize("field", range(5))
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_refused(field, value):
+    values = [0.0, 0.0, 0.0, 0.0, 0.0]
+    values[field] = value
+    assert Gate(2.0).refuse(Fix(*values)) == "a value is not finite"
+
+
+@pytest.mark.parametrize(
+    ("fix", "word"), [(Fix(2e5, 0.0, 0.0, 0.0, 0.0), "nowhere"), (Fix(0.0, 0.0, 0.0, 9.0, 0.0), "beyond the boat")]
+)
+def test_impossible_values_are_refused(fix, word):
+    assert word in Gate(2.0).refuse(fix)
+
+
+def test_a_jump_is_refused_and_the_way_back_is_not():
+    gate = Gate(2.0)
+    gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))
+    assert gate.refuse(Fix(30.0, 0.0, 0.0, 0.0, 0.1)) == "position jumped 30 m"
+    assert gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.2)) == ""
+
+
+def test_a_place_told_long_enough_is_believed():
+    gate = Gate(2.0)
+    gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))
+    said = [gate.refuse(Fix(30.0, 0.0, 0.0, 0.0, 0.1 * k)) for k in range(1, 40)]
+    first = said.index("")
+    assert 0.1 * first == pytest.approx(BELIEVED_AFTER_S, abs=0.11)
+    assert said[first:] == [""] * (39 - first)
+
+
+def test_jumps_all_over_the_place_are_never_believed():
+    gate = Gate(2.0)
+    gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))
+    said = [gate.refuse(Fix(30.0 + 40.0 * (k % 2), 0.0, 0.0, 0.0, 0.1 * k)) for k in range(1, 80)]
+    assert all(said)
+
+
+@settings(max_examples=100, derandomize=True)
+@given(st.floats(-2.0, 2.0), st.floats(-math.pi, math.pi), st.floats(0.05, 1.9), st.floats(-0.5, 0.5))
+def test_whatever_a_boat_can_do_between_two_fixes_passes(speed, heading, seconds, noise):
+    gate = Gate(2.0)
+    gate.refuse(Fix(0.0, 0.0, 0.0, 2.0, 0.0))
+    way = speed * seconds
+    fix = Fix(way * math.sin(heading) + noise, way * math.cos(heading), heading, speed, seconds)
+    assert gate.refuse(fix) == ""
