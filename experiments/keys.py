@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .attack.keys import ATTACK as _ATTACK
-from .deploy.replay_keys import REPLAY as _REPLAY
 from .boats_keys import SIM_BOATS as _SIM_BOATS
+from .deploy.replay_keys import REPLAY as _REPLAY
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
 
 BREACH = {

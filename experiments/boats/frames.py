@@ -20,10 +20,10 @@ def _target_offsets() -> dict[int, int]:
         if "target_system" not in kind.ordered_fieldnames:
             continue
         offset = 0
-        for name, length in zip(kind.ordered_fieldnames, kind.lengths, strict=True):
+        for name, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
             if name == "target_system":
                 break
-            offset += sizes[kind.fieldtypes[kind.fieldnames.index(name)]] * length
+            offset += sizes[kind.fieldtypes[kind.fieldnames.index(name)]] * max(1, length)
         offsets[number] = offset
     return offsets
 

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .hull import STEP_S
+
 HEARTBEAT_S = 1.0
+_PHASE_S = STEP_S
+"""A stream begins at a multiple of this, so that it tells each new state of the hull as soon as there is one."""
 
 GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: (),
@@ -68,7 +74,7 @@ class Streams:
         """Messages to send now; one that fell behind is sent once."""
         due = []
         for message, interval in self._interval_s.items():
-            at = self._next_s.get(message, now_s)
+            at = self._next_s.setdefault(message, math.ceil(now_s / _PHASE_S - 1e-6) * _PHASE_S)
             if at <= now_s + 1e-9:
                 due.append(message)
                 self._next_s[message] = at + interval if at + interval > now_s else now_s + interval
