@@ -1,0 +1,122 @@
+"""What the operator's keys do: STOP ALL, resume, end, and the menu of overrides."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.operator import DISABLES, Operator
+from steerclear.shield.exceptions import ConfigError
+
+STOP_KEYS = (" ", "s", "S")
+BY = "keyboard"
+REPEAT_S = 0.8
+"""Presses of the stop key closer together than this are one: a key held down must not stop boats past the shield."""
+DURATIONS_S = (10.0, 30.0, 60.0, 300.0)
+DIGITS = "123456789abcdefgh"
+
+
+class Controls:
+    """Turns keys into calls of the operator. A stop key is obeyed whatever menu is open.
+
+    Args:
+        fleet: the file.
+        operator: gets what keys ask for.
+        clock: the loop's.
+        time_s: tells repeated presses apart, s.
+    """
+
+    def __init__(
+        self, fleet: FleetFile, operator: Operator, clock: Clock, time_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._operator, self._clock, self._time_s = operator, clock, time_s
+        self._names = fleet.names
+        self._lock = threading.Lock()
+        self._stopped_s = float("-inf")
+        self._open = ""
+        self._condition = self._subject = ""
+        self._said = ""
+
+    def press(self, key: str) -> None:
+        """Act on a key; keys that mean nothing are ignored."""
+        with self._lock:
+            if key in STOP_KEYS:
+                self._open = ""
+                self._stop()
+            elif self._open:
+                self._choose(key)
+            else:
+                self._command(key)
+
+    def menu(self) -> list[str]:
+        """Lines of the open menu; empty: none is open."""
+        with self._lock:
+            if not self._open:
+                return []
+            titles = {
+                "resume": "Take STOP ALL back? y: boats move again",
+                "condition": "Switch off which response, for a time? It is logged. ESC leaves",
+                "subject": f"{self._condition}: for which boat?",
+                "duration": f"{self._condition} of {self._subject or 'all'}: for how long? It disables "
+                f"{DISABLES.get(self._condition, '')}",
+            }
+            return [titles[self._open], *self._entries(), *([self._said] if self._said else [])]
+
+    def _stop(self) -> None:
+        now_s = self._time_s()
+        held = now_s - self._stopped_s < REPEAT_S
+        self._stopped_s = now_s
+        if not (held and self._operator.stopped):
+            self._operator.stop_all(BY)
+
+    def _command(self, key: str) -> None:
+        if key in ("q", "Q"):
+            self._operator.end(BY)
+        elif key in ("r", "R") and self._operator.stopped:
+            self._open = "resume"
+        elif key in ("o", "O"):
+            self._open, self._said = "condition", ""
+
+    def _choose(self, key: str) -> None:
+        if self._open == "resume":
+            self._open = ""
+            if key in ("y", "Y"):
+                self._operator.resume(BY)
+            return
+        options = self._options()
+        if key not in DIGITS[: len(options)]:
+            self._open = ""
+            return
+        chosen = options[DIGITS.index(key)]
+        if self._open == "condition":
+            self._condition, self._open = chosen, "subject"
+        elif self._open == "subject":
+            self._subject, self._open = "" if chosen == "all" else chosen, "duration"
+        else:
+            self._override(float(chosen))
+
+    def _override(self, seconds: float) -> None:
+        self._open = ""
+        try:
+            self._operator.override(self._condition, self._subject, seconds, self._clock.now_s(), BY)
+        except ConfigError as error:
+            self._open, self._said = "condition", str(error)
+
+    def _options(self) -> Sequence[str]:
+        if self._open == "condition":
+            return tuple(DISABLES)
+        if self._open == "subject":
+            return ("all", *self._names)[: len(DIGITS)]
+        return tuple(f"{seconds:g}" for seconds in DURATIONS_S)
+
+    def _entries(self) -> list[str]:
+        if self._open == "resume":
+            return []
+        options = self._options()
+        if self._open == "condition":
+            return [f" {key} {name}: disables {DISABLES[name]}" for key, name in zip(DIGITS, options, strict=False)]
+        unit = " s" if self._open == "duration" else ""
+        return ["   ".join(f"{key} {name}{unit}" for key, name in zip(DIGITS, options, strict=False))]

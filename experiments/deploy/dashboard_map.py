@@ -1,0 +1,135 @@
+"""The dashboard's map: field, flags, geofence, boats with their radii and headings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from rich.console import Console, ConsoleOptions
+from rich.text import Text
+from steerclear.env.field import FieldGeometry, field_geometry
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.exceptions import ConfigError, GameError
+
+from .braille import Canvas
+from .rules import game_config
+
+COLOURS = ("bright_blue", "bright_red", "bright_white")
+"""Of blue, red and boats outside the game."""
+AHEAD_S = 2.0
+"""The line before a boat is the way it makes in this time, s."""
+MARGIN_M = 4.0
+FAR_M = 60.0
+"""Boats further than this from the field are not fitted in."""
+
+
+class FieldMap:
+    """Draws ticks. Build one per run.
+
+    Args:
+        fleet: the file.
+    """
+
+    def __init__(self, fleet: FleetFile) -> None:
+        self._fleet = fleet
+        width, height = fleet.field.size_m
+        self._field = (0.0, 0.0, float(width), float(height))
+        self._lines = _geometry(fleet)
+        self._separation_m = fleet.shield_config.separation_m
+
+    def draw(self, tick: Tick | None, columns: int, rows: int) -> list[Text]:
+        """The map as lines of text, for a tick or for none yet."""
+        places = {} if tick is None else places_of(tick)
+        canvas = Canvas(columns, rows, self._window(places))
+        canvas.box(self._fleet.geofence.box, "grey50", every=3)
+        canvas.box(self._field, "white")
+        game = {} if tick is None else tick.game
+        if self._lines is not None:
+            self._draw_lines(canvas, self._lines, game)
+        errors = {} if tick is None else _errors(tick)
+        for name, (x, y, heading, speed) in places.items():
+            self._draw_boat(canvas, name, (x, y), heading, speed, errors.get(name, 0.0))
+        for name, (x, y, _, _) in places.items():
+            canvas.label((x, y), _short(name), f"bold {self._colour(name)}", above=1)
+        return canvas.lines()
+
+    def _draw_lines(self, canvas: Canvas, lines: FieldGeometry, game: Mapping[str, object]) -> None:
+        canvas.line(tuple(lines.scrimmage[0]), tuple(lines.scrimmage[1]), "grey50", every=2)
+        flags = game.get("flags")
+        for team, home in enumerate(lines.flag_home):
+            place = (float(home[0]), float(home[1]))
+            if isinstance(flags, (list, tuple)) and len(flags) == 2:
+                place = (float(flags[team]["x_m"]), float(flags[team]["y_m"]))
+            canvas.label(place, "⚑", COLOURS[team])
+
+    def _draw_boat(
+        self, canvas: Canvas, name: str, place: tuple[float, float], heading: float, speed: float, error_m: float
+    ) -> None:
+        colour = self._colour(name)
+        ahead = self._separation_m * 0.6 + abs(speed) * AHEAD_S
+        canvas.line(place, (place[0] + ahead * math.sin(heading), place[1] + ahead * math.cos(heading)), colour)
+        canvas.circle(place, 0.5, colour)
+        if self._fleet.team_of.get(name) == self._fleet.team_number:
+            canvas.circle(place, self._separation_m, colour)
+        if error_m > 0.5:
+            canvas.circle(place, error_m, "yellow")
+
+    def _window(self, places: Mapping[str, tuple[float, float, float, float]]) -> tuple[float, float, float, float]:
+        near = np.array(
+            [(x, y) for x, y, _, _ in places.values() if self._is_near(x, y)] + [self._field[:2], self._field[2:]]
+        )
+        low, high = near.min(axis=0) - MARGIN_M, near.max(axis=0) + MARGIN_M
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    def _is_near(self, x: float, y: float) -> bool:
+        return -FAR_M <= x <= self._field[2] + FAR_M and -FAR_M <= y <= self._field[3] + FAR_M
+
+    def _colour(self, name: str) -> str:
+        return COLOURS[self._fleet.team_of.get(name, 2)]
+
+
+class Drawing:
+    """A map as large as the place it is put in.
+
+    Args:
+        field_map: draws it.
+        tick: what to draw.
+    """
+
+    def __init__(self, field_map: FieldMap, tick: Tick | None) -> None:
+        self._map, self._tick = field_map, tick
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        lines = self._map.draw(self._tick, options.max_width, options.height or 16)
+        yield Text("\n").join(lines)
+
+
+def places_of(tick: Tick) -> dict[str, tuple[float, float, float, float]]:
+    """Where boats are: x m, y m, heading rad, speed m/s by name; as the shield was given it, else as heard."""
+    places = {contact.boat: (*contact.position_m, contact.heading_rad, contact.speed_mps) for contact in tick.contacts}
+    for name, reading in tick.readings.items():
+        places[name] = (*reading.position_m, reading.heading_rad, reading.speed_mps)
+    if tick.fleet is not None:
+        rows = zip(tick.fleet.names, tick.fleet.position_m, tick.fleet.heading_rad, tick.fleet.speed_mps, strict=True)
+        for name, position, heading, speed in rows:
+            places[name] = (float(position[0]), float(position[1]), float(heading), float(speed))
+    return {name: row for name, row in places.items() if all(map(math.isfinite, row))}
+
+
+def _errors(tick: Tick) -> dict[str, float]:
+    if tick.fleet is None or tick.fleet.position_error_m is None:
+        return {}
+    return dict(zip(tick.fleet.names, map(float, tick.fleet.position_error_m), strict=True))
+
+
+def _geometry(fleet: FleetFile) -> FieldGeometry | None:
+    try:
+        return field_geometry(game_config(fleet))
+    except (ConfigError, GameError):  # boats without a game have a field without lines
+        return None
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 8 else f"{name[:7]}…"

@@ -1,0 +1,251 @@
+"""What the dashboard shows of one moment; draws nothing by itself."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.layout import Layout
+from rich.table import Table
+from rich.text import Text
+from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.decision import Decision, Reason
+
+from .approach import Approach, approaches
+from .dashboard_map import COLOURS, Drawing, FieldMap
+
+WIDE = 150
+"""From this many columns on the table stands beside the map."""
+MOST_ACTIONS = 6
+SILENT_S = 1.0
+"""A loop without a tick for so long is shown as standing still."""
+KEYS = "SPACE or s STOP ALL   r resume   o overrides   q end"
+WHY = {
+    Reason.PASSED: ("passed", "green"),
+    Reason.QP: ("QP", "cyan"),
+    Reason.QP_RELAXED: ("QP slack", "yellow"),
+    Reason.ESCAPE: ("escape", "yellow"),
+    Reason.BEST_EFFORT: ("best eff.", "bold red"),
+    Reason.HELD: ("held", "magenta"),
+    Reason.NOT_COVERED: ("-", "dim"),
+}
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is to be shown.
+
+    Attributes:
+        tick: the latest; None: none yet.
+        now_s: on the loop's clock, s.
+        stopped: why all boats are told to stop; empty: they are not.
+        hard: whether past the shield.
+        ended: why the run ends; empty: it goes on.
+        late_s: mean and worst delay of ticks of late, s.
+        menu: lines of an open menu.
+        log: latest lines of the log.
+    """
+
+    tick: Tick | None
+    now_s: float
+    stopped: str = ""
+    hard: bool = False
+    ended: str = ""
+    late_s: tuple[float, float] = (0.0, 0.0)
+    menu: Sequence[str] = ()
+    log: Sequence[str] = ()
+
+
+class View:
+    """Shows moments of one run.
+
+    Args:
+        fleet: the file.
+    """
+
+    def __init__(self, fleet: FleetFile) -> None:
+        self._fleet = fleet
+        self._map = FieldMap(fleet)
+
+    def of(self, moment: Moment, columns: int, rows: int) -> RenderableType:
+        """The whole screen, so many characters large."""
+        lower = _lower(moment, columns)
+        height = len(lower) + 1
+        table_rows = len(self._fleet.boats) + 1
+        screen, body = Layout(), Layout(name="body")
+        boats = Layout(self._boats(moment), name="boats")
+        drawing = Layout(Drawing(self._map, moment.tick), name="map", minimum_size=4)
+        if columns >= WIDE:
+            boats.size = 82
+            body.split_row(drawing, boats)
+        else:
+            boats.size = min(table_rows, max(4, rows - height - 8))
+            body.split_column(drawing, boats)
+        screen.split_column(
+            Layout(self._head(moment), size=2),
+            body,
+            Layout(Group(*lower, Text(KEYS, "reverse")), size=min(height, max(3, rows // 2))),
+        )
+        return screen
+
+    def _head(self, moment: Moment) -> RenderableType:
+        tick = moment.tick
+        line = Text(f"steerclear, {self._fleet.team}", no_wrap=True, overflow="ellipsis")
+        if tick is not None:
+            line.append(f"   tick {tick.number}")
+            line.append(f"   {_score(tick.game)}")
+            line.append(f"   policy {_age(tick.policy_age_s)}")
+            line.append(f"   late {1e3 * moment.late_s[0]:.1f} ms, at most {1e3 * moment.late_s[1]:.1f}")
+        return Group(line, self._banner(moment))
+
+    def _banner(self, moment: Moment) -> Text:
+        if moment.stopped:
+            how = "by their links, past the shield" if moment.hard else "through the shield (again: past the shield)"
+            return _bar(f" STOP ALL by {moment.stopped}: boats are told to stop {how}; r resumes", "bold white on red")
+        if moment.ended:
+            return _bar(f" The run ends ({moment.ended}): boats are left stopped", "bold black on yellow")
+        if moment.tick is None:
+            return _bar(" Nothing yet", "black on yellow")
+        silent_s = moment.now_s - moment.tick.began_s
+        if silent_s > SILENT_S:
+            return _bar(f" The loop stands still: no tick for {silent_s:.1f} s", "bold white on red")
+        count = len(moment.tick.actions)
+        if moment.tick.fleet is None:
+            return _bar(" No boat's state is known: boats are told to stop", "bold white on red")
+        if count:
+            return _bar(f" {count} response{'s' if count > 1 else ''} in effect, see below", "black on yellow")
+        return _bar(" All within limits", "black on green")
+
+    def _boats(self, moment: Moment) -> Table:
+        table = Table(box=None, padding=(0, 1, 0, 0), expand=True, header_style="bold")
+        for title, width in (("boat", 10), ("hdg", 4), ("m/s", 5), ("age", 5), ("wanted", 8), ("sent", 8)):
+            table.add_column(title, width=width, no_wrap=True, justify="left" if title == "boat" else "right")
+        table.add_column("why", width=9, no_wrap=True)
+        table.add_column("margin", width=6, no_wrap=True, justify="right")
+        table.add_column("closest", no_wrap=True, overflow="ellipsis")
+        tick = moment.tick
+        if tick is None:
+            return table
+        contacts = {contact.boat: contact for contact in tick.contacts}
+        decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
+        near = {} if tick.fleet is None else approaches(tick.fleet)
+        for boat in self._fleet.boats:
+            name = self._name(boat.name, tick.game)
+            reading = tick.readings.get(boat.name)
+            if reading is not None:
+                table.add_row(name, *_own(reading, decisions.get(boat.name), tick, self._near(near.get(boat.name))))
+            else:
+                table.add_row(name, *_other(contacts.get(boat.name), moment.now_s, self._limit_s()))
+        return table
+
+    def _name(self, name: str, game: Mapping[str, Any]) -> Text:
+        status = (game.get("boats") or {}).get(name) or {}
+        marks = "".join(mark for mark, key in (("⚑", "has_flag"), ("T", "tagged"), ("O", "oob")) if status.get(key))
+        text = Text(name, COLOURS[self._fleet.team_of.get(name, 2)])
+        return text.append(f" {marks}", "bold yellow") if marks else text
+
+    def _near(self, approach: Approach | None) -> Text:
+        if approach is None:
+            return Text("")
+        limit = self._fleet.shield_config.separation_m
+        style = "bold red" if approach.distance_m < limit else "yellow" if approach.closest_m < limit else ""
+        when = f" in {approach.in_s:.0f} s" if approach.in_s > 0.5 else " now"
+        return Text(f"{approach.other} {approach.closest_m:.1f} m{when}", style)
+
+    def _limit_s(self) -> float:
+        return self._fleet.limits.contact.max_age_s
+
+
+def _lower(moment: Moment, columns: int) -> list[Text]:
+    """The open menu, or what is in effect and the end of the log; long lines are broken."""
+    if moment.menu:
+        return [line for text in moment.menu for line in _broken(text, "bold", columns)]
+    actions = () if moment.tick is None else moment.tick.actions
+    lines = [
+        line
+        for action in actions[:MOST_ACTIONS]
+        for line in _broken(f"{action.subject}: {action.text}", "yellow", columns)
+    ]
+    if len(actions) > MOST_ACTIONS:
+        lines.append(Text(f"and {len(actions) - MOST_ACTIONS} more", "yellow"))
+    return lines + [Text(line, "dim", no_wrap=True, overflow="ellipsis") for line in moment.log]
+
+
+def _broken(text: str, style: str, columns: int) -> list[Text]:
+    pieces = textwrap.wrap(text, max(20, columns), subsequent_indent="   ") or [""]
+    return [Text(piece, style, no_wrap=True, overflow="crop") for piece in pieces]
+
+
+def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> tuple[Any, ...]:
+    sent = tick.sent.get(reading.boat)
+    age = _age(reading.age_s)
+    seen = (_heading(reading.heading_rad), _speed(reading.speed_mps), age)
+    sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
+    if sent is not None and not sent.delivered:
+        sent_text = Text("not sent", "bold red")
+    if not reading.ready:
+        return (*seen, "-", sent_text, Text(reading.mode or "not ready", "bold red"), "-", Text(reading.why_not, "red"))
+    if decision is None:
+        return (*seen, "-", sent_text, Text("undecided", "red"), "-", near)
+    if decision.intervened:
+        sent_text.stylize("bold cyan")
+    wanted = _command(decision.wanted_speed_mps, decision.wanted_heading_rad)
+    margin = Text("free" if decision.certificate_m == math.inf else f"{decision.certificate_m:.1f}")
+    if decision.certificate_m < 0.0:
+        margin.stylize("bold red")
+    return (*seen, wanted, sent_text, Text(*WHY[decision.reason]), margin, near)
+
+
+def _other(contact: Contact | None, now_s: float, limit_s: float) -> tuple[Any, ...]:
+    if contact is None:
+        return ("-", "-", Text("never", "red"), "", "", Text("not heard", "red"), "", "")
+    age_s = now_s - contact.fixed_s
+    age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
+    seen = (_heading(contact.heading_rad), _speed(contact.speed_mps), age)
+    return (
+        *seen,
+        "",
+        "",
+        Text("contact", "dim"),
+        "",
+        Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim"),
+    )
+
+
+def _score(game: Mapping[str, Any]) -> str:
+    if not game:
+        return "no referee"
+    blue, red = game.get("captures") or (0, 0)
+    text = f"{float(game.get('time_s') or 0.0):.0f} s, blue {blue} : {red} red"
+    if game.get("over"):
+        text += ", over"
+    return f"{text} ({game['note']})" if game.get("note") else text
+
+
+def _bar(text: str, style: str) -> Text:
+    return Text(text.ljust(500), style, no_wrap=True, overflow="crop")
+
+
+def _age(age_s: float) -> str:
+    if not math.isfinite(age_s):
+        return "never"
+    return f"{age_s:.2f}" if age_s < 10.0 else f"{min(age_s, 9999.0):.0f} s"
+
+
+def _heading(heading_rad: float) -> str:
+    return f"{round(math.degrees(heading_rad)) % 360:03d}°" if math.isfinite(heading_rad) else "-"
+
+
+def _speed(speed_mps: float) -> str:
+    return f"{speed_mps:.2f}" if math.isfinite(speed_mps) else "-"
+
+
+def _command(speed_mps: float, heading_rad: float) -> str:
+    return f"{speed_mps:.1f} {_heading(heading_rad)}" if math.isfinite(speed_mps) else "none"
