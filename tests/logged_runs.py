@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 NAMES = ("blue_1", "blue_2", "red_1", "red_2")
 FIELD = Surroundings(field=(-5.0, -5.0, 85.0, 45.0))
 STARTS = ((10.0, 20.0, 90.0), (40.0, 35.0, 180.0), (70.0, 20.0, -90.0), (40.0, 5.0, 0.0))
-"""Everybody heads for the middle: x m, y m, heading deg."""
+"""Everybody faces the middle, and another boat beyond it: x m, y m, heading deg."""
 START_S = 1000.25
 UNIX_NS = 1_790_000_000_000_000_000
 
@@ -72,7 +72,7 @@ class Encounter:
         steps: ticks to make.
         shielded: whether boats obey the shield, else what was wanted.
         game: state of the game put into each tick.
-        aims: (n, 2) point each boat wants to go to, m; at one of them every boat turns round.
+        aims: (n, 2) point each boat wants to go to, m, and then back; None: where the boat that faces it starts.
         edit: called with each tick; returns what is logged instead.
     """
 
@@ -83,7 +83,7 @@ class Encounter:
         self.state[:, :3] = STARTS
         self.state[:, [L.SPEED, L.THRUST]] = 1.0, 40.0
         self.state[:, [L.SPEED_ERROR, L.HEADING_ERROR]] = np.nan
-        self.aims = np.full((4, 2), (40.0, 20.0)) if aims is None else np.array(aims, dtype=float)
+        self.aims = np.array(STARTS)[[2, 3, 0, 1], :2] if aims is None else np.array(aims, dtype=float)
         self.edit = edit or (lambda tick: tick)
 
     def __iter__(self):
@@ -100,11 +100,11 @@ class Encounter:
     def tick(self, number):
         """One turn of the loop."""
         now_s = START_S + number * self.header.config.dt_s
-        fleet = Fleet(
-            self.state.copy(), np.array([0, 0, 1, 1]), ("heron",) * 4, np.array([True, True, False, False]), NAMES
-        )
-        wanted = self.wanted()
-        decisions = self.shield.decide(fleet, wanted)
+        fleet, fixed, reset = self.fleet(number), self.fixed(number), self.resets(number)
+        wanted = self.wanted(number, fleet)
+        if reset:
+            self.shield.reset()
+        decisions = self.shield.decide(fleet, wanted, fixed)
         sent = {
             name: Sent(name, now_s + 0.002, *decisions.sent.absolute(i, fleet.heading_rad[i])[::-1], "attitude", True)
             for i, name in enumerate(NAMES[:2])
@@ -118,16 +118,29 @@ class Encounter:
             contacts=tuple(contact_of(name, self.state[i], now_s) for i, name in enumerate(NAMES) if i >= 2),
             fleet=fleet,
             wanted=wanted,
-            surroundings=None,
+            surroundings=fixed,
             decisions=decisions,
-            shield_reset=number == 0,
+            shield_reset=reset,
             sent=sent,
             policy_age_s=0.1,
             actions=(Action("red_1", "contact", "slow", "red_1 is late"),) if 20 <= number < 40 else (),
             game=self.game,
         )
 
-    def wanted(self):
+    def fleet(self, number):
+        """What is seen."""
+        ours = np.array([True, True, False, False])
+        return Fleet(self.state.copy(), np.array([0, 0, 1, 1]), ("heron",) * 4, ours, NAMES)
+
+    def fixed(self, number):
+        """Fixed things handed over with the decision."""
+        return None
+
+    def resets(self, number):
+        """Whether the shield is reset before the decision."""
+        return number == 0
+
+    def wanted(self, number, fleet):
         """Everybody at full speed towards its aim; having come near, on to where it came from."""
         gap = self.aims - self.state[:, :2]
         near = np.hypot(*gap.T) < 3.0
@@ -136,10 +149,10 @@ class Encounter:
         return Commands.absolute_rad(np.stack([np.full(4, 2.0), course], axis=1))
 
 
-def write_log(path, steps=300, header=None, **more):
+def write_log(path, steps=300, header=None, kind=Encounter, **more):
     """Write the log of an encounter; returns its header and ticks."""
     header = header or header_of()
-    ticks = list(Encounter(header, steps, **more))
+    ticks = list(kind(header, steps, **more))
     writer = McapWriter(path, header, capacity=steps + 10)
     for tick in ticks:
         writer.take(tick)
