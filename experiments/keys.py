@@ -12,6 +12,7 @@ from typing import Any
 
 from .attack.keys import ATTACK as _ATTACK
 from .boats_keys import SIM_BOATS as _SIM_BOATS
+from .deploy.referee_keys import REFEREE as _REFEREE
 from .deploy.replay_keys import REPLAY as _REPLAY
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
 
@@ -214,6 +215,8 @@ SIM_BOATS = {**_PROVENANCE, **_SIM_BOATS, **{f"breaches[].{name}": words for nam
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
+REFEREE = {**_PROVENANCE, **_REFEREE}
+
 REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for name, words in BREACH.items()}}
 
 KEYS = {
@@ -228,6 +231,7 @@ KEYS = {
     "render": RENDER,
     "replay": REPLAY,
     "sim-boats": SIM_BOATS,
+    "referee": REFEREE,
 }
 
 

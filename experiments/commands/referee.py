@@ -17,6 +17,7 @@ from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import ConfigError
 
 from ..deploy.referee import RATE_HZ, Referee
+from ..provenance import machine, versions
 from ..store import write_json
 from . import options as o
 from .console import Interrupted, command, err, out
@@ -67,7 +68,9 @@ def referee(
         faults = {} if kept.hearing.feed is None else kept.hearing.feed.faults()
     out().print(_table(state))
     if json_file is not None:
-        content = {"command": "referee", "wall_s": time.perf_counter() - started, "ended": why, "faults": faults}
+        settings = {"listen": listen, "publish": publish or [], "links": links, "rate": rate, "speed": speed}
+        content = {"command": "referee", "settings": settings, "versions": versions(), "machine": machine()}
+        content |= {"wall_s": time.perf_counter() - started, "ended": why, "faults": faults}
         write_json(json_file, {**content, "game": state.as_dict(), "events": events})
     if why == "stopped":
         raise Interrupted("interrupted; boats are where they are, and their runners miss the referee")

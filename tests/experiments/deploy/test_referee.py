@@ -16,6 +16,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.referee import Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
+from steerclear.experiments.keys import KEYS, undocumented
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
@@ -250,6 +251,7 @@ def test_the_command_keeps_a_game(fleet_file, tmp_path):
     assert result.exit_code == 0, result.output
     assert "the game begins" in result.output
     content = json.loads((tmp_path / "game.json").read_text())
+    assert undocumented(content, KEYS["referee"]) == []
     assert content["ended"] == "over"
     assert content["game"]["over"]
     assert content["events"][0]["text"] == "the game begins"
