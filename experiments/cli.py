@@ -9,11 +9,13 @@ import typer
 from .commands.ablate import ablate
 from .commands.attack import attack
 from .commands.bench import bench
+from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.evaluate import evaluate
 from .commands.parity import parity
 from .commands.play import play
+from .commands.preflight import preflight
 from .commands.reach import app as reach_app
 from .commands.referee import referee
 from .commands.render import render
@@ -29,7 +31,21 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (play, evaluate, ablate, encounters, attack, parity, bench, render, replay, referee, docs):
+for function in (
+    play,
+    evaluate,
+    ablate,
+    encounters,
+    attack,
+    parity,
+    bench,
+    render,
+    deploy,
+    preflight,
+    replay,
+    referee,
+    docs,
+):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
 app.add_typer(reach_app, name="reach")

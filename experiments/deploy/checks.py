@@ -1,30 +1,47 @@
-"""The checks before a start, gathered: the links', the situation's, the log's."""
+"""The checks before a start, gathered: the log's, the links', the situation's, the drill's."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
 from steerclear.shield.bridge.blackbox import check_disk
+from steerclear.shield.bridge.loop import Loop, Parts
+from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.preflight.drill import Drill
+from steerclear.shield.bridge.preflight.link_checks import link_checks
+from steerclear.shield.bridge.preflight.response import drill_checks
 from steerclear.shield.bridge.preflight.result import Check
 from steerclear.shield.bridge.roster import Roster
-from steerclear.shield.bridge.situation import situation_checks
+from steerclear.shield.bridge.situation import SITUATION, check_situation
+from steerclear.shield.bridge.tick import TickSink
 
+from .preflight_file import check_drill
 from .station import Station
 
 LOOK_S = 1.5
 """How long boats are looked at before their situation is judged, s."""
 
 
-def look(station: Station, seconds: float = LOOK_S) -> Roster:
-    """Watch all boats for a while; what is known of them then."""
-    fleet, clock = station.fleet, station.clock
-    roster = Roster(fleet, station.links)
-    end = clock.now_s() + seconds
-    while True:
-        now = clock.now_s()
-        readings = {name: link.read() for name, link in station.links.items()}
-        roster.update(now, readings, station.contacts())
-        if now >= end:
-            return roster
-        clock.sleep_until(now + fleet.dt_s)
+class _Look:
+    """What is known of all boats after watching them for a while, when first asked for."""
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+
+    @cached_property
+    def roster(self) -> Roster:
+        station = self._station
+        fleet, clock = station.fleet, station.clock
+        roster = Roster(fleet, station.links)
+        due = clock.now_s()
+        for _ in range(math.ceil(LOOK_S / fleet.dt_s)):
+            due += fleet.dt_s
+            clock.sleep_until(due)
+            readings = {name: link.read() for name, link in station.links.items()}
+            roster.update(clock.now_s(), readings, station.contacts())
+        return roster
 
 
 def checks_of(station: Station, minutes: float) -> list[Check]:
@@ -34,7 +51,34 @@ def checks_of(station: Station, minutes: float) -> list[Check]:
         station: connected.
         minutes: how long the run may take.
     """
-    fleet = station.fleet
-    roster = look(station)
+    fleet, look = station.fleet, _Look(station)
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
-    return [disk, *situation_checks(fleet, roster)]
+    links = link_checks(station.links, fleet.platform_of, station.clock)
+    situation = [Check(name, lambda name=name: check_situation(name, fleet, look.roster)) for name in SITUATION]
+    return [disk, *links, *situation]
+
+
+def drilled_check(station: Station, text: str, boat: str | None) -> Check:
+    """The check that these boats were drilled lately."""
+    return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links)))
+
+
+def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] = ()) -> list[Check]:
+    """Drive one boat after the other a short way, all of them behind the shield; the checks of what was seen.
+
+    Args:
+        station: prepared.
+        operator: whose STOP ALL counts.
+        sinks: get every tick.
+    """
+    fleet = station.fleet
+    drill = Drill(fleet, tuple(station.links))
+    parts = Parts(
+        links=station.links,
+        policy=drill,
+        ears=station.ears,
+        contacts=() if station.feed is None else (station.feed,),
+        sinks=(drill, *sinks),
+    )
+    Loop(fleet, parts, operator, station.clock).run(drill.seconds + 2.0 * fleet.dt_s)
+    return drill_checks(drill, dict(fleet.platform_of), fleet.dt_s)

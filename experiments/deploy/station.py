@@ -104,7 +104,7 @@ class Station:
             with ThreadPoolExecutor(len(links)) as pool:
                 texts = list(pool.map(_leave, [link for name, link in links.items() if name not in ears]))
             for link in ears.values():
-                link.endpoint.detach(link.system_id)
+                link.release()
             self.left = tuple(texts)
         for endpoint in self._endpoints.values():
             endpoint.close()

@@ -40,6 +40,17 @@ class FleetFile(FleetSettings):
         """Settings of the shield: the file's, with step and coordination from the file's own keys."""
         return shield_config(self)
 
+    def with_shield(self, **settings: Any) -> FleetFile:
+        """This file with some settings of the shield replaced, such as a measured delay.
+
+        Raises:
+            FleetFileError: a setting is unknown or out of range.
+        """
+        changed = self.model_copy(update={"shield": {**self.shield, **settings}})
+        vars(changed).pop("shield_config", None)  # the copy comes with what was worked out for this one
+        shield_config(changed)
+        return changed
+
     @cached_property
     def surroundings(self) -> Surroundings:
         """The geofence, as the shield keeps it."""

@@ -31,6 +31,7 @@ class Seen:
         rivals: own boats that somebody else commands too.
         policy_fault: what the policy's process says is wrong; empty: nothing.
         game_age_s: age of the state of the game, s; inf: none yet.
+        game_expected: whether there is to be a game at all.
         game_over: whether the game has ended.
         log_fault: why ticks can no longer be recorded; empty: they are.
         overrides: in force.
@@ -42,6 +43,7 @@ class Seen:
     rivals: Collection[str] = ()
     policy_fault: str = ""
     game_age_s: float = math.inf
+    game_expected: bool = False
     game_over: bool = False
     log_fault: str = ""
     overrides: tuple[Override, ...] = ()
@@ -151,12 +153,12 @@ def _judge_contact(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verd
 
 
 def _judge_game(fleet: FleetFile, roster: Roster, seen: Seen, verdict: Verdict) -> None:
-    """A game that never spoke is missed only where the file names a referee."""
+    """A game that never spoke is missed only where one is expected."""
     if seen.game_over:
         verdict.due(Action("game", "game", "hold_station", "the game is over"), roster.commanded)
         return
-    expected = fleet.feed is not None and fleet.feed.referee is not None
-    silent = seen.game_age_s > fleet.limits.game.max_age_s and (expected or math.isfinite(seen.game_age_s))
+    heard = seen.game_expected or math.isfinite(seen.game_age_s)
+    silent = heard and seen.game_age_s > fleet.limits.game.max_age_s
     if silent and not seen.overridden("game", ""):
         text = f"state of the game: {words(seen.game_age_s)}"
         verdict.due(Action("game", "game", fleet.limits.game.then, text), roster.commanded)

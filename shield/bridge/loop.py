@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -24,13 +24,19 @@ from .operator import Operator
 from .overruns import Overruns
 from .policy_watch import PolicyWatch
 from .roster import Roster
-from .tick import Tick, TickSink
+from .tick import Action, Tick, TickSink
 from .wanted import Snapshot, WantedSource
 
 LOG = logging.getLogger(__name__)
 
 TALK_EVERY_S = 5.0
 """The same failure is logged again after this long, s."""
+
+WIND_DOWN_S = 20.0
+"""Boats are given this long to come to rest at the end, s."""
+
+REST_MPS = 0.2
+"""A boat slower than this lies still, m/s."""
 
 SECOND_COMMANDER = "second_commander"
 """Key of `BoatReading.faults` under which a link counts commands of somebody else."""
@@ -99,15 +105,20 @@ class Loop:
         chosen = Shield(fleet.shield_config, fleet.surroundings) if shield is None else shield
         self._helm = Helm(fleet, chosen, parts.links, clock)
         self._watch = PolicyWatch(fleet, tuple(parts.links))
+        self._has_referee = fleet.feed is not None and fleet.feed.referee is not None
         self._mates = _mates(fleet, parts.links)
         self._number = 0
         self._log_fault = ""
         self._broken: set[int] = set()
         self._rivals_s: dict[str, float] = {}
         self._broke_s = -math.inf
+        self._ending = ""
 
     def run(self, seconds: float | None = None) -> str:
-        """Turn at the file's rate until the operator ends it or the time is over; boats are left told to stop.
+        """Turn at the file's rate until the operator ends it or the time is over, then bring boats to rest.
+
+        At the end boats are told to stop and go on behind the shield until they lie still: a boat that only stops may
+        drift into another.
 
         Args:
             seconds: how long, s on the loop's clock; None: until ended.
@@ -117,15 +128,27 @@ class Loop:
         """
         began = self.clock.now_s()
         last = math.inf if seconds is None else began + seconds
-        due = began
         try:
-            while not self.operator.ended and due < last:
-                self.clock.sleep_until(due)
-                self._turn_or_stop(due)
-                due = self.overruns.next_due(due, self.clock.now_s())
+            due = self._keep_on(began, lambda due: not self.operator.ended and due < last)
+            self._ending = self.operator.ended or f"ran for {self.clock.now_s() - began:.0f} s"
+            still = due + WIND_DOWN_S
+            self._keep_on(due, lambda now: now < still and not self._at_rest())
         finally:
             self._helm.stop_all(tuple(self.parts.links))
-        return self.operator.ended or f"ran for {self.clock.now_s() - began:.0f} s"
+        return self._ending
+
+    def _keep_on(self, due_s: float, goes_on: Callable[[float], bool]) -> float:
+        """Turn at the rate as long as ``goes_on(due time)``; when the next turn would be due."""
+        while goes_on(due_s):
+            self.clock.sleep_until(due_s)
+            self._turn_or_stop(due_s)
+            due_s = self.overruns.next_due(due_s, self.clock.now_s())
+        return due_s
+
+    def _at_rest(self) -> bool:
+        """Whether every own boat that is known and obeys lies still."""
+        readings = (link.read() for link in self.parts.links.values())
+        return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in readings)
 
     def _turn_or_stop(self, due_s: float) -> None:
         """A turn that breaks where none should leaves boats told to stop, and the next one is tried."""
@@ -176,7 +199,9 @@ class Loop:
         return tick
 
     def _steer(self, answer: Commands | None, verdict: Verdict) -> Steered:
-        if self.operator.stopped:
+        if self._ending:
+            verdict.actions.append(Action("all", "end", "stop", f"the run ends: {self._ending}"))
+        if self.operator.stopped or self._ending:
             verdict.responses.update(dict.fromkeys(self.parts.links, "stop"))
         if self.operator.hard:
             return Steered(sent=self._helm.stop_all(tuple(self.parts.links)))
@@ -197,6 +222,7 @@ class Loop:
             rivals={name for name, time_s in self._rivals_s.items() if now_s - time_s <= RIVAL_S},
             policy_fault=self._watch.fault,
             game_age_s=game_age_s,
+            game_expected=self.parts.game is not None and self._has_referee,
             game_over=game is not None and game.over,
             log_fault=self._log_fault,
             overrides=self.operator.active(now_s),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,20 +14,16 @@ from ..shield import Shield
 from .assemble import assemble, seen_now
 from .fleet_file import FleetFile
 from .freshness import words
-from .preflight.result import Check, CheckResult
+from .preflight.result import CheckResult
 from .roster import Roster
 
 NEAR_MARGIN_M = 1e5
 """Margins beyond this mean that nobody is near."""
 
 
-def situation_checks(fleet: FleetFile, roster: Roster) -> list[Check]:
-    """All of them, of a roster that has just been updated."""
-    return [
-        Check("known", lambda: check_known(fleet, roster)),
-        Check("geofence", lambda: check_geofence(fleet, roster)),
-        Check("certificate", lambda: check_certificate(fleet, roster)),
-    ]
+def check_situation(name: str, fleet: FleetFile, roster: Roster) -> CheckResult:
+    """One of `SITUATION`, of a roster that has just been updated."""
+    return SITUATION[name](fleet, roster)
 
 
 def check_known(fleet: FleetFile, roster: Roster) -> CheckResult:
@@ -83,9 +79,8 @@ def check_certificate(fleet: FleetFile, roster: Roster) -> CheckResult:
     figures = {"certificate_m": margin, "nearest_m": _nearest_m(given.state, worst)}
     name = given.names[worst]
     if not margin >= 0.0:
-        text = (
-            f"{name} has a margin of {margin:.2f} m beyond the separation; move it away from {_binding(answer, worst)}"
-        )
+        near = ", ".join(answer[worst].binding) or "the others"
+        text = f"{name} has a margin of {margin:.2f} m beyond the separation; move it away from {near}"
         return CheckResult("certificate", False, text, figures)
     text = "nobody near" if margin > NEAR_MARGIN_M else f"least margin {margin:.2f} m ({name})"
     return CheckResult("certificate", True, text, figures)
@@ -103,5 +98,9 @@ def _nearest_m(state: np.ndarray, i: int) -> float:
     return float(np.hypot(*(others - state[i, [L.X, L.Y]]).T).min()) if len(others) else math.inf
 
 
-def _binding(answer: Sequence[object], i: int) -> str:
-    return ", ".join(getattr(answer[i], "binding", ())) or "the others"
+SITUATION: Mapping[str, Callable[[FleetFile, Roster], CheckResult]] = {
+    "known": check_known,
+    "geofence": check_geofence,
+    "certificate": check_certificate,
+}
+"""The checks of the situation, by name."""

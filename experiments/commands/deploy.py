@@ -1,0 +1,133 @@
+"""``steerclear deploy``: a policy steers boats, every command through the shield."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.tick import TickSink
+from steerclear.shield.exceptions import ConfigError
+
+from ..deploy.dashboard import Dashboard
+from ..deploy.demo import Demo, demo_file
+from ..deploy.orders import Orders, Surface
+from ..deploy.plain import PlainLines, logging_aside
+from ..deploy.run import deploy as run_boats
+from ..store import write_json
+from . import deploying as d
+from . import options as o
+from .console import Interrupted, command, err, finish, out
+
+Fleet = Annotated[
+    Path | None, typer.Argument(metavar="FLEET.yaml", help="Boats, links, geofence, limits.", show_default=False)
+]
+Policy = Annotated[str, typer.Option(metavar="NAME", help="Policy of our boats: a name or a submission's path.")]
+Minutes = Annotated[float | None, typer.Option(metavar="MIN", help="How long.", show_default="until q or Ctrl-C")]
+DemoOption = Annotated[
+    bool, typer.Option("--demo", help="Simulate the boats and keep the game too; without FLEET.yaml: 3 against 3.")
+]
+Opponents = Annotated[str, typer.Option(metavar="NAME", help="With --demo: policy of the other team.")]
+Plain = Annotated[bool, typer.Option("--plain", help="Lines instead of the dashboard; no keys but Ctrl-C.")]
+
+DEMO_WAIT_S = 300.0
+"""Simulated boats may have to be compiled first."""
+
+
+@command
+def deploy(
+    fleet: Fleet = None,
+    policy: Policy = "medium",
+    boat: d.Boat = None,
+    minutes: Minutes = None,
+    accept: d.Accept = None,
+    demo: DemoOption = False,
+    opponents: Opponents = "medium",
+    speed: d.Speed = 1.0,
+    wait: d.Wait = 15.0,
+    seed: o.Seed = 0,
+    plain: Plain = False,
+    no_tlog: d.NoTlog = False,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Steer the boats of a FLEET.yaml by a policy, every command through the shield; boats are left stopped.
+
+    Exit status: 0 done, 1 checks do not allow the start, 2 bad input, 130 interrupted.
+    """
+    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
+    file = load_fleet(orders.fleet_file)
+    dashboard = d.on_terminal() and not plain
+    operator, console = Operator(), out()
+
+    def sinks(file: FleetFile, operator: Operator, clock: Clock) -> Sequence[TickSink]:
+        if dashboard:
+            return (Dashboard(file, operator, clock),)
+        return (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),)
+
+    with ExitStack() as stack:
+        stack.enter_context(logging_aside(d.text_log(file.log_dir), shown=not dashboard))
+        if demo:
+            stack.enter_context(Demo(orders.fleet_file, opponents, speed))
+            err().print("the demonstration's boats are starting; the first time all is compiled, which takes minutes")
+        outcome = run_boats(orders, Surface(lambda result: d.show_check(console, result), sinks), operator)
+    if outcome.figures:
+        console.print(_table(outcome.figures))
+    d.show_outcome(console, outcome)
+    if json_file is not None:
+        settings = {**asdict(orders), "fleet_file": str(orders.fleet_file)}
+        write_json(json_file, d.content_of("deploy", settings, outcome))
+    if outcome.ended.startswith("SIG"):
+        raise Interrupted("interrupted; boats were stopped as said above")
+    finish(not outcome.refused)
+
+
+def _orders(
+    fleet: Path | None,
+    policy: str,
+    boat: str | None,
+    minutes: float | None,
+    accept: Sequence[str],
+    demo: bool,
+    more: tuple[float, float, int, bool],
+) -> Orders:
+    speed, wait_s, seed, tlog = more
+    if fleet is None and not demo:
+        raise ConfigError("give a FLEET.yaml, or --demo for boats that come with the package")
+    if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
+        raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
+    return Orders(
+        fleet_file=demo_file() if fleet is None else fleet,
+        policy=policy,
+        boat=boat,
+        minutes=minutes,
+        accept=(*accept, *(("drill",) if demo else ())),
+        seed=seed,
+        tlog=tlog,
+        speed=speed,
+        connect_s=max(wait_s, DEMO_WAIT_S) if demo else wait_s,
+    )
+
+
+def _table(figures: dict[str, float]) -> Table:
+    table = Table(title="the run")
+    table.add_column("")
+    table.add_column("", justify="right")
+    rows = (
+        ("turns", f"{figures['ticks']:.0f}"),
+        ("commands changed by the shield", f"{100.0 * figures['changed_share']:.1f} %"),
+        ("closest approach of our boats, as believed", f"{figures['closest_m']:.2f} m"),
+        ("turns with a declared response", f"{figures['ticks_with_actions']:.0f}"),
+        ("turn began late, 999 of 1000 within", f"{1e3 * figures['jitter_p999_s']:.1f} ms"),
+        ("telemetry read to command sent, 99 of 100 within", f"{1e3 * figures['read_to_sent_p99_s']:.1f} ms"),
+        ("turns missed", f"{figures['missed_turns']:.0f}"),
+    )
+    for row in rows:
+        table.add_row(*row)
+    return table

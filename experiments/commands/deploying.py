@@ -1,0 +1,73 @@
+"""What ``steerclear deploy`` and ``steerclear preflight`` share: options, how checks and outcomes are shown."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from steerclear.shield.bridge.preflight.result import CheckResult
+
+from ..deploy.orders import Outcome
+
+Boat = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="The one boat this process commands (coordination: per_boat)."),
+]
+Accept = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="CHECK", help="Start although this check does not pass; it is logged. May be repeated: latency:blue_1."
+    ),
+]
+Speed = Annotated[
+    float, typer.Option(metavar="X", help="Times faster than real time, as sim-boats was started; never real boats.")
+]
+Wait = Annotated[float, typer.Option(metavar="S", help="How long boats are waited for.")]
+NoTlog = Annotated[bool, typer.Option("--no-tlog", help="Do not keep raw MAVLink packets beside the black box.")]
+
+
+def show_check(console: Console, result: CheckResult) -> None:
+    """One line per check."""
+    mark = "[green]ok  [/]" if result.passed else "[bold red]FAIL[/]"
+    console.print(mark, end=" ")
+    console.print(f"{result.name}: {result.text}", markup=False, soft_wrap=True)
+
+
+def show_outcome(console: Console, outcome: Outcome) -> None:
+    """What boats were left doing and where the logs are; why nothing was begun."""
+    for text in outcome.left:
+        console.print(text, markup=False, soft_wrap=True)
+    if outcome.refused:
+        names = " ".join(f"--accept {result.name}" for result in outcome.refused)
+        console.print(f"not started: {len(outcome.refused)} checks do not pass. Put them right, or go on with {names}",
+                      markup=False, soft_wrap=True)  # fmt: skip
+    if outcome.log is not None:
+        console.print(f"{outcome.log}", markup=False, soft_wrap=True)
+
+
+def content_of(command: str, settings: dict[str, Any], outcome: Outcome) -> dict[str, Any]:
+    """The outcome for a JSON file."""
+    return {
+        "command": command,
+        "settings": settings,
+        "ended": outcome.ended,
+        "refused": [result.name for result in outcome.refused],
+        "checks": [vars(result) | {"figures": dict(result.figures)} for result in outcome.checks],
+        "left": list(outcome.left),
+        "log": None if outcome.log is None else str(outcome.log),
+        "figures": outcome.figures,
+    }
+
+
+def on_terminal() -> bool:
+    """Whether a person sits before it: keys can be read and the screen be drawn."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def text_log(folder: Path) -> Path:
+    """Path of a new log of text."""
+    return folder / f"steerclear_{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log"

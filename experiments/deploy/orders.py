@@ -1,0 +1,134 @@
+"""What to run, what came of it, and the steps that `deploy` and `preflight` share."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
+from steerclear.shield.bridge.tick import TickSink
+from steerclear.shield.exceptions import FleetFileError
+
+from .preflight_file import measured_delay_s
+from .rules import game_config
+from .station import CONNECT_S
+
+LOG = logging.getLogger(__name__)
+
+LONGEST_MINUTES = 120.0
+"""Room for so long a log is asked for when no end is given."""
+
+Shown = Callable[[CheckResult], None]
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What to run.
+
+    Attributes:
+        fleet_file: path of the FLEET.yaml.
+        policy: name or path, as `steerclear.policies.make` takes it.
+        boat: name of this process's boat (coordination per_boat); None: all of the team.
+        minutes: how long; None: until ended.
+        accept: names of checks that may fail.
+        seed: of what the policy draws.
+        tlog: whether raw packets are kept as well.
+        speed: times faster than real time, for simulated boats that live so.
+        connect_s: how long boats are waited for, s.
+    """
+
+    fleet_file: Path
+    policy: str
+    boat: str | None = None
+    minutes: float | None = None
+    accept: tuple[str, ...] = ()
+    seed: int = 0
+    tlog: bool = True
+    speed: float = 1.0
+    connect_s: float = CONNECT_S
+
+
+@dataclass
+class Outcome:
+    """What came of it.
+
+    Attributes:
+        ended: why it ended.
+        refused: checks that forbade the start; nothing moved.
+        checks: results of all checks.
+        left: what each boat was left doing.
+        log: path of the black box; None when it never began.
+        figures: of the loop and its decisions.
+    """
+
+    ended: str = ""
+    refused: list[CheckResult] = field(default_factory=list)
+    checks: list[CheckResult] = field(default_factory=list)
+    left: tuple[str, ...] = ()
+    log: Path | None = None
+    figures: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Where a person sees and steers the run.
+
+    Attributes:
+        shown: called with each check's result.
+        sinks: makes further sinks, such as a dashboard, once the run begins.
+    """
+
+    shown: Shown = lambda result: None
+    sinks: Callable[[FleetFile, Operator, Clock], Sequence[TickSink]] = lambda fleet, operator, clock: ()
+
+
+def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
+    """The file, with the delay the last drill measured where it declares none, and its text.
+
+    Raises:
+        FleetFileError: it cannot be used, or there is nothing to command.
+    """
+    fleet = load_fleet(orders.fleet_file)
+    if fleet.agent_ids:
+        game_config(fleet)
+    if not fleet.commanded(orders.boat):
+        raise FleetFileError(f"{orders.fleet_file}: no boat of team {fleet.team} has a link; give one to command it")
+    if "delay_s" not in fleet.shield:
+        measured = measured_delay_s(fleet, orders.boat)
+        fleet = fleet.with_shield(delay_s=fleet.dt_s if measured is None else measured)
+        LOG.info(
+            "commands are taken to work after %.1f s (%s)",
+            fleet.shield_config.delay_s,
+            "not measured" if measured is None else "measured by the drill",
+        )
+    return fleet, orders.fleet_file.read_text(encoding="utf-8")
+
+
+def may_start(
+    checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome, later: Sequence[str] = ()
+) -> bool:
+    """Run checks; whether they allow to go on.
+
+    Args:
+        checks: to run.
+        accept: names that may fail.
+        surface: where results are shown.
+        outcome: gets results and refusals.
+        later: kinds of checks that come later and may be accepted too.
+
+    Raises:
+        ConfigError: a name to accept is no check's.
+    """
+    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in later)]
+    validate_accepted([name for name in accept if name.split(":")[0] not in later], known)
+    outcome.checks = run_checks(checks, surface.shown)
+    outcome.refused = not_passed(outcome.checks, accept)
+    for result in outcome.checks:
+        if not result.passed and result not in outcome.refused:
+            LOG.warning("accepted although not passed: %s: %s", result.name, result.text)
+    return not outcome.refused

@@ -1,0 +1,106 @@
+"""A line now and then about a run, where no dashboard is shown; and logs that never make the loop wait."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import logging.handlers
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from steerclear.shield.bridge.tick import Tick
+
+from .tally import closest_m
+
+MOST_LINES = 10_000
+"""Lines of the log that may wait to be written; more are dropped."""
+
+
+class PlainLines:
+    """A sink that says how it goes every few seconds, from a thread of its own.
+
+    Args:
+        say: takes a line.
+        every_s: s.
+    """
+
+    def __init__(self, say: Callable[[str], None], every_s: float = 5.0) -> None:
+        self._say, self._every_s = say, every_s
+        self._tick: Tick | None = None
+        self._began_s: float | None = None
+        self._told: tuple[str, ...] = ()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="plain lines", daemon=True)
+        self._thread.start()
+
+    def take(self, tick: Tick) -> None:
+        """Have this tick told next."""
+        if self._began_s is None:
+            self._began_s = tick.began_s
+        self._tick = tick
+
+    def close(self) -> None:
+        """Say the last and end."""
+        self._closing.set()
+        self._thread.join(2.0)
+
+    def _run(self) -> None:
+        while not self._closing.wait(self._every_s):
+            if self._tick is not None:
+                self._say(self._line(self._tick))
+                new = tuple(action.text for action in self._tick.actions)
+                for text in new:
+                    if text.split(",")[0] not in {told.split(",")[0] for told in self._told}:
+                        self._say(f"  {text}")
+                self._told = new
+
+    def _line(self, tick: Tick) -> str:
+        seconds = tick.began_s - (self._began_s or 0.0)
+        if tick.fleet is None or tick.decisions is None:
+            return f"{seconds:6.0f} s  no decision"
+        changed = f"{tick.decisions.count_intervened} of {int(tick.fleet.controlled.sum())}"
+        return (
+            f"{seconds:6.0f} s  closest {closest_m(tick.fleet):5.1f} m, {changed} commands changed, "
+            f"policy {1e3 * tick.policy_age_s:.0f} ms old"
+        )
+
+
+@contextlib.contextmanager
+def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
+    """Write the log to a file, and to standard error when ``shown``, from a thread of its own.
+
+    Whatever a disk or a terminal does, logging costs the loop no time.
+    """
+    handlers: list[logging.Handler] = []
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handlers.append(logging.FileHandler(path, encoding="utf-8"))
+    if shown:
+        handlers.append(logging.StreamHandler())
+    for handler in handlers:
+        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    root, line = logging.getLogger(), _Dropping(queue.Queue(MOST_LINES))
+    listener = logging.handlers.QueueListener(line.queue, *handlers)
+    before = root.level
+    root.addHandler(line)
+    root.setLevel(logging.INFO)
+    listener.start()
+    try:
+        yield
+    finally:
+        root.removeHandler(line)
+        root.setLevel(before)
+        listener.stop()
+        for handler in handlers:
+            handler.close()
+
+
+class _Dropping(logging.handlers.QueueHandler):
+    """Drops lines when too many wait."""
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Hand a line over, or drop it."""
+        with contextlib.suppress(queue.Full):
+            self.queue.put_nowait(record)

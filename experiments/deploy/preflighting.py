@@ -1,0 +1,59 @@
+"""`preflight`: all checks and a drill, boats left stopped, what was found kept for `deploy`."""
+
+from __future__ import annotations
+
+from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.preflight.result import not_passed, run_checks
+
+from .checks import checks_of, drive_drill
+from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
+from .preflight_file import DRILLED, keep
+from .quiet import ended_by_signals, undisturbed, warm_up
+from .station import Station
+
+
+def preflight(
+    orders: Orders, surface: Surface | None = None, operator: Operator | None = None, *, drill: bool = True
+) -> Outcome:
+    """Run all checks, and the drill when the others allow it; boats are left stopped. What was found is kept.
+
+    Args:
+        orders: of a run; its policy is not needed.
+        surface: where a person sees it.
+        operator: whose orders count.
+        drill: whether boats are moved.
+
+    Raises:
+        FleetFileError: the file cannot be used; nothing was opened.
+        BridgeError: a port is taken, a boat does not answer or refuses, or the result cannot be kept.
+    """
+    surface, operator = surface or Surface(), operator or Operator()
+    fleet, text = read_fleet(orders)
+    warm_up(fleet)
+    outcome = Outcome()
+    station = Station(fleet, orders.boat, MonotonicClock(orders.speed), tlog=orders.tlog)
+    try:
+        with station, ended_by_signals(operator):
+            station.connect(orders.connect_s)
+            checks = checks_of(station, LONGEST_MINUTES)
+            if may_start(checks, orders.accept, surface, outcome, later=DRILLED) and drill and not operator.ended:
+                station.prepare()
+                _drill(station, orders, surface, operator, outcome)
+    finally:
+        outcome.left = station.left
+    outcome.ended = operator.ended
+    outcome.log = keep(fleet, text, orders.boat, outcome.checks, [result.name for result in outcome.refused])
+    return outcome
+
+
+def _drill(station: Station, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome) -> None:
+    sinks = surface.sinks(station.fleet, operator, station.clock)
+    try:
+        with undisturbed():
+            checks = drive_drill(station, operator, sinks)
+    finally:
+        for sink in sinks:
+            sink.close()
+    outcome.checks += run_checks(checks, surface.shown)
+    outcome.refused = not_passed(outcome.checks, orders.accept)
