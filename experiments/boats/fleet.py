@@ -25,7 +25,7 @@ from .hub import PositionHub
 from .hull import STEP_S
 from .pace import Pace
 from .places import game_of
-from .ports import Ports
+from .ports import Ports, near
 from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
 from .signing import check_key
 from .truth import Approach, TruthRecord, record_of
@@ -38,7 +38,7 @@ _TICKS_PER_STEP = round(STEP_S / TICK_S)
 class SimFleet:
     """Simulated boats. A context manager: entering it starts the thread, leaving it gives everything back.
 
-    Their time begins with the start and is counted in s of ``clock``. Boats without a link are driven by their policy
+    Their time begins with the start and is counted in s of ``clock``. Boats with a policy are driven by it
     from the moment on at which all other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
 
     Args:
@@ -100,7 +100,7 @@ class SimFleet:
         config = game_of(boats, preset, rules or {})
         try:
             self.boats = build_boats(boats, config, setting, self._ports, seed, random_start)
-            self._hub = PositionHub(feed_to, self.frame, noise) if feed_to else None
+            self._hub = PositionHub([near(to, allow_remote) for to in feed_to], self.frame, noise) if feed_to else None
             self._world = build_world(self.boats, config, (water or Water(), setting), self._hub, seed, waits)
         except BaseException:
             self.close()
@@ -113,7 +113,7 @@ class SimFleet:
 
         Args:
             fleet: the file, read or to be read.
-            opponents: scripted policy of the boats of the game that have no link.
+            opponents: scripted policy of the boats of the game that the file's runner does not command.
             **settings: of `SimFleet`, beside or instead of what the file says.
 
         Raises:
@@ -240,7 +240,7 @@ class SimFleet:
         if self._pace.is_running:
             raise ConfigError("the fleet runs by itself; call advance only on one that was not started")
         for _ in range(round(seconds / TICK_S)):
-            self._receive()
+            self._receive(0.0)
             self._tick()
 
     def start(self) -> None:
@@ -278,9 +278,9 @@ class SimFleet:
             raise ConfigError(f"no simulated boat is named {name!r}; there are {', '.join(self.boats)}")
         return self.boats[name]
 
-    def _receive(self) -> None:
+    def _receive(self, since_tick_s: float) -> None:
         with self._lock:
-            self._ports.receive(self.time_s)
+            self._ports.receive(self.time_s + since_tick_s)
 
     def _tick(self) -> None:
         with self._lock:

@@ -7,10 +7,13 @@ from typing import Any
 
 from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.fleet_settings import BoatSettings
 from steerclear.shield.bridge.mavlink.signing import read_key
 
 from .hull import STEP_S
 from .settings import SimBoat
+
+_APART_M = 6.0
 
 
 def as_fleet(fleet: FleetFile | str | Path) -> FleetFile:
@@ -23,10 +26,14 @@ def as_fleet(fleet: FleetFile | str | Path) -> FleetFile:
 
 
 def boats_of(fleet: FleetFile, opponents: str) -> list[SimBoat]:
-    """The boats of a file; those of the game that have no link are driven by ``opponents``."""
+    """The boats of a file; those of the game that the file's runner does not command are driven by ``opponents``.
+
+    One of these that has a link tells where it is there, and obeys it as soon as it is commanded.
+    """
     boats = []
-    for boat in fleet.boats:
-        driven = boat.link is None and boat.agent is not None
+    commanded = {boat.name for boat in _commanded(fleet)}
+    for i, boat in enumerate(fleet.boats):
+        driven = boat.agent is not None and boat.name not in commanded
         boats.append(
             SimBoat(
                 name=boat.name,
@@ -35,9 +42,21 @@ def boats_of(fleet: FleetFile, opponents: str) -> list[SimBoat]:
                 system_id=0 if boat.link is None else boat.link.system_id,
                 address=None if boat.link is None else boat.link.address,
                 policy=opponents if driven else "",
+                start=None if boat.agent is not None else _beside(fleet, i),
             )
         )
     return boats
+
+
+def _commanded(fleet: FleetFile) -> list[BoatSettings]:
+    """Boats that a runner of the file commands, be it one process or one per boat."""
+    ours = [boat for boat in fleet.boats if boat.link is not None and boat.commanded]
+    return [boat for boat in ours if fleet.team_of[boat.name] == fleet.team_number]
+
+
+def _beside(fleet: FleetFile, number: int) -> tuple[float, float, float]:
+    """Place of a boat outside the game: along the geofence's lower edge."""
+    return fleet.geofence.xmin_m + 2.0 + _APART_M * number, fleet.geofence.ymin_m + 2.0, 90.0
 
 
 def settings_of(fleet: FleetFile) -> dict[str, Any]:

@@ -27,14 +27,14 @@ class Pace:
         clock: the clock.
         tick_s: s.
         tick: lives one tick.
-        receive: reads what came in.
+        receive: reads what came in; gets how far the clock is past the latest tick, s.
 
     Attributes:
         cpu_s: processor time of the thread, s.
         let_go_s: time that was not lived because the machine was too slow, s.
     """
 
-    def __init__(self, clock: Clock, tick_s: float, tick: Callable[[], None], receive: Callable[[], None]) -> None:
+    def __init__(self, clock: Clock, tick_s: float, tick: Callable[[], None], receive: Callable[[float], None]) -> None:
         self.clock = clock
         self.let_go_s = 0.0
         self.cpu_s = 0.0
@@ -85,7 +85,7 @@ class Pace:
                 logger.warning("simulated boats are %.1f s behind their clock and let the time go", lag)
                 due += lag
                 self.let_go_s += lag
-            self._receive()
+            self._receive(min(lag, _LONGEST_LAG_S) + self._tick_s)
             self._tick()
             due += self._tick_s
             self.cpu_s = time.thread_time() - began_s
@@ -103,4 +103,4 @@ class Pace:
                 selector.register(entry, selectors.EVENT_READ)
             readable = bool(selector.select(patience))
         if readable:
-            self._receive()
+            self._receive(self.clock.now_s() - due_s + self._tick_s)

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import socket
 
+from steerclear.shield.bridge.feed_sockets import socket_address
 from steerclear.shield.exceptions import ConfigError
 
 from .boat import Boat
 from .frames import target_of
-from .wires import Wire, open_wire
+from .wires import ANY, LOOPBACK, Wire, is_loopback, open_wire
 
 _FREE_PORT = "udpout:127.0.0.1:0"
+
+
+def near(address: str, allow_remote: bool) -> str:
+    """HOST:PORT of a listener, which must be on this machine without ``allow_remote``.
+
+    Raises:
+        ConfigError: it is elsewhere, or of another form.
+    """
+    host, port = socket_address(address)
+    if host == ANY:
+        return f"{LOOPBACK}:{port}"
+    if not (allow_remote or is_loopback(host)):
+        raise ConfigError(f"{address!r} is not on this machine; simulated boats stay on 127.0.0.1 unless told")
+    return address
 
 
 class Ports:

@@ -37,9 +37,9 @@ class SimBoat:
         system_id: MAVLink system id; 0: its place in the list + 1.
         address: where its link is, as the runner's side has it: ``udpin:HOST:PORT`` (the boat sends there),
             ``udpout:HOST:PORT`` (the boat listens there), ``tcp:HOST:PORT`` (the boat is the server),
-            ``tcpin:HOST:PORT`` (the boat dials); `FREE`: ``udpout`` with a free port; None: no link, the boat is
-            driven by ``policy`` or stays where it is.
-        policy: scripted policy that drives the boat; empty: it obeys its link.
+            ``tcpin:HOST:PORT`` (the boat dials); `FREE`: ``udpout`` with a free port; None: no link.
+        policy: scripted policy that drives the boat while nobody commands it by its link; empty: without commands it
+            stays where it is.
         start: x m, y m, heading deg in the field; None: the game's start place.
     """
 

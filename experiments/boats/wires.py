@@ -13,7 +13,7 @@ from steerclear.shield.exceptions import ConfigError
 from .tcp import TcpCaller, TcpListener
 from .udp import UdpCaller, UdpListener
 
-LOOPBACK = "127.0.0.1"
+LOOPBACK, ANY = "127.0.0.1", "0.0.0.0"
 
 
 class Wire(Protocol):
@@ -46,7 +46,7 @@ def split_address(address: str, allow_remote: bool = False) -> tuple[str, str, i
         kind = "udpin"  # what pymavlink makes of it
     if kind not in _WIRES or not port.isdecimal() or not int(port) < 65536:
         raise ConfigError(f"cannot simulate a boat at {address!r}; give udpin, udpout, tcp or tcpin:HOST:PORT")
-    host = LOOPBACK if host in ("", "localhost", "0.0.0.0") else host
+    host = LOOPBACK if host in ("", "localhost", ANY) else host
     if not (allow_remote or is_loopback(host)):
         raise ConfigError(f"{address!r} is not on this machine; simulated boats stay on 127.0.0.1 unless told")
     return kind, host, int(port)

@@ -81,12 +81,14 @@ class World:
         """Move all boats by one step, to ``time_s``."""
         self._look_for_play()
         given = self._game.orders() if self._game is not None and self.is_playing else {}
-        orders: dict[str, Order] = {self._players[i].spec.name: order for i, order in given.items()}
+        # somebody who commands a boat by its link takes it from its policy
+        free = {i: order for i, order in given.items() if not self._players[i].is_commanded}
+        orders: dict[str, Order] = {self._players[i].spec.name: order for i, order in free.items()}
         headings = np.array([boat.hull.state[L.HEADING] for boat in self._players])
         drift = self._weather.drift_mps(STEP_S)
         for boat in self._boats:
             boat.hull.drift_mps = drift
-            boat.step(time_s, orders.get(boat.spec.name, None if boat.has_link else Keep()))
+            boat.step(time_s, orders.get(boat.spec.name, _otherwise(boat)))
         self._note(headings, time_s)
 
     def _note(self, headings_deg: Array, time_s: float) -> None:
@@ -102,7 +104,9 @@ class World:
         """Begin once every boat of the game that has a link obeys somebody, and goes on doing so."""
         if self.is_playing or self._game is None:
             return
-        ready = not self._waits or all(boat.is_commanded for boat in self._players if boat.has_link)
+        ready = not self._waits or all(
+            boat.is_commanded for boat in self._players if not boat.spec.policy and boat.has_link
+        )
         self._commanded_s = self._commanded_s + STEP_S if ready else 0.0
         if not self._waits or self._commanded_s >= _PLAY_AFTER_S:
             self.play()
@@ -110,3 +114,9 @@ class World:
     def _restart_game(self) -> None:
         if self._game is not None:
             self._game.start([boat.hull.state for boat in self._players])
+
+
+def _otherwise(boat: Boat) -> Order | None:
+    """What a boat does that no policy drives now: its autopilot's order, or nothing without a link."""
+    waits_for_policy = boat.spec.policy and not boat.is_commanded
+    return None if boat.has_link and not waits_for_policy else Keep()

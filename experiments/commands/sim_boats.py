@@ -36,7 +36,9 @@ Delay = Annotated[float, typer.Option(metavar="S", help="Delay of every packet, 
 Jitter = Annotated[float, typer.Option(metavar="S", help="Further delay, drawn for each packet.")]
 Duration = Annotated[float | None, typer.Option(metavar="S", help="Simulated time.", show_default="until Ctrl-C")]
 Boot = Annotated[float, typer.Option(metavar="S", help="From power on until the autopilot arms; 42 was measured.")]
-Opponents = Annotated[str, typer.Option(metavar="NAME", help="Scripted policy of boats of the game without a link.")]
+Opponents = Annotated[
+    str, typer.Option(metavar="NAME", help="Scripted policy of the boats that the file's runner does not command.")
+]
 NoWait = Annotated[bool, typer.Option("--no-wait", help="Let policies begin at once, not when all are commanded.")]
 RandomStart = Annotated[bool, typer.Option("--random-start", help="Draw start places from the seed.")]
 Fault = Annotated[
@@ -177,3 +179,5 @@ def _show(content: dict[str, Any], files: list[str]) -> None:
         console.print(verdicts_table(content))
     for path in files:
         console.print(path, soft_wrap=True)
+    if not content["played"]:
+        err().print("the game never began (not every boat was commanded): nothing was recorded", soft_wrap=True)
