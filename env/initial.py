@@ -153,17 +153,21 @@ def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given
             raise GameError(f"{config.agent_ids[i]} carries a flag but is on its own side; place it on the other side")
 
 
+def _point(place: Array) -> str:
+    return f"({place[0]:g}, {place[1]:g})"
+
+
 def _check_places(config: GameConfig, rules: Rules, taken: np.ndarray, given: Array) -> None:
     """Given places must lie inside the field, clear of obstacles and of flags that are home, no two on one point."""
     for i in np.flatnonzero(~np.isnan(given[:, 0])):
         name, place, radius = config.agent_ids[i], given[i, :2], config.agent_radius_m[i]
         if not ((place > radius) & (place < rules.size - radius)).all():
-            raise GameError(f"{name} at {tuple(place)} is not inside the field {tuple(rules.size)}; move it inside")
+            raise GameError(f"{name} at {_point(place)} is not inside the field {_point(rules.size)}; move it inside")
         if touches_obstacle(rules.obstacles, place[0], place[1], radius):
-            raise GameError(f"{name} at {tuple(place)} touches an obstacle; move it away")
+            raise GameError(f"{name} at {_point(place)} touches an obstacle; move it away")
         for flag in (0, 1):
             if not taken[flag] and np.hypot(*(place - rules.flag_home[flag])) <= rules.flag_keepout:
-                raise GameError(f"{name} at {tuple(place)} is on a flag's home; move it {rules.flag_keepout} m away")
+                raise GameError(f"{name} at {_point(place)} is on a flag's home; move it {rules.flag_keepout} m away")
         for j in range(i):
             if (given[j, :2] == place).all():
-                raise GameError(f"{config.agent_ids[j]} and {name} are on one point {tuple(place)}; move one")
+                raise GameError(f"{config.agent_ids[j]} and {name} are on one point {_point(place)}; move one")

@@ -58,7 +58,7 @@ class PyquaticusReader:
         array = np.asarray(action, dtype=np.float64)
         if array.shape == (2,):
             return float(array[0]), float(array[1])
-        if array.ndim != 0 or not 0 <= int(array) <= 16:
+        if array.ndim != 0 or array not in range(len(DISCRETE)):
             raise ConfigError(f"action {action!r} of {player.id} is neither 0..16 nor (speed, relative heading)")
         share, heading = DISCRETE[int(array)]
         return top * float(share), float(heading)
