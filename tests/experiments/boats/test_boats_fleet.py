@@ -5,6 +5,7 @@ import time
 
 import pytest
 from boat_links import READY, station
+from pymavlink import mavutil
 from steerclear.experiments.boats import RadioSettings, SimBoat, SimFleet
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
@@ -316,3 +317,19 @@ def test_a_boat_can_be_put_somewhere():
         assert speed == pytest.approx(1.0, abs=0.2)
     finally:
         fleet.close()
+
+
+def test_boats_read_their_clocks_between_ticks():
+    with alone() as fleet:
+        link = mavutil.mavlink_connection(fleet.addresses["b"], dialect="ardupilotmega", source_system=255)
+        try:
+            told = []
+            for i in range(20):
+                link.mav.timesync_send(0, 1000 + i)
+                answer = link.recv_match(type="TIMESYNC", blocking=True, timeout=5.0)
+                told.append(answer.tc1)
+                time.sleep(0.003)
+        finally:
+            link.close()
+    assert told == sorted(told)
+    assert any(nanoseconds % 20_000_000 for nanoseconds in told)

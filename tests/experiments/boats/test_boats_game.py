@@ -205,3 +205,22 @@ def test_states_are_of_one_moment_while_the_thread_runs():
         stop.set()
         looker.join()
     assert torn == sorted(torn)
+
+
+def test_a_policys_boat_with_a_link_tells_where_it_is_and_obeys_who_commands_it():
+    boats = [SimBoat("blue", policy="medium_attack"), SimBoat("red", team=1, policy="medium_attack")]
+    fleet = SimFleet(boats, autopilot=READY, waits=False)
+    with station(fleet, fleet.addresses["red"]) as ground:
+        ground.run(0.2)
+        ground.guide(2)
+        ground.run(4.0)
+        told = ground.positions(2)
+        assert math.dist(told[0][1:], told[-1][1:]) > 1.0  # its policy drives it while nobody commands
+        ground.run(12.0, lambda: ground.steer(2, 0.0, 0.5))
+        assert fleet.states()["red"][L.HEADING] == pytest.approx(0.0, abs=5.0)
+
+
+def test_the_feed_stays_on_this_machine():
+    with pytest.raises(ConfigError, match="not on this machine"):
+        SimFleet([SimBoat("b")], feed_to=["10.1.2.3:14700"])
+    SimFleet([SimBoat("b")], feed_to=["0.0.0.0:14700"]).close()

@@ -121,3 +121,26 @@ def test_planned_faults_are_read():
     for wrong in ("jump@60", "b:jump", "b:jump@x", "b:jump@1,a=x y", "b:jump@1.2.3", ""):
         with pytest.raises(ConfigError):
             parse_incident(wrong)
+
+
+def test_boats_the_runner_does_not_command_are_driven_and_safety_boats_lie_beside(fleet_path):
+    link = '{kind: mavlink, address: "udpout:127.0.0.1:%d", system_id: %d}'
+    ports = free_ports(2)
+    text = fleet_path.read_text()
+    text = text.replace(
+        "red_1, agent: agent_3, platform: heron, contact: feed}",
+        f"red_1, agent: agent_3, platform: heron, commanded: false, link: {link % (ports[0], 11)}}}",
+    )
+    text = text.replace(
+        "feed: {listen",
+        f"  - {{name: safety, platform: heron, commanded: false, link: {link % (ports[1], 12)}}}\nfeed: {{listen",
+    )
+    fleet = SimFleet.from_file(parse_fleet(text), opponents="rammer")
+    try:
+        assert fleet.boats["red_1"].spec.policy == "rammer"
+        assert "red_1" in fleet.addresses
+        assert fleet.boats["safety"].spec.policy == ""
+        assert tuple(fleet.states()["safety"][:2]) == (33.0, -3.0)
+        fleet.advance(1.0)
+    finally:
+        fleet.close()
