@@ -11,7 +11,7 @@ import math
 DRIFT = 1e-4
 """The boat's clock may run this much faster or slower than ours, s per s."""
 AHEAD_S = 0.5
-"""A time since boot this much further than can be is doubted."""
+"""A time since boot this much later than can be is doubted."""
 BEHIND_S = 2.0
 """So is one this much earlier than the latest: a restart, or a packet that was long under way."""
 BELIEVED_AFTER = 5
@@ -45,7 +45,8 @@ class BoatClock:
         if self.starts and self._is_odd(boot_s, difference):
             if not self._believe(difference):
                 return None
-            self._forget()
+            if boot_s < self._latest_boot_s - BEHIND_S:
+                self._forget()
         self._doubts.clear()
         self.starts = max(self.starts, 1)
         drifted = self._quickest_s + DRIFT * max(0.0, received_s - self._heard_s)
@@ -91,7 +92,9 @@ class BoatClock:
         self._middle_s, self._trip_s = math.nan, math.inf
 
     def _is_odd(self, boot_s: float, difference: float) -> bool:
-        return difference < self._quickest_s - AHEAD_S or boot_s < self._latest_boot_s - BEHIND_S
+        """Earlier than the latest by far, or much quicker than any before, and than the round trip allows."""
+        least_s = self._middle_s - 0.5 * self._trip_s if math.isfinite(self._trip_s) else self._quickest_s
+        return difference < least_s - AHEAD_S or boot_s < self._latest_boot_s - BEHIND_S
 
     def _believe(self, difference: float) -> bool:
         if self._doubts and abs(difference - self._doubts[-1]) > AHEAD_S:

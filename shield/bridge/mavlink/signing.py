@@ -29,6 +29,7 @@ _SIGNED_FLAG = 0x01
 _MARKER_2 = 0xFD
 _BLOCK = 13
 _SHORTEST_PASSPHRASE = 8
+_LONGEST = 4096
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,12 @@ def read_key(path: str | Path) -> bytes:
         raise ConfigError(
             f"cannot read the signing key {path} ({error.strerror}); give the path of a key file"
         ) from None
-    with os.fdopen(descriptor, "rb") as file:
+    try:
         _check_safe(path, os.fstat(descriptor))  # of the opened file: what is checked is what is read
-        text = file.read(4096)
-    return _parse_key(path, text)
+        content = os.read(descriptor, _LONGEST)
+    finally:
+        os.close(descriptor)
+    return _parse_key(path, content)
 
 
 def _check_safe(path: Path, status: os.stat_result) -> None:

@@ -1,0 +1,142 @@
+"""Signing: key files nobody else can read, and frames that are signed rightly, once, and now."""
+
+import hashlib
+import os
+import time
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.bridge.mavlink.codec import Codec
+from steerclear.shield.bridge.mavlink.signing import SignatureCheck, Signing, SigningClock, read_key
+from steerclear.shield.exceptions import ConfigError
+
+KEY = bytes(range(32))
+MINUTE = 60 * 100_000
+
+
+def key_file(path, text, mode=0o600):
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def test_a_key_is_64_digits_or_a_passphrase(tmp_path):
+    assert read_key(key_file(tmp_path / "a", KEY.hex() + "\n")) == KEY
+    assert read_key(key_file(tmp_path / "b", "correct horse\n")) == hashlib.sha256(b"correct horse").digest()
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620, 0o602, 0o660])
+def test_a_key_others_can_read_or_change_is_refused(tmp_path, mode):
+    with pytest.raises(ConfigError, match="run: chmod 600"):
+        read_key(key_file(tmp_path / "key", KEY.hex(), mode))
+
+
+@pytest.mark.parametrize("text", ["", "short", "two lines\nof passphrase", KEY.hex()[:-2] + "\n" + "ab"])
+def test_what_is_no_key_is_refused(tmp_path, text):
+    with pytest.raises(ConfigError, match="neither 64 hexadecimal digits nor"):
+        read_key(key_file(tmp_path / "key", text))
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    path = tmp_path / "key"
+    path.write_bytes(b"\xff\xfe" * 16)
+    path.chmod(0o600)
+    with pytest.raises(ConfigError, match="neither"):
+        read_key(path)
+
+
+def test_a_missing_key_a_folder_and_a_pipe_are_refused_at_once(tmp_path):
+    with pytest.raises(ConfigError, match="cannot read the signing key"):
+        read_key(tmp_path / "none")
+    with pytest.raises(ConfigError, match="no plain file"):
+        read_key(tmp_path)
+    os.mkfifo(tmp_path / "pipe", 0o600)
+    with pytest.raises(ConfigError, match="no plain file"):
+        read_key(tmp_path / "pipe")
+
+
+def test_the_key_never_shows():
+    assert KEY.hex() not in repr(Signing(KEY))
+    assert str(KEY) not in repr(Signing(KEY))
+    with pytest.raises(ConfigError, match="31 bytes; give 32"):
+        Signing(KEY[1:])
+    with pytest.raises(ConfigError, match="link_id is 256"):
+        Signing(KEY, 256)
+
+
+def signed(key=KEY, at=0, system=1, link_id=1):
+    """A signed heartbeat with a time stamp ``at`` ticks from now."""
+    mav = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
+    mav.signing.secret_key, mav.signing.sign_outgoing, mav.signing.link_id = key, True, link_id
+    mav.signing.timestamp = SigningClock().now() + at
+    return bytes(mavlink.MAVLink_heartbeat_message(11, 3, 1, 0, 4, 3).pack(mav))
+
+
+def check():
+    return SignatureCheck(KEY, SigningClock())
+
+
+def test_only_the_right_key_is_believed():
+    assert check().refuse(signed()) == ""
+    assert check().refuse(signed(key=KEY[::-1])) == "bad_signature"
+    mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = mavlink.MAVLink_heartbeat_message(11, 3, 1, 0, 4, 3)
+    assert check().refuse(bytes(beat.pack(mav))) == "unsigned"
+    assert check().refuse(bytes(beat.pack(mav, force_mavlink1=True))) == "unsigned"
+
+
+def test_every_flipped_bit_of_a_signed_frame_is_noticed():
+    frame = signed()
+    for i in range(len(frame)):
+        for bit in range(8):
+            bent = bytearray(frame)
+            bent[i] ^= 1 << bit
+            assert check().refuse(bytes(bent)) != "", (i, bit)
+
+
+def test_a_frame_is_believed_once_and_older_ones_never():
+    checks, frame, older = check(), signed(at=10), signed(at=5)
+    assert [checks.refuse(frame), checks.refuse(frame), checks.refuse(older)] == ["", "replayed", "replayed"]
+    assert checks.refuse(signed(at=11)) == ""
+    assert checks.refuse(signed(at=5, system=2)) == "", "each sender has its own time"
+    assert checks.refuse(signed(at=5, link_id=2)) == "", "and so has each link"
+
+
+def test_a_new_sender_more_than_a_minute_behind_is_refused():
+    assert check().refuse(signed(at=-MINUTE // 2)) == ""
+    assert check().refuse(signed(at=-2 * MINUTE)) == "old_signature"
+
+
+def test_a_forged_time_stamp_does_not_lock_the_boat_out():
+    checks = check()
+    assert checks.refuse(signed(key=KEY[::-1], at=1000 * MINUTE)) == "bad_signature"
+    assert checks.refuse(signed()) == ""
+
+
+def test_our_time_stamps_rise_when_the_wall_clock_steps_back(monkeypatch):
+    clock = SigningClock()
+    first = clock.take()
+    before = time.time()
+    monkeypatch.setattr(time, "time", lambda: before - 3600.0)
+    assert first < clock.take() < clock.take()
+
+
+def test_our_time_stamps_never_fall_behind_a_boat_we_believed():
+    clock = SigningClock()
+    ahead = clock.now() + 100 * MINUTE
+    assert SignatureCheck(KEY, clock).refuse(signed(at=100 * MINUTE)) == ""
+    assert clock.take() > ahead
+
+
+def test_two_codecs_with_one_key_understand_each_other_and_nobody_else():
+    ours, theirs, plain = Codec(255, 191, Signing(KEY)), Codec(1, 1, Signing(KEY)), Codec(1, 1, None)
+    beat = mavlink.MAVLink_heartbeat_message(11, 3, 1, 15, 4, 3)
+    message, refused = ours.decode(theirs.encode(beat))
+    assert refused == ""
+    assert message.custom_mode == 15
+    assert ours.decode(plain.encode(beat)) == (None, "unsigned")
+    assert ours.decode(Codec(1, 1, Signing(KEY[::-1])).encode(beat)) == (None, "bad_signature")
+    frame = ours.encode(beat)
+    assert theirs.decode(frame)[1] == ""
+    assert theirs.decode(frame)[1] == "replayed"
+    assert plain.decode(frame)[1] == "", "who has no key cannot check"
