@@ -15,6 +15,7 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import BridgeError, LinkError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.tracks import thrust_at
 
 DT_S = 0.1
 
@@ -51,6 +52,7 @@ class FakeLink:
         self.clock = clock
         self.params = get_platform(platform).pack()
         self.row = fresh_state(x, y, heading_deg, speed)
+        self.row[L.THRUST] = thrust_at(self.params, speed)  # under way, as one that has come here
         self.command = None
         self.sent = []
         self.stops = 0
