@@ -1,0 +1,56 @@
+"""The delay from command to effect is measured while a boat is steered, and only when it can be."""
+
+import math
+
+import numpy as np
+import pytest
+from bridge_fakes import FakeLink
+from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.latency import DelayMeter
+from steerclear.shield.platforms import get_platform
+
+DT_S = 0.1
+
+
+def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0):
+    clock = ManualClock()
+    link = FakeLink("blue_1", clock, platform, 0.0, 0.0, 0.0, 1.0)
+    meter = DelayMeter(get_platform(platform), DT_S)
+    queue, random = [(0.0, 1.0)] * delay_steps, np.random.default_rng(1)
+    for k in range(round(seconds / DT_S)):
+        reading = link.read()
+        turned = math.radians(noise_deg) * random.normal()
+        meter.update(type(reading)(**{**vars(reading), "heading_rad": reading.heading_rad + turned}))
+        heading = 0.0 if steady else math.radians(60.0) * ((k // 40) % 3)
+        meter.sent(heading, 2.0)
+        queue.append((math.degrees(heading), 2.0))
+        link.command = queue.pop(0)
+        link.advance(DT_S)
+        clock.sleep_until(clock.now_s() + DT_S)
+    return meter.delay_s
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("steps", [0, 1, 3, 5])
+def test_the_delay_is_found(platform, steps):
+    assert measure(platform, steps) == pytest.approx(steps * DT_S, abs=0.05)
+
+
+def test_the_delay_is_found_through_noise():
+    assert measure("heron", 2, noise_deg=0.5) == pytest.approx(0.2, abs=0.06)
+
+
+def test_a_boat_that_holds_its_course_tells_nothing():
+    assert measure("heron", 2, steady=True) is None
+
+
+def test_gaps_and_faults_start_anew_and_break_nothing():
+    clock = ManualClock()
+    link = FakeLink("blue_1", clock)
+    meter = DelayMeter(get_platform("heron"), DT_S)
+    for changed in ({}, {"heading_rad": math.nan}, {"position_age_s": 9.0}, {}, {"speed_mps": math.inf}, {}):
+        link.changed = changed
+        meter.update(link.read())
+        meter.sent(math.nan, 0.0)
+        clock.sleep_until(clock.now_s() + DT_S)
+    assert meter.delay_s is None
