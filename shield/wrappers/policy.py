@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ from ..exceptions import ConfigError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
 from .reading import GameReader, reader_of
+
+logger = logging.getLogger(__name__)
 
 
 class ShieldedTeamPolicy:
@@ -41,15 +44,11 @@ class ShieldedTeamPolicy:
         """Begin a game.
 
         Raises:
-            ConfigError: the env cannot be read, or the boats are of two teams.
+            ConfigError: the env cannot be read, or the boats are none, not in the game, or of two teams.
         """
-        self._reader = reader_of(env)
-        self._agent_ids = tuple(agent_ids)
-        team = self._reader.fleet(0, False).team
-        teams = {int(team[self._reader.agent_ids.index(agent)]) for agent in agent_ids}
-        if len(teams) != 1:
-            raise ConfigError(f"{', '.join(agent_ids)} are of two teams; give the boats of one")
-        self._team = teams.pop()
+        reader = reader_of(env)
+        self._team = _team_of(reader, agent_ids)
+        self._reader, self._agent_ids = reader, tuple(agent_ids)
         self.shield.reset()
         self.policy.reset(env, agent_ids, seed)
 
@@ -78,6 +77,23 @@ class ShieldedTeamPolicy:
         return getattr(self.policy, name)
 
 
+def _team_of(reader: GameReader, agent_ids: Sequence[str]) -> int:
+    """The team of the boats.
+
+    Raises:
+        ConfigError: there are none, one is not in the game, or they are of two teams.
+    """
+    for agent in agent_ids:
+        if agent not in reader.agent_ids:
+            raise ConfigError(f"unknown boat {agent!r}; the game has {', '.join(reader.agent_ids)}")
+    team = reader.fleet(0, False).team
+    teams = {int(team[reader.agent_ids.index(agent)]) for agent in agent_ids}
+    if len(teams) != 1:
+        found = f"{', '.join(agent_ids)} are of two teams" if teams else "the list names no boat"
+        raise ConfigError(f"{found}; give the boats of one team")
+    return teams.pop()
+
+
 class ShieldedCallable:
     """Any function of what is seen to commands, with the fleet read from what is seen.
 
@@ -97,21 +113,24 @@ class ShieldedCallable:
         """Safe commands. A policy that raises or answers something else holds all boats; the reason says so."""
         fleet = self.read(seen)
         try:
-            wanted = self.policy(seen)
-            usable = isinstance(wanted, Commands) and len(wanted) == len(fleet)
-        except Exception as error:
-            _log_failure(error)
-            usable = False
-        if not usable:
+            wanted = _usable(self.policy(seen), len(fleet))
+        except Exception as error:  # whatever a policy does, its boats must get commands
+            logger.error("policy failed (%s: %s); all boats hold", type(error).__name__, error)
             wanted = Commands.relative_deg(np.full((len(fleet), 2), np.nan))
         self.decisions = self.shield.decide(fleet, wanted)
         return self.decisions.sent
 
 
-def _log_failure(error: Exception) -> None:
-    import logging
+def _usable(answer: Any, boats: int) -> Commands:
+    """The answer, if it is commands for so many boats.
 
-    logging.getLogger(__name__).error("policy failed (%s: %s); all boats hold", type(error).__name__, error)
+    Raises:
+        PolicyError: it is not.
+    """
+    if not isinstance(answer, Commands) or len(answer) != boats:
+        found = f"Commands of {len(answer)}" if isinstance(answer, Commands) else type(answer).__name__
+        raise PolicyError(f"it answered {found}; give Commands of all {boats} boats")
+    return answer
 
 
 def wrap_policy(policy: Any, shield: Shield, read: Callable[[Any], Fleet] | None = None) -> Any:

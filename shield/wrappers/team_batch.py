@@ -114,16 +114,18 @@ class TeamBatch:
     def _decode(self, actions: Any) -> Array:
         """Commands (B, boats, 2) of flat actions."""
         shape = (self.core.n_games, len(self.boats))
+        try:
+            given = np.asarray(actions, dtype=np.float64)
+        except (TypeError, ValueError):
+            given = np.full(0, np.nan)  # no numbers: refused below like any wrong shape
         if self.actions == "discrete":
-            numbers = np.asarray(actions)
-            if numbers.shape != (self.learners,) or numbers.min() < 0 or numbers.max() >= len(DISCRETE):
+            if given.shape != (self.learners,) or not np.isin(given, range(len(DISCRETE))).all():
                 raise PolicyError(f"give {self.learners} discrete actions in 0..{len(DISCRETE) - 1}")
-            commands = DISCRETE[numbers.astype(np.int64)].reshape(*shape, 2)
+            commands = DISCRETE[given.astype(np.int64)].reshape(*shape, 2)
             return commands * np.stack([self.core.max_speed_mps[self.boats], np.ones(len(self.boats))], axis=1)
-        pairs = np.asarray(actions, dtype=np.float64)
-        if pairs.shape != (self.learners, 2) or not np.isfinite(pairs).all():
+        if given.shape != (self.learners, 2) or not np.isfinite(given).all():
             raise PolicyError(f"give finite actions of shape ({self.learners}, 2): speed m/s, relative heading deg")
-        return pairs.reshape(*shape, 2)
+        return given.reshape(*shape, 2)
 
     def _flat(self, observations: Any) -> NDArray[np.float32]:
         flat: NDArray[np.float32] = observations[:, self.boats].reshape(self.learners, -1).copy()

@@ -1,0 +1,175 @@
+"""Vector environments: one team's boats in many games as a flat batch of learners, with the shield inside."""
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
+from steerclear.shield import ShieldConfig
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.exceptions import ConfigError, PolicyError
+from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch
+from steerclear.shield.wrappers.reading import DISCRETE
+
+GAMES = 4
+
+
+def batch(shielded=False, opponent=None, team="blue", actions="discrete", **rules):
+    config = GameConfig.preset("aamas2024", **rules)
+    core = BatchedMctf(config, n_games=GAMES, seed=0)
+    kinds, sides = (config.platforms[0],) * config.n_boats, tuple(core.team.tolist())
+    if isinstance(config.platforms, tuple):
+        kinds = config.platforms
+    shield = BatchedShield(ShieldConfig(), GAMES, kinds, sides) if shielded else None
+    other = None if opponent is None else policies.make_batch(opponent)
+    return TeamBatch(core, other, team, shield, actions, seed=5)
+
+
+def closest_mates(games, steps=150):
+    """Closest distance of two learners of one game while they act at random, m."""
+    random, closest = np.random.default_rng(1), np.inf
+    games.reset()
+    for step in range(steps):
+        if step % 10 == 0:
+            actions = random.integers(8, size=games.learners)
+        games.step(actions)
+        place = games.core.state[:, games.boats, :2]
+        gap = np.linalg.norm(place[:, :, None] - place[:, None], axis=-1)
+        closest = min(closest, gap[:, ~np.eye(3, dtype=bool)].min())
+    return closest
+
+
+def test_the_shield_keeps_learners_apart_that_act_at_random():
+    assert closest_mates(batch()) < 2.5 <= closest_mates(batch(shielded=True))
+
+
+@pytest.mark.parametrize("team", ["blue", "red"])
+def test_a_step_is_the_step_of_the_games(team):
+    games, core = batch(opponent="medium", team=team), BatchedMctf("aamas2024", n_games=GAMES, seed=0)
+    other = policies.make_batch("medium")
+    own, others = ([0, 1, 2], [3, 4, 5]) if team == "blue" else ([3, 4, 5], [0, 1, 2])
+    seen = games.reset()
+    core.reset(seed=5)
+    other.reset(core, 1 if team == "blue" else 0, 5)
+    assert seen.tobytes() == core.observations[:, own].reshape(12, -1).tobytes()
+    random = np.random.default_rng(2)
+    for _ in range(30):
+        actions = random.integers(17, size=12)
+        out = games.step(actions)
+        commands = np.zeros((GAMES, 6, 2))
+        commands[:, own] = DISCRETE[actions].reshape(GAMES, 3, 2) * [core.max_speed_mps[0], 1.0]
+        commands[:, others] = other.act(core, 1 if team == "blue" else 0)
+        observations, rewards, *_ = core.step(commands)
+        assert games.core.state.tobytes() == core.state.tobytes()
+        assert out.observations.tobytes() == observations[:, own].reshape(12, -1).tobytes()
+        np.testing.assert_array_equal(out.rewards, rewards[:, own].ravel())
+
+
+def test_discrete_actions_are_shares_of_top_speed_and_continuous_ones_are_taken_as_they_are():
+    by_number, by_pair = batch(), batch(actions="continuous")
+    for games in (by_number, by_pair):
+        games.reset()
+    numbers = np.arange(12)
+    by_number.step(numbers)
+    by_pair.step(DISCRETE[numbers] * [by_pair.top_speed_mps, 1.0])
+    assert by_number.core.state.tobytes() == by_pair.core.state.tobytes()
+
+
+@pytest.mark.parametrize("shielded", [False, True])
+def test_ended_games_start_anew_and_show_how_they_ended(shielded):
+    games = batch(shielded, opponent="easy", max_time_s=1.0)
+    games.reset()
+    for step in range(1, 26):
+        out = games.step(np.full(games.learners, 4))
+        ended = out.terminated | out.truncated
+        assert ended.all() == (step % 10 == 0)
+        assert ended.any() == ended.all()
+        changed = (out.observations != out.final_observations).any(axis=1)
+        assert (changed == ended).all()
+    assert games.core.time_s == pytest.approx(0.5)
+
+
+def test_the_same_seed_plays_the_same_games():
+    def play(seed):
+        games = batch(opponent="medium", max_time_s=2.0, default_start=False)
+        games.reset(seed)
+        random = np.random.default_rng(0)
+        return np.array([games.step(random.integers(17, size=12)).observations for _ in range(50)])
+
+    assert play(3).tobytes() == play(3).tobytes()
+    assert play(3).tobytes() != play(4).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "actions"),
+    [
+        ("discrete", np.full(12, 17)),
+        ("discrete", np.full(12, -1)),
+        ("discrete", np.full(11, 1)),
+        ("discrete", np.full(12, np.nan)),
+        ("discrete", np.full(12, 1.5)),
+        ("discrete", np.array(["a"] * 12)),
+        ("discrete", []),
+        ("continuous", np.full((12, 2), np.nan)),
+        ("continuous", np.full((12, 2), np.inf)),
+        ("continuous", np.zeros((11, 2))),
+        ("continuous", np.zeros(24)),
+        ("continuous", [["a", "b"]] * 12),
+    ],
+)
+def test_actions_that_are_none_are_refused(kind, actions):
+    games = batch(actions=kind)
+    games.reset()
+    with pytest.raises(
+        PolicyError, match=r"give 12 discrete actions in 0\.\.16|give finite actions of shape \(12, 2\)"
+    ):
+        games.step(actions)
+
+
+def test_what_fits_no_batch_is_refused():
+    with pytest.raises(ConfigError, match="unknown actions 'analog'; choose one of discrete, continuous"):
+        batch(actions="analog")
+    with pytest.raises(ConfigError, match="unknown team 'green'"):
+        batch(team="green")
+
+
+def test_gymnasium_gets_spaces_steps_and_the_last_observations():
+    env = MctfVectorEnv(batch(True, opponent="easy", max_time_s=0.5))
+    observations, infos = env.reset(seed=1)
+    assert infos == {}
+    assert env.num_envs == 12
+    env.action_space.seed(0)
+    for step in range(1, 11):
+        assert env.observation_space.contains(observations)
+        actions = env.action_space.sample()
+        assert actions.shape == (12,)
+        observations, rewards, terminated, truncated, infos = env.step(actions)
+        assert rewards.shape == terminated.shape == truncated.shape == (12,)
+        assert truncated.all() == (step % 5 == 0) == bool(infos)
+        if infos:
+            assert infos["_final_obs"].all()
+            assert env.single_observation_space.contains(infos["final_obs"][0])
+    env.close()
+
+
+def test_stable_baselines_gets_what_it_asks_for():
+    pytest.importorskip("stable_baselines3")
+    from steerclear.shield.wrappers.vector_sb3 import MctfVecEnv
+
+    env = MctfVecEnv(batch(actions="continuous", max_time_s=0.5))
+    env.seed(3)
+    first = env.reset()
+    again = MctfVecEnv(batch(actions="continuous", max_time_s=0.5))
+    again.seed(3)
+    assert first.tobytes() == again.reset().tobytes()
+    assert env.observation_space.contains(first[0])
+    assert env.action_space.high.tolist() == pytest.approx([env.batch.top_speed_mps, 180.0])
+    for step in range(1, 6):
+        _, rewards, done, infos = env.step(np.zeros((12, 2)))
+    assert done.all()
+    assert rewards.dtype == np.float32
+    assert infos[0]["TimeLimit.truncated"]
+    assert infos[0]["terminal_observation"].shape == env.observation_space.shape
+    assert env.get_attr("num_envs", [0, 3]) == [12, 12]
+    assert env.env_is_wrapped(object) == [False] * 12
+    assert env.env_method("reset", 3, indices=0)[0].tobytes() == first.tobytes()

@@ -1,0 +1,126 @@
+"""The shield around a policy: what the policy answers is already safe."""
+
+import copy
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.shield import Commands, Fleet, Reason, Shield
+from steerclear.shield.exceptions import ConfigError, PolicyError
+from steerclear.shield.wrappers import ShieldedCallable, ShieldedParallelEnv, ShieldedTeamPolicy
+
+OWN = ["agent_0", "agent_1", "agent_2"]
+
+
+def crowd():
+    """Three own boats close together, making for one another, and opponents far away."""
+    places = [[18.0, 8.0], [32.0, 8.0], [25.0, 24.0], [60.0, 5.0], [60.0, 20.0], [60.0, 35.0]]
+    headings = [90.0, -90.0, 180.0, 0.0, 0.0, 0.0]
+    start = {"agent_position": places, "agent_heading": headings, "agent_speed": [1.5] * 6}
+    return MctfEnv(GameConfig.preset("aamas2024")), {"init_dict": start}
+
+
+def straight():
+    return policies.from_callable(lambda observation: 4)
+
+
+def test_the_answers_keep_the_team_apart_and_are_pairs_only_where_changed():
+    closest = {}
+    for team in (straight(), Shield().wrap(straight())):
+        env, options = crowd()
+        observations, infos = env.reset(seed=0, options=options)
+        team.reset(env, OWN, 0)
+        gaps = []
+        for _ in range(70):
+            actions = team.act(observations, infos)
+            if isinstance(team, ShieldedTeamPolicy):
+                changed = [np.shape(actions[agent]) == (2,) for agent in OWN]
+                assert changed == team.decisions.intervened[:3].tolist()
+            observations, *_, infos = env.step(actions)
+            place = env.view().position[:3]
+            gaps += [np.hypot(*(place[i] - place[j])) for i in range(3) for j in range(i)]
+        closest[type(team)] = min(gaps)
+    wrapped = closest.pop(ShieldedTeamPolicy)
+    assert closest.popitem()[1] < 2.5 <= wrapped
+
+
+def test_the_decisions_are_those_of_a_shielded_env():
+    (env, options), (inner, _) = crowd(), crowd()
+    other = ShieldedParallelEnv(inner, Shield(), shield_autopilot=False)
+    team, bare = Shield().wrap(straight()), straight()
+    start = options["init_dict"]["agent_position"]
+    seen, likewise = env.reset(seed=0, options=options), other.reset(seed=0, options=options)
+    team.reset(env, OWN, 0)
+    bare.reset(other, OWN, 0)
+    for _ in range(60):
+        actions = team.act(*seen)
+        observations, *_, infos = env.step(actions)
+        *_, shielded_infos = other.step(bare.act(*likewise))
+        seen = likewise = observations, infos
+        for i, agent in enumerate(OWN):
+            mine, theirs = team.decisions[i], shielded_infos[agent]["shield"]
+            assert (mine.reason, mine.binding) == (theirs.reason, theirs.binding)
+        # actions outside the env are float32, commands inside its step are not
+        np.testing.assert_allclose(env.view().position, inner.view().position, atol=1e-4)
+    assert (env.view().position[0] != start[0]).any()
+
+
+def test_attributes_of_the_policy_are_within_reach_and_it_can_be_copied():
+    team = policies.make("medium")
+    shielded = Shield().wrap(team)
+    assert shielded.name == f"shielded {team.name}"
+    shielded.reset(crowd()[0], OWN, 0)
+    assert shielded.behaviours == team.behaviours
+    assert copy.copy(shielded).name == shielded.name
+    with pytest.raises(AttributeError):
+        _ = shielded.nonsense
+
+
+def test_misuse_is_refused():
+    env, _ = crowd()
+    team = Shield().wrap(straight())
+    with pytest.raises(PolicyError, match="call reset"):
+        team.act({}, {})
+    with pytest.raises(ConfigError, match="are of two teams; give the boats of one"):
+        team.reset(env, ["agent_0", "agent_3"], 0)
+    with pytest.raises(ConfigError, match="unknown boat 'agent_9'; the game has agent_0, "):
+        team.reset(env, ["agent_9"], 0)
+    with pytest.raises(ConfigError, match="names no boat; give the boats of one team"):
+        team.reset(env, [], 0)
+    with pytest.raises(ConfigError, match="a plain function needs read="):
+        Shield().wrap(lambda seen: None)
+    with pytest.raises(ConfigError, match="cannot wrap str"):
+        Shield().wrap("medium")
+
+
+def near(gap_m):
+    return Fleet.of(
+        position_m=[[0, 0], [0, gap_m]], heading_rad=[0, np.pi], speed_mps=[2, 2], team=[0, 1], platforms="heron"
+    )
+
+
+def test_a_function_of_what_is_seen_gets_a_shield_too():
+    wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]])
+    team = Shield().wrap(lambda gap_m: wanted, read=near)
+    assert isinstance(team, ShieldedCallable)
+    assert team(60.0).values.tobytes() == wanted.values.tobytes()
+    assert team(6.0).values[0, 1] != 0.0
+    assert team.decisions[0].intervened
+
+
+@pytest.mark.parametrize("answer", [None, Commands.relative_deg([[1.0, 0.0]]), [[2.0, 0.0], [2.0, 0.0]], ValueError])
+def test_a_function_that_fails_holds_the_boats(answer, caplog):
+    def policy(seen):
+        if answer is ValueError:
+            raise ValueError("broken")
+        return answer
+
+    team = Shield().wrap(policy, read=near)
+    sent = team(60.0)
+    assert team.decisions[0].reason == Reason.HELD
+    assert np.isfinite(sent.values[0]).all()
+    assert sent.values[0, 0] == 0.0
+    assert caplog.messages
+    assert ("broken" in caplog.text) == (answer is ValueError)
