@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.env.record import save
-from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.blackbox import LogReader, mend
 
 from ..deploy.replay_text import show
 from ..deploy.replaying_report import Replay, as_content, compare, draw, replay_log
@@ -25,6 +25,9 @@ WithoutShield = Annotated[
 Judge = Annotated[bool, typer.Option(help="Ask the oracle about breaches that happened (with --without-shield).")]
 Html = Annotated[Path | None, typer.Option(help="Write a replay to scrub in a browser.")]
 RecordFile = Annotated[Path | None, typer.Option("--record", help="Write the game's record (.npz) for render.")]
+Mend = Annotated[
+    Path | None, typer.Option("--mend", help="Write what can be read of a cut-off log as a whole one (.mcap).")
+]
 
 
 @command
@@ -34,6 +37,7 @@ def replay(
     judge: Judge = True,
     html: Html = None,
     record: RecordFile = None,
+    mended: Mend = None,
     json_file: o.JsonFile = None,
 ) -> None:
     """Run the shield again on a recorded log and prove that it decides the same, bit for bit.
@@ -46,7 +50,7 @@ def replay(
     draw(found)
     if without_shield:
         compare(found, judge)
-    files = _write(found, log, html, record)
+    files = _write(found, log, html, record, mended)
     show(out(), found)
     for path in files:
         out().print(f"{path}", soft_wrap=True)
@@ -58,8 +62,11 @@ def replay(
     finish(found.proof.holds)
 
 
-def _write(found: Replay, log: Path, html: Path | None, record: Path | None) -> list[Any]:
+def _write(found: Replay, log: Path, html: Path | None, record: Path | None, mended: Path | None) -> list[Any]:
     files = []
+    if mended is not None:
+        mend(log, mended)
+        files.append(str(mended))
     if html is not None:
         files.append(str(write_replay(found.records, html, f"steerclear replay of {log.name}")))
     if record is not None:

@@ -11,6 +11,7 @@ How to use it::
     check_disk(folder, boats=6)                              # before the start: a CheckResult
     with LogReader(path) as log:                             # also of a log cut off by a crash
         for tick in log.ticks(): ...
+    mend(path, target)                                       # what is left of such a log, for viewers
 """
 
 from .disk import Disk
@@ -18,6 +19,7 @@ from .fleet_header import header_of_fleet
 from .header import LoggedBoat, LogHeader, platforms_of
 from .mcap_writer import McapWriter, log_path
 from .reader import LogLine, LogReader
+from .records import mend
 from .space import check_disk
 from .tlog import TlogWriter
 
@@ -32,5 +34,6 @@ __all__ = [
     "check_disk",
     "header_of_fleet",
     "log_path",
+    "mend",
     "platforms_of",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -131,7 +132,7 @@ class McapWriter:
 
 
 def log_path(folder: Path, ending: str, unix_s: float | None = None, name: str = "steerclear") -> Path:
-    """A path for a new log, named after the time, UTC.
+    """A path for a new log, named after the time, UTC, and this process, so that two that start together do not clash.
 
     Args:
         folder: the log folder.
@@ -140,7 +141,7 @@ def log_path(folder: Path, ending: str, unix_s: float | None = None, name: str =
         name: first part of the name.
     """
     moment = time.gmtime(time.time() if unix_s is None else unix_s)
-    return folder / f"{name}_{time.strftime('%Y%m%dT%H%M%SZ', moment)}{ending}"
+    return folder / f"{name}_{time.strftime('%Y%m%dT%H%M%SZ', moment)}_{os.getpid()}{ending}"
 
 
 def _snapshot(tick: Tick) -> Tick:

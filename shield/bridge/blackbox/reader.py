@@ -4,38 +4,22 @@ from __future__ import annotations
 
 import json
 import logging
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Footer, Message
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from zstandard import ZstdError
+from mcap.records import Channel, Footer, Message
 
 from ...exceptions import LogError
 from ..tick import Tick
 from .decode import tick_from_json
 from .header import LogHeader
 from .mcap_file import HEADER_TOPIC, LOG_TOPIC, TICK_TOPIC
+from .records import read_records
 
 LOG = logging.getLogger(__name__)
-
-LARGEST_RECORD = 64 << 20
-"""Longer records than this are damage, bytes."""
-
-_DAMAGE = (
-    McapError,
-    CRCValidationError,
-    struct.error,
-    UnicodeDecodeError,
-    MemoryError,
-    OverflowError,
-    ZstdError,
-)
 
 
 @dataclass(frozen=True)
@@ -127,28 +111,12 @@ class LogReader:
 
     def _read(self) -> Iterator[tuple[str, Message]]:
         """Messages with their topics; ends where the log can no longer be read."""
-        records = StreamReader(self._file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records
-        try:
-            for item in records:
-                self.complete = isinstance(item, Footer)
-                yield from self._messages_of(item)
-        except _DAMAGE as error:
-            self.complete = False
-            self._tell(f"it ends in the middle of a record ({type(error).__name__})")
-
-    def _messages_of(self, item: Any) -> Iterator[tuple[str, Message]]:
-        if isinstance(item, Chunk):
-            try:
-                parts = breakup_chunk(item, validate_crc=True)
-            except _DAMAGE as error:
-                self._tell(f"{item.uncompressed_size} bytes are damaged and left out ({type(error).__name__})")
-                return
-            for part in parts:
-                yield from self._messages_of(part)
-        elif isinstance(item, Channel):
-            self._topics[item.id] = item.topic
-        elif isinstance(item, Message):
-            yield self._topics.get(item.channel_id, ""), item
+        for item in read_records(self._file, self._tell):
+            self.complete = isinstance(item, Footer)
+            if isinstance(item, Channel):
+                self._topics[item.id] = item.topic
+            elif isinstance(item, Message):
+                yield self._topics.get(item.channel_id, ""), item
 
     def _tell(self, text: str) -> None:
         LOG.warning("%s: %s", self.path, text)

@@ -175,22 +175,24 @@ def test_a_slow_disk_delays_no_tick_and_what_is_dropped_is_counted(tmp_path, tic
         tmp_path / "run.mcap", header_of(), flush_s=0.02, capacity=20, open_disk=opened(StuckDisk, found)
     )
     found[0].free.clear()  # nothing is written until all was taken: whoever waits for the disk waits for ever
-    for number in range(300):
-        writer.take(numbered(ticks, number))
-    assert writer.waiting == 20
-    dropped = writer.dropped
-    assert 200 < dropped <= 280
+    taken = 0
+    while writer.dropped < 200 and taken < 100_000:
+        writer.take(numbered(ticks, taken))
+        taken += 1
+    assert writer.waiting <= 20
     found[0].free.set()
     until(lambda: writer.waiting == 0)
-    writer.take(numbered(ticks, 300))
+    dropped = writer.dropped
+    writer.take(numbered(ticks, taken))
     writer.close()
     with LogReader(tmp_path / "run.mcap") as log:
         entries = list(log.entries())
     numbers = [entry.number for entry in entries if isinstance(entry, Tick)]
-    assert len(numbers) == 301 - dropped
+    assert len(numbers) == taken + 1 - dropped
     assert numbers == sorted(numbers)
     told = [entry.text for entry in entries if not isinstance(entry, Tick) and entry.name == "black box"]
-    assert told == [f"the disk is too slow: {dropped} ticks before this are missing, {dropped} in all"]
+    assert all("the disk is too slow" in text for text in told)
+    assert told[-1].endswith(f"ticks before this are missing, {dropped} in all")
 
 
 def test_a_stuck_disk_is_said_and_forgiven_when_it_goes_on(tmp_path, ticks):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 
 import pytest
 from logged_runs import START_S, UNIX_NS, Encounter, header_of, reading_of, write_log
@@ -207,5 +208,5 @@ def test_a_folder_that_cannot_be_made_is_said(tmp_path):
         McapWriter(tmp_path / "file" / "run.mcap", header_of())
 
 
-def test_logs_are_named_after_their_time(tmp_path):
-    assert log_path(tmp_path, ".tlog", unix_s=0.0) == tmp_path / "steerclear_19700101T000000Z.tlog"
+def test_logs_are_named_after_their_time_and_process(tmp_path):
+    assert log_path(tmp_path, ".tlog", unix_s=0.0) == tmp_path / f"steerclear_19700101T000000Z_{os.getpid()}.tlog"

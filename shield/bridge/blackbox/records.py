@@ -1,0 +1,93 @@
+"""Records of an MCAP file as far as they can be read, whole or cut off, sound or damaged."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.writer import Writer
+from zstandard import ZstdError
+
+from ...exceptions import LogError
+from .disk import Disk
+
+LARGEST_RECORD = 64 << 20
+"""Longer records than this are damage, bytes."""
+
+_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
+
+Tell = Callable[[str], None]
+
+
+def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
+    """Schemas, channels, messages and, when the file was closed properly, its footer; chunks taken apart.
+
+    Args:
+        file: at its beginning.
+        tell: gets a text about each part that cannot be read; nothing is raised for them.
+    """
+    try:
+        for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
+            if isinstance(item, Chunk):
+                yield from _parts(item, tell)
+            elif isinstance(item, (Schema, Channel, Message, Footer)):
+                yield item
+    except _DAMAGE as error:
+        tell(f"it ends in the middle of a record ({type(error).__name__})")
+
+
+def _parts(chunk: Chunk, tell: Tell) -> list[Any]:
+    try:
+        return list(breakup_chunk(chunk, validate_crc=True))
+    except _DAMAGE as error:
+        tell(f"{chunk.uncompressed_size} bytes are damaged and left out ({type(error).__name__})")
+        return []
+
+
+def mend(source: Path, target: Path) -> tuple[int, list[str]]:
+    """Write what can be read of a log as a whole file with an index, which viewers open that refuse a cut-off one.
+
+    Args:
+        source: the log.
+        target: new file.
+
+    Returns:
+        Messages written, and what could not be read.
+
+    Raises:
+        LogError: the log cannot be opened or holds nothing, or the file cannot be written.
+        BridgeError: the file cannot be made.
+    """
+    damage: list[str] = []
+    try:
+        with source.open("rb") as file:
+            return _copy(read_records(file, damage.append), target), damage
+    except OSError as error:
+        raise LogError(f"cannot mend {source} ({error.strerror}); check both paths and the room on the disk") from None
+
+
+def _copy(records: Iterator[Any], target: Path) -> int:
+    disk = Disk(target)
+    writer = Writer(disk)  # type: ignore[arg-type]
+    writer.start(library="steerclear")
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    count = 0
+    for item in records:
+        if isinstance(item, Schema) and item.id not in schemas:
+            schemas[item.id] = writer.register_schema(item.name, item.encoding, item.data)
+        elif isinstance(item, Channel) and item.id not in channels and item.schema_id in schemas:
+            channels[item.id] = writer.register_channel(item.topic, item.message_encoding, schemas[item.schema_id])
+        elif isinstance(item, Message) and item.channel_id in channels:
+            count += 1
+            writer.add_message(channels[item.channel_id], item.log_time, item.data, item.publish_time, item.sequence)
+            disk.flush()
+    writer.finish()
+    disk.flush()
+    disk.close()
+    return count
