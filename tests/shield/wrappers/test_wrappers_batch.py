@@ -120,9 +120,7 @@ def test_the_same_seed_plays_the_same_games():
 def test_actions_that_are_none_are_refused(kind, actions):
     games = batch(actions=kind)
     games.reset()
-    with pytest.raises(
-        PolicyError, match=r"give 12 discrete actions in 0\.\.16|give finite actions of shape \(12, 2\)"
-    ):
+    with pytest.raises(PolicyError, match=r"give (12 discrete actions in 0\.\.16|finite actions of shape \(12, 2\))"):
         games.step(actions)
 
 
@@ -164,7 +162,7 @@ def test_stable_baselines_gets_what_it_asks_for():
     assert first.tobytes() == again.reset().tobytes()
     assert env.observation_space.contains(first[0])
     assert env.action_space.high.tolist() == pytest.approx([env.batch.top_speed_mps, 180.0])
-    for step in range(1, 6):
+    for _ in range(5):
         _, rewards, done, infos = env.step(np.zeros((12, 2)))
     assert done.all()
     assert rewards.dtype == np.float32
