@@ -75,10 +75,13 @@ class Canvas:
         return not any((row, column + k) in self._letters for k in range(length))
 
     def _row(self, row: int) -> Text:
-        text = Text(no_wrap=True, end="")
+        letters = [chr(_BLANK + dots) for dots in self._dots[row].tolist()]
         for column in range(self.columns):
-            letter = self._letters.get((row, column)) or chr(_BLANK + int(self._dots[row, column]))
-            text.append(letter, self._palette[self._styles[row, column]])
+            letters[column] = self._letters.get((row, column), letters[column])
+        text = Text("".join(letters), no_wrap=True, end="")
+        ends = [*(np.flatnonzero(np.diff(self._styles[row])) + 1).tolist(), self.columns]
+        for start, end in zip([0, *ends], ends, strict=False):
+            text.stylize(self._palette[self._styles[row, start]], start, end)
         return text
 
     def _cell(self, place: tuple[float, float]) -> tuple[int | None, int | None]:

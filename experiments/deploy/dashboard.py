@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -16,7 +17,7 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Tick
 
 from .controls import Controls
-from .dashboard_view import Moment, View
+from .dashboard_view import SILENT_S, Moment, View
 from .keys import Keyboard
 
 logger = logging.getLogger(__name__)
@@ -31,6 +32,8 @@ LATE_OF = 100
 class Dashboard:
     """A `TickSink` that shows the latest tick, and takes keys. A thread draws, another listens to the keyboard.
 
+    It draws when a tick has come, so while the loop rests till the next, and when a key was pressed.
+
     Keys act at once and do not wait for the picture; when drawing fails, they go on.
 
     Args:
@@ -39,7 +42,7 @@ class Dashboard:
         clock: the loop's.
         console: where to draw; None: standard output.
         keyboard: descriptor of the terminal that keys come from; None: standard input.
-        refresh_hz: pictures a second.
+        refresh_hz: pictures a second, at most.
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class Dashboard:
         self._period_s = 1.0 / refresh_hz
         self._tick: Tick | None = None
         self._late_s: deque[float] = deque(maxlen=LATE_OF)
+        self._drawn_s = -math.inf
         self._wake = threading.Event()
         self._closing = False
         self._log = LogLines()
@@ -71,6 +75,8 @@ class Dashboard:
         """Show this tick from the next picture on."""
         self._tick = tick
         self._late_s.append(tick.began_s - tick.due_s)
+        if time.monotonic() - self._drawn_s >= self._period_s:
+            self._wake.set()
 
     def press(self, key: str) -> None:
         """Act on a key."""
@@ -107,10 +113,10 @@ class Dashboard:
         try:
             with self._log, Live(console=self._console, screen=True, auto_refresh=False, redirect_stdout=False) as live:
                 while not self._closing:
-                    began_s = time.monotonic()
+                    self._drawn_s = time.monotonic()
                     size = self._console.size
                     live.update(self._view.of(self.moment(), size.width, size.height), refresh=True)
-                    self._wake.wait(max(0.0, self._period_s - (time.monotonic() - began_s)))
+                    self._wake.wait(max(self._period_s, SILENT_S))
                     self._wake.clear()
         except Exception:  # boats go on without a picture; the keys still work
             logger.exception("the dashboard cannot be drawn any more; keys still work: SPACE is STOP ALL")
