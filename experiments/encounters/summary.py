@@ -19,26 +19,39 @@ def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> flo
     return float(stats.beta.ppf(confidence, events + 1, trials - events))
 
 
+QUANTILES = np.linspace(0.0, 1.0, 101)
+
+
 def summarise(columns: Columns) -> dict[str, Any]:
     """Figures over encounters.
 
     Returns:
         JSON-ready; `keys.CELL_KEYS` describes them.
     """
+    return {
+        "encounters": len(columns["closest_m"]),
+        **_breach_figures(columns),
+        **_distance_figures(columns),
+        **_change_figures(columns),
+        **_course_figures(columns),
+        "decision_us": float(np.median(columns["decision_us"])),
+        "decision_p999_us": float(columns["decision_p999_us"].max()),
+    }
+
+
+def _breach_figures(columns: Columns) -> dict[str, Any]:
+    """How many encounters were breached, what the oracle says of them, and how many of these started outside."""
     n = len(columns["closest_m"])
     breached = (columns["breaches_teammate"] + columns["breaches_opponent"]) > 0
+    bare = columns["unshielded_breaches_teammate"] + columns["unshielded_breaches_opponent"] > 0
     avoidable, unjudged = columns["avoidable"] > 0, breached & (columns["not_judged"] > 0)
     open_, outside = unjudged & ~avoidable, columns["start_certificate_m"] >= 0.0
     settled = breached & ~avoidable & ~open_
     unavoidable = settled & (columns["unavoidable"] > 0)
-    goal, bare = columns["goal_s"].sum(), columns["unshielded_goal_s"].sum()
     return {
-        "encounters": n,
         "breached": int(breached.sum()),
         "breached_upper": upper_bound(int(breached.sum()), n),
-        "unshielded_breached": int(
-            (columns["unshielded_breaches_teammate"] + columns["unshielded_breaches_opponent"] > 0).sum()
-        ),
+        "unshielded_breached": int(bare.sum()),
         "avoidable": int(avoidable.sum()),
         "avoidable_upper": upper_bound(int((avoidable | open_).sum()), n),
         "unavoidable": int(unavoidable.sum()),
@@ -50,24 +63,36 @@ def summarise(columns: Columns) -> dict[str, Any]:
         "breaches_outside_upper": upper_bound(int((breached & outside).sum()), int(outside.sum())),
         "breaches_teammate": int(columns["breaches_teammate"].sum()),
         "breaches_opponent": int(columns["breaches_opponent"].sum()),
+    }
+
+
+def _distance_figures(columns: Columns) -> dict[str, Any]:
+    return {
         "closest_m": float(columns["closest_m"].min()),
         "closest_quantiles_m": np.quantile(columns["closest_m"], QUANTILES).tolist(),
         "unshielded_closest_quantiles_m": np.quantile(columns["unshielded_closest_m"], QUANTILES).tolist(),
+    }
+
+
+def _change_figures(columns: Columns) -> dict[str, Any]:
+    return {
         "changed_percent": 100.0 * float(columns["changed_share"].mean()),
         "heading_change_deg": _mean(columns["heading_change_deg"], columns["changed_share"]),
         "speed_change_mps": _mean(columns["speed_change_mps"], columns["changed_share"]),
+    }
+
+
+def _course_figures(columns: Columns) -> dict[str, Any]:
+    """What became of the way to the goal: time, arrival, deadlock, reversals, leaving the field."""
+    goal, bare = columns["goal_s"].sum(), columns["unshielded_goal_s"].sum()
+    return {
         "goal_time_ratio": float(goal / bare) if bare > 0 else None,
         "reached_percent": 100.0 * float(columns["reached"].mean()),
         "deadlocked": int((columns["deadlocks"] > 0).sum()),
         "reversals_per_min": float(columns["reversals_per_min"].mean()),
         "unshielded_reversals_per_min": float(columns["unshielded_reversals_per_min"].mean()),
         "outside_m": float(columns["outside_m"].max()),
-        "decision_us": float(np.median(columns["decision_us"])),
-        "decision_p999_us": float(columns["decision_p999_us"].max()),
     }
-
-
-QUANTILES = np.linspace(0.0, 1.0, 101)
 
 
 def _mean(values: np.ndarray, weights: np.ndarray) -> float | None:

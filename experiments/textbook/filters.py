@@ -103,22 +103,31 @@ def _answer(
 
 
 @kernel
+def _ask(
+    setup: Setup, state: Array, wanted: Array, ours: BoolArray, slot: IntArray, unit: Array, corner_deg: Array
+) -> Array:
+    """Write each own boat's place in the program, units and wanted course; returns the wanted inputs of them all."""
+    start, own = np.zeros(2 * state.shape[0]), 0
+    for i in range(state.shape[0]):
+        slot[i] = own if ours[i] else -1
+        if ours[i]:
+            one, two, unit[i, 0], unit[i, 1] = wanted_inputs(setup, state[i], wanted[i], i)
+            start[2 * own], start[2 * own + 1] = one, two
+            corner_deg[i] = state[i, L.HEADING] + wanted[i, 1]
+            own += 1
+    return start[: 2 * own]
+
+
+@kernel
 def decide_game(
     setup: Setup, state: Array, wanted: Array, ours: BoolArray, sent: Array, reason: IntArray, clear_m: Array
 ) -> None:
     """Decide for the boats of ours; ``sent`` starts as ``wanted``, ``reason`` as `PASSED`, ``clear_m`` as inf."""
     n = state.shape[0]
-    slot, own = np.full(n, -1), 0
-    unit, start, corner_deg = np.ones((n, 2)), np.zeros(2 * n), np.zeros(n)
-    for i in range(n):
-        if ours[i]:
-            slot[i] = own
-            one, two, unit[i, 0], unit[i, 1] = wanted_inputs(setup, state[i], wanted[i], i)
-            start[2 * own], start[2 * own + 1] = one, two
-            corner_deg[i] = state[i, L.HEADING] + wanted[i, 1]
-            own += 1
-    z0 = start[: 2 * own]
-    rows, need, pair = np.zeros((own * n, 2 * own)), np.zeros(own * n), np.zeros((own * n, 2), np.int64)
+    slot, unit, corner_deg = np.empty(n, np.int64), np.ones((n, 2)), np.zeros(n)
+    z0 = _ask(setup, state, wanted, ours, slot, unit, corner_deg)
+    most = z0.size // 2 * n
+    rows, need, pair = np.zeros((most, z0.size)), np.zeros(most), np.zeros((most, 2), np.int64)
     count = _barrier_rows(setup, state, unit, slot, rows, need, pair, clear_m)
     if holds(rows[:count], need[:count], z0, SAME):
         return
@@ -129,21 +138,10 @@ def decide_game(
     for r in range(count):
         for i in pair[r]:
             met[i], loose[i] = True, loose[i] or slack[r] > SAME
-    for i in range(n):
-        if met[i]:
-            k = 2 * slot[i]
-            reason[i] = _answer(
-                setup,
-                state[i],
-                wanted[i],
-                i,
-                z0[k : k + 2],
-                z[k : k + 2],
-                unit[i],
-                status,
-                loose[i],
-                sent[i],
-            )
+    for i in np.flatnonzero(met):
+        k = 2 * slot[i]
+        start, answer = z0[k : k + 2], z[k : k + 2]
+        reason[i] = _answer(setup, state[i], wanted[i], i, start, answer, unit[i], status, loose[i], sent[i])
 
 
 @kernel
