@@ -12,6 +12,8 @@ DRIFT = 1e-4
 """The boat's clock may run this much faster or slower than ours, s per s."""
 AHEAD_S = 0.5
 """A time since boot this much later than can be is doubted."""
+SYNCED_AHEAD_S = 0.1
+"""The same once a round trip says what can be."""
 BEHIND_S = 2.0
 """So is one this much earlier than the latest: a restart, or a packet that was long under way."""
 BELIEVED_AFTER = 5
@@ -93,8 +95,10 @@ class BoatClock:
 
     def _is_odd(self, boot_s: float, difference: float) -> bool:
         """Earlier than the latest by far, or much quicker than any before, and than the round trip allows."""
-        least_s = self._middle_s - 0.5 * self._trip_s if math.isfinite(self._trip_s) else self._quickest_s
-        return difference < least_s - AHEAD_S or boot_s < self._latest_boot_s - BEHIND_S
+        least_s = self._quickest_s - AHEAD_S
+        if math.isfinite(self._trip_s):
+            least_s = self._middle_s - 0.5 * self._trip_s - SYNCED_AHEAD_S
+        return difference < least_s or boot_s < self._latest_boot_s - BEHIND_S
 
     def _believe(self, difference: float) -> bool:
         if self._doubts and abs(difference - self._doubts[-1]) > AHEAD_S:

@@ -32,23 +32,25 @@ class Framer:
     def __init__(self, datagrams: bool) -> None:
         self._datagrams = datagrams
         self._rest = b""
+        self._end = 0  # where the frame before ended, in what comes next
         self.damaged = 0
         self.unknown = 0
 
     def feed(self, data: bytes) -> list[bytes]:
         """The whole frames these bytes complete, in order."""
-        if self._datagrams and self._rest and _measure(data, 0) > 0:
+        if self._datagrams and self._rest and _measure(data, 0, False) > 0:
             self._rest = b""
             self.damaged += 1
         buffer = self._rest + data
         frames: list[bytes] = []
-        at, kept = 0, -1
+        at, kept, end = 0, -1, self._end
         while (found := _MARKERS.search(buffer, at)) is not None:
             at = found.start()
-            length = _measure(buffer, at)
+            length = _measure(buffer, at, at == end)
             if length > 0:
                 self._keep(buffer[at : at + length], frames)
-                at, kept = at + length, -1
+                end = at = at + length
+                kept = -1
                 continue
             if length == _SHORT:
                 kept = at if kept < 0 else kept
@@ -58,6 +60,7 @@ class Framer:
                 self.damaged += 1
             at += 1
         self._rest = buffer[kept:] if kept >= 0 else b""
+        self._end = 0 if self._datagrams or kept == end or end == len(buffer) else -1
         return frames
 
     def _keep(self, frame: bytes, frames: list[bytes]) -> None:
@@ -77,8 +80,14 @@ def source(frame: bytes) -> tuple[int, int]:
     return (frame[5], frame[6]) if frame[0] == _MARKER_2 else (frame[3], frame[4])
 
 
-def _measure(buffer: bytes, at: int) -> int:
-    """Length of the right frame that begins here; `_SHORT` when its end is not there yet, `_BAD` when it is none."""
+def _measure(buffer: bytes, at: int, follows: bool) -> int:
+    """Length of the right frame that begins here; `_SHORT` when its end is not there yet, `_BAD` when it is none.
+
+    Args:
+        buffer: bytes.
+        at: where a marker is.
+        follows: a frame ended just before: only there an unknown message is taken for one, whose checksum nobody knows.
+    """
     if len(buffer) - at < 3:
         return _SHORT if len(buffer) > at and buffer[at] in _HEADER else _BAD
     header = _HEADER.get(buffer[at])
@@ -92,14 +101,14 @@ def _measure(buffer: bytes, at: int) -> int:
     length = header + buffer[at + 1] + _CHECKSUM + signed
     if len(buffer) - at < length:
         return _SHORT
-    return length if _is_right(buffer, at, header + buffer[at + 1], at + length) else _BAD
+    return length if _is_right(buffer, at, header + buffer[at + 1], at + length, follows) else _BAD
 
 
-def _is_right(buffer: bytes, at: int, covered: int, end: int) -> bool:
-    """Whether the checksum is; of messages we do not know, whether another frame or nothing follows."""
+def _is_right(buffer: bytes, at: int, covered: int, end: int, follows: bool) -> bool:
+    """Whether the checksum is; of messages we do not know, whether it stands between frames."""
     kind = mavlink.mavlink_map.get(message_id(buffer[at : at + 10]))
     if kind is None:
-        return end == len(buffer) or buffer[end] in _HEADER
+        return follows and (end == len(buffer) or buffer[end] in _HEADER)
     checksum = mavlink.x25crc(buffer[at + 1 : at + covered])
     checksum.accumulate(bytes([kind.crc_extra]))
     return checksum.crc == int.from_bytes(buffer[at + covered : at + covered + _CHECKSUM], "little")

@@ -22,7 +22,7 @@ class LinkHealth:
     Attributes:
         boat: its name.
         address: where it is heard from.
-        rates_hz: arrivals of each message asked for, by name, over the last 2 s.
+        rates_hz: arrivals of each message asked for, by name.
         missing: needed messages that do not arrive at the rate asked for, in words; empty: all do.
         round_trips_s: of the last TIMESYNC answers, s, newest last.
         shortest_delay_s: what the quickest telemetry took, s; 0 while no round trip is known.

@@ -49,9 +49,7 @@ class SerialWire:
             termios.tcflush(made, termios.TCIOFLUSH)
         except termios.error as error:
             os.close(made)
-            raise LinkError(
-                f"link {self._address}: {self._address.host} is no serial port ({error}); name one"
-            ) from None
+            raise LinkError(f"link {self._address}: that is no serial port ({error.args[-1]}); name one") from None
         self._descriptor, self._pending = made, b""
 
     def _speed(self) -> int:

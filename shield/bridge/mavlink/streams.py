@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import deque
 from collections.abc import Mapping
 from typing import Any
@@ -15,8 +14,9 @@ HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 GPS = int(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
 TIME = int(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
 
-WINDOW_S = 2.0
-"""Rates are counted over this."""
+WINDOW_S = 1.0
+WINDOW_MESSAGES = 10
+"""Rates are counted over the longer of a second and the time so many messages should take."""
 ENOUGH = 0.8
 """Share of the rate asked for that must arrive."""
 _ASK_AGAIN_S = 2.0
@@ -34,7 +34,8 @@ class Streams:
     def __init__(self, rate_hz: float) -> None:
         self.needed: Mapping[int, float] = {POSITION: rate_hz, ATTITUDE: rate_hz}
         self._extra: Mapping[int, float] = {HEARTBEAT: min(4.0, rate_hz), GPS: 2.0, TIME: 1.0}
-        self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in (*self.needed, *self._extra)}
+        self._wanted_hz = {**self.needed, **self._extra}
+        self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in self._wanted_hz}
         self._asked_s: dict[int, float] = {}
         self._tries: dict[int, int] = dict.fromkeys(self._extra, 0)
 
@@ -45,18 +46,13 @@ class Streams:
             arrivals.append(received_s)
 
     def rate_hz(self, message_id: int, now_s: float) -> float:
-        """How often a message came over the last `WINDOW_S`, Hz."""
-        return sum(1 for at in self._arrivals[message_id] if 0.0 <= now_s - at < WINDOW_S) / WINDOW_S
+        """How often a message came lately, Hz."""
+        window_s = max(WINDOW_S, WINDOW_MESSAGES / self._wanted_hz[message_id])
+        return sum(1 for at in self._arrivals[message_id] if 0.0 <= now_s - at < window_s) / window_s
 
     def rates_hz(self, now_s: float) -> dict[str, float]:
         """The same of all messages asked for, by name."""
         return {mavlink.mavlink_map[key].msgname: self.rate_hz(key, now_s) for key in self._arrivals}
-
-    def longest_gap_s(self, message_id: int, now_s: float) -> float:
-        """Longest silence over the last `WINDOW_S`, s."""
-        times = [at for at in self._arrivals[message_id] if now_s - at < WINDOW_S]
-        edges = [now_s - WINDOW_S, *times, now_s]
-        return max(later - sooner for sooner, later in itertools.pairwise(edges))
 
     def missing(self, now_s: float) -> str:
         """What of the needed does not arrive at the rate asked for, in words; empty when all does."""

@@ -18,7 +18,7 @@ class FakeBoat:
     What it does is in plain attributes that tests change while it runs.
     """
 
-    def __init__(self, send_to=None, *, system_id=1, key=None):
+    def __init__(self, send_to=None, *, system_id=1, key=None, speed=1.0):
         self.system_id = system_id
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
@@ -32,7 +32,8 @@ class FakeBoat:
         self.reader.robust_parsing = True
         self.vehicle, self.autopilot = mavlink.MAV_TYPE_SURFACE_BOAT, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
         self.mode, self.armed = 0, False
-        self.parameters = {"WP_SPEED": 2.0, "FS_GCS_ENABLE": 0.0}
+        self.parameters = {"WP_SPEED": 2.0, "FS_GCS_ENABLE": 0.0, "GUID_TIMEOUT": 3.0, "SYSID_MYGCS": 255.0}
+        self.parameters |= {"SYSID_ENFORCE": 0.0, "ARMING_CHECK": 1.0}
         self.version, self.capabilities = (4, 6, 0), 64 | 128 | 8192
         self.refuses_mode = self.refuses_arming = ""
         self.answers, self.speaks = True, True
@@ -44,18 +45,23 @@ class FakeBoat:
         self.intervals = {}
         self.heard = []
         self._sent = {}
-        self._began = time.monotonic()
+        self.pace = speed
+        self._began = self.now_s()
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
+    def now_s(self):
+        """Time on the clock of a link with the same speed."""
+        return time.monotonic() * self.pace
+
     @property
     def uptime_s(self):
-        return time.monotonic() - self._began + 100.0
+        return self.now_s() - self._began + 100.0
 
     def reboot(self):
         """Begin again: its clock near zero, nothing asked of it remembered."""
-        self._began = time.monotonic() + 95.0
+        self._began = self.now_s() + 95.0
         self.mode, self.armed = 0, False
         self.intervals.clear()
 
@@ -106,12 +112,12 @@ class FakeBoat:
         self.socket.close()
 
     def _run(self):
-        last = time.monotonic()
+        last = self.now_s()
         while not self._ending.is_set():
             ready, _, _ = select.select([self.socket], [], [], TICK_S)
             if ready:
                 self._receive()
-            now = time.monotonic()
+            now = self.now_s()
             self._move(now - last)
             last = now
             if self.speaks:
@@ -124,9 +130,12 @@ class FakeBoat:
                 self._periodic(message, self.intervals[message], now, send)
 
     def _periodic(self, key, interval, now, send):
-        if now - self._sent.get(key, 0.0) >= interval:
-            self._sent[key] = now
+        """Send what is due; what a slow machine left out by more than a few times is not made up for."""
+        due = max(self._sent.get(key, 0.0), now - 5.0 * interval)
+        while now - due >= interval:
+            due += interval
             send()
+        self._sent[key] = due
 
     def _move(self, dt):
         self.latitude += math.degrees(self.speed * math.cos(self.yaw) * dt / 6.37e6)

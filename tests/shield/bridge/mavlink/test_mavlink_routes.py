@@ -41,7 +41,7 @@ def test_attitude_says_the_heading_and_a_share_of_the_top_speed(heading, speed):
     assert apart(2 * math.atan2(got.q[3], got.q[0]), heading) < 1e-6
     assert got.thrust * 2.0 == encoded.speed_mps == pytest.approx(max(-2.0, min(2.0, speed)), abs=1e-6)
     assert apart(encoded.heading_rad, heading) < 1e-6
-    assert 0.0 <= encoded.heading_rad < 2 * math.pi
+    assert 0.0 <= encoded.heading_rad <= 2 * math.pi
 
 
 @given(headings, speeds)

@@ -1,0 +1,83 @@
+"""Somebody else at the helm is noticed and named."""
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.bridge.mavlink.commanders import SAY_AGAIN_S, Commanders
+
+OURS = (255, 191)
+
+
+def of(message, system=252, component=190):
+    message._header.srcSystem, message._header.srcComponent = system, component
+    return message
+
+
+def watching():
+    return Commanders("blue_1", 1, OURS)
+
+
+def command(number, target=1):
+    return mavlink.MAVLink_command_long_message(target, 1, number, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+STEERING = [
+    mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1, 0, 0, 0], 0, 0, 0, 0.5),
+    mavlink.MAVLink_set_mode_message(1, 1, 0),
+    mavlink.MAVLink_rc_channels_override_message(1, 1, 1500, 0, 0, 0, 0, 0, 0, 0),
+    mavlink.MAVLink_param_set_message(1, 1, b"WP_SPEED", 5.0, 9),
+    command(mavlink.MAV_CMD_DO_SET_MODE),
+    command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM),
+]
+
+
+@pytest.mark.parametrize("message", STEERING, ids=lambda m: m.get_type())
+def test_whoever_steers_our_boat_is_a_second_commander(message):
+    watch = watching()
+    fault, text = watch.hear_foreign(of(message), 5.0)
+    assert fault == "second_commander"
+    assert "blue_1: a second commander (system 252, component 190)" in text
+    assert "end it" in text
+    assert watch.heard_s == 5.0
+
+
+def test_what_is_for_another_boat_or_asks_for_nothing_is_left():
+    watch = watching()
+    for message in (
+        command(mavlink.MAV_CMD_DO_SET_MODE, target=2),
+        command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL),
+        mavlink.MAVLink_param_request_read_message(1, 1, b"WP_SPEED", -1),
+        mavlink.MAVLink_heartbeat_message(11, 3, 1, 0, 4, 3),
+    ):
+        assert watch.hear_foreign(of(message), 1.0) == ("", "")
+
+
+def test_another_ground_station_is_named_once_in_a_while():
+    watch, beat = watching(), mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+    assert watch.hear_foreign(of(beat), 0.0) == (
+        "",
+        "blue_1: another ground station (system 252, component 190) is on this link; see that it does not command",
+    )
+    assert watch.hear_foreign(of(beat), 1.0) == ("", "")
+    assert watch.hear_foreign(of(beat), SAY_AGAIN_S + 1.0)[1]
+    assert "our own ids" in watch.hear_foreign(of(beat, *OURS), 2.0)[1]
+    assert watch.stations == {(252, 190), OURS}
+
+
+def test_an_answer_to_somebody_else_gives_him_away():
+    watch = watching()
+
+    def answer(command, system, component):
+        return mavlink.MAVLink_command_ack_message(command, 0, 0, 0, system, component)
+
+    mode = mavlink.MAV_CMD_DO_SET_MODE
+    assert watch.hear_answer(answer(mode, *OURS), 1.0) == ("", "")
+    assert watch.hear_answer(answer(mode, 0, 0), 1.0) == ("", ""), "older firmware names nobody"
+    assert watch.hear_answer(answer(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 252, 190), 1.0) == ("", "")
+    assert watch.hear_answer(answer(mode, 252, 190), 1.0)[0] == "second_commander"
+
+
+def test_a_crowd_of_stations_does_not_fill_memory():
+    watch, beat = watching(), mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+    for i in range(5000):
+        watch.hear_foreign(of(beat, i % 255, i // 255), float(i))
+    assert len(watch._said_s) <= 300

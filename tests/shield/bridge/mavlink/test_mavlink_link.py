@@ -1,0 +1,335 @@
+"""`MavlinkLink` against a boat of the tests' own: connect, prepare, command, leave, and what can go wrong at each."""
+
+import contextlib
+import math
+
+import pytest
+from fake_boat import FakeBoat, wait_for
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.link import NEVER_S
+from steerclear.shield.bridge.mavlink.endpoint import Endpoint
+from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.mavlink.routes import ROUTES
+from steerclear.shield.bridge.mavlink.signing import Signing
+from steerclear.shield.exceptions import LinkError, LinkRefused
+
+FRAME = FieldFrame(42.0, -71.0, 30.0)
+TURN = 2.0 * math.pi
+SPEED = 4.0
+
+
+@contextlib.contextmanager
+def linked(*, prepared=True, signing=None, boat_key=None, rate_hz=10.0, route="auto", **boat):
+    """A boat and its link, connected and prepared if asked for; four times as fast as real time."""
+    clock = MonotonicClock(SPEED)
+    endpoint = Endpoint("udpin:127.0.0.1:0", clock, signing=signing)
+    endpoint.open()
+    with FakeBoat(endpoint.port, key=boat_key, speed=SPEED) as fake:
+        for name, value in boat.items():
+            setattr(fake, name, value)
+        link = MavlinkLink("blue_1", endpoint, 1, FRAME, clock, rate_hz=rate_hz, route=route)
+        try:
+            if prepared:
+                link.connect(20.0)
+                link.prepare(20.0)
+            yield fake, link
+        finally:
+            link.release()
+            endpoint.close()
+
+
+def test_from_nothing_to_steering_to_hold():
+    with linked() as (boat, link):
+        reading = link.read()
+        assert reading.ready, reading.why_not
+        assert (boat.mode, boat.armed, reading.mode) == (15, True, "GUIDED")
+        assert math.isfinite(reading.position_m[0])
+        sent = link.send(1.0, 1.5)
+        assert (sent.delivered, sent.route) == (True, "SET_ATTITUDE_TARGET")
+        assert sent.heading_rad == pytest.approx(1.0, abs=1e-6)
+        assert sent.speed_mps == pytest.approx(1.5, abs=1e-6)
+        assert wait_for(lambda: boat.targets)
+        assert boat.yaw == pytest.approx(1.0 + math.radians(30.0), abs=1e-6), "headings are the field's, courses true"
+        assert wait_for(lambda: link.read().speed_mps > 1.4)
+        assert link.read().course_rad == pytest.approx(1.0, abs=0.02)
+        assert link.close() == "blue_1: in HOLD, speed 0.0 m/s"
+        assert boat.mode == 4
+        assert "not connected" in link.close()
+
+
+def test_the_field_is_where_the_boat_says():
+    with linked(prepared=False, latitude=42.0002, longitude=-70.9996) as (_, link):
+        link.connect(20.0)
+        assert wait_for(lambda: math.isfinite(link.read().position_m[0]))
+        assert link.read().position_m == pytest.approx(FRAME.to_field_m(42.0002, -70.9996), abs=0.03)
+        assert link.read().heading_rad == pytest.approx((0.5 - math.radians(30.0)) % TURN, abs=1e-3)
+
+
+def test_velocity_route_by_name_steers_too():
+    with linked(route=ROUTES[1]) as (boat, link):
+        sent = link.send(2.0, 1.0)
+        assert sent.route == "SET_POSITION_TARGET_LOCAL_NED"
+        assert wait_for(lambda: boat.speed > 0.9)
+        assert boat.yaw % TURN == pytest.approx(2.0 + math.radians(30.0), abs=1e-5)
+
+
+def test_nothing_is_sent_that_is_no_number_and_nothing_before_prepare():
+    with linked(prepared=False) as (boat, link):
+        link.connect(20.0)
+        sent = link.send(1.0, 1.0)
+        assert (sent.delivered, "not prepared" in sent.route) == (False, True)
+        for heading, speed in ((math.nan, 1.0), (1.0, math.inf), (-math.inf, 0.0)):
+            with pytest.raises(LinkError, match="give finite numbers"):
+                link.send(heading, speed)
+        assert not boat.targets
+
+
+def test_speeds_are_limited_to_what_the_boat_takes_and_said_so():
+    with linked() as (_, link):
+        assert link.send(0.0, 1e9).speed_mps == pytest.approx(2.0)
+        assert link.send(0.0, -1e9).speed_mps == pytest.approx(-2.0)
+
+
+def test_a_silent_boat_is_told_from_one_that_is_refused():
+    with (
+        linked(prepared=False, speaks=False) as (_, link),
+        pytest.raises(LinkError, match=r"no heartbeat of system id 1 on udpin.*check power, radio, address"),
+    ):
+        link.connect(0.3)
+    with (
+        linked(prepared=False, signing=Signing(bytes(32))) as (_, link),
+        pytest.raises(LinkError, match=r"refused: .* unsigned; give both sides the same key"),
+    ):
+        link.connect(0.6)
+
+
+def test_signed_boats_are_steered():
+    key = bytes(range(32))
+    with linked(signing=Signing(key), boat_key=key) as (boat, link):
+        assert link.send(0.0, 1.0).delivered
+        assert wait_for(lambda: boat.targets)
+        assert link.health().signs
+
+
+def test_a_boat_that_is_none_is_refused():
+    with (
+        linked(prepared=False, vehicle=mavlink.MAV_TYPE_QUADROTOR) as (_, link),
+        pytest.raises(LinkError, match="it is a MAV_TYPE_QUADROTOR, not a boat"),
+    ):
+        link.connect(20.0)
+    with (
+        linked(prepared=False, autopilot=mavlink.MAV_AUTOPILOT_PX4) as (_, link),
+        pytest.raises(LinkError, match="its autopilot is MAV_AUTOPILOT_PX4, not ArduPilot"),
+    ):
+        link.connect(20.0)
+
+
+def test_streams_that_do_not_come_are_named():
+    with (
+        linked(prepared=False, rates_given=False) as (_, link),
+        pytest.raises(LinkError, match=r"sends GLOBAL_POSITION_INT at 0.0 of 10 Hz, ATTITUDE .*lower rate_hz"),
+    ):
+        link.connect(1.0)
+
+
+def test_a_refusal_to_arm_carries_the_boats_own_words():
+    with linked(prepared=False, refuses_arming="PreArm: Compass not calibrated") as (boat, link):
+        link.connect(20.0)
+        with pytest.raises(LinkRefused, match=r"blue_1 refuses arming \(failed\): .*Compass not calibrated; put that"):
+            link.prepare(1.5)
+        assert not boat.armed
+        arms = [m for m in boat.heard if m.get_type() == "COMMAND_LONG" and m.command == 400]
+        assert arms
+        assert all(m.param2 == 0 for m in arms), "never forced"
+
+
+def test_a_boat_still_booting_is_asked_again():
+    with linked(prepared=False, refuses_arming="PreArm: AHRS: not using configured AHRS type") as (boat, link):
+        link.connect(20.0)
+        boat.refuses_arming = "PreArm: AHRS"
+
+        class Later(str):
+            asked = 0
+
+            def __bool__(self):
+                Later.asked += 1
+                return Later.asked < 3
+
+        boat.refuses_arming = Later("PreArm: AHRS: not using configured AHRS type")
+        link.prepare(30.0)
+        assert boat.armed
+        assert link.read().ready
+
+
+def test_a_refused_mode_and_no_answer_at_all_are_told_apart():
+    with linked(prepared=False, refuses_mode="Mode change to GUIDED failed: requires position") as (_, link):
+        link.connect(20.0)
+        with pytest.raises(LinkRefused, match=r"refuses GUIDED .*requires position"):
+            link.prepare(1.0)
+    with linked(prepared=False) as (boat, link):
+        link.connect(20.0)
+        link.learn(20.0)
+        boat.answers = False
+        with pytest.raises(LinkError, match="no answer to the request for GUIDED; check the radio"):
+            link.prepare(1.0)
+
+
+def test_a_boat_that_would_not_move_is_refused():
+    with linked(prepared=False, parameters={"WP_SPEED": 0.0}) as (_, link):
+        link.connect(20.0)
+        with pytest.raises(LinkRefused, match="WP_SPEED is 0"):
+            link.prepare(10.0)
+
+
+def test_preparing_without_connecting_is_refused():
+    with linked(prepared=False) as (_, link):
+        with pytest.raises(LinkError, match="call connect first"):
+            link.prepare(1.0)
+        assert link.read().age_s == NEVER_S
+        assert link.read().why_not == "nothing heard yet"
+        assert "not connected" in link.close()
+
+
+@pytest.mark.parametrize(
+    "changes", [{"rate_hz": 0.0}, {"rate_hz": 41.0}, {"rate_hz": math.nan}, {"route": "BODY_NED"}, {"system_id": 0}]
+)
+def test_settings_that_are_none_are_refused(changes):
+    clock = MonotonicClock()
+    endpoint = Endpoint("udpin:127.0.0.1:0", clock)
+    system_id = changes.pop("system_id", 1)
+    with pytest.raises(LinkError, match="give"):
+        MavlinkLink("blue_1", endpoint, system_id, FRAME, clock, **changes)
+
+
+def test_a_hand_that_takes_over_is_noticed_and_not_fought():
+    with linked() as (boat, link):
+        link.read()
+        boat.mode = 0
+        assert wait_for(lambda: not link.read().ready)
+        readings = [link.read() for _ in range(3)]
+        assert all("it is in MANUAL" in reading.why_not for reading in readings)
+        assert boat.mode == 0
+        assert "left alone, armed in MANUAL" in link.close()
+        assert boat.mode == 0
+
+
+def test_a_taken_over_boat_is_a_fault_once_with_a_text():
+    with linked() as (boat, link):
+        link.read()
+        boat.mode = 4
+        faults, texts = {}, []
+
+        def seen():
+            reading = link.read()
+            faults.update(reading.faults)
+            texts.extend(reading.texts)
+            return "mode_changed" in faults
+
+        assert wait_for(seen)
+        assert faults["mode_changed"] == 1
+        assert any("switched it to HOLD" in text for text in texts)
+        boat.mode = 15
+        assert wait_for(lambda: link.read().ready), "handed back, it obeys again"
+        boat.armed = False
+        assert wait_for(lambda: "disarmed" in link.read().why_not)
+
+
+def test_a_changed_top_speed_is_used_at_once():
+    with linked() as (boat, link):
+        assert link.send(0.0, 1.0).speed_mps == pytest.approx(1.0)
+        boat.parameters["WP_SPEED"] = 4.0
+        boat.send_parameter("WP_SPEED")
+        assert wait_for(lambda: link.autopilot.route.top_mps == 4.0)
+        boat.targets.clear()
+        link.send(0.0, 1.0)
+        assert wait_for(lambda: boat.targets)
+        assert boat.targets[-1].thrust == pytest.approx(0.25)
+        boat.parameters["WP_SPEED"] = 0.0
+        boat.send_parameter("WP_SPEED")
+        assert wait_for(lambda: not link.read().ready)
+        assert not link.send(0.0, 1.0).delivered
+
+
+def test_a_silent_boat_grows_old_and_is_ready_no_more():
+    with linked() as (boat, link):
+        boat.speaks = False
+        assert wait_for(lambda: link.read().age_s > 0.5)
+        assert wait_for(lambda: "no heartbeat" in link.read().why_not)
+        boat.speaks = True
+        assert wait_for(lambda: link.read().ready and link.read().age_s < 0.5)
+
+
+def test_streams_are_asked_for_again_after_a_restart():
+    with linked() as (boat, link):
+        boat.reboot()
+        assert wait_for(lambda: not link.read().ready)
+        texts = []
+        assert wait_for(lambda: texts.extend(link.read().texts) or any("restarted" in text for text in texts), 20.0)
+        assert wait_for(lambda: link.read().age_s < 0.5, 20.0)
+        assert "MANUAL" in link.read().why_not
+        link.prepare(20.0)
+        assert link.read().ready
+
+
+def test_stopping_never_needs_anything_and_never_raises():
+    with linked(prepared=False) as (boat, link):
+        assert not link.stop().delivered
+        link.connect(20.0)
+        boat.mode, boat.armed = 15, True
+        sent = link.stop()
+        assert sent.delivered
+        assert wait_for(lambda: boat.targets)
+        assert boat.targets[-1].thrust == 0.0
+        link.endpoint.close()
+        assert not link.stop().delivered
+
+
+def test_a_stop_keeps_the_heading_it_has():
+    with linked() as (boat, link):
+        boat.obeys = False
+        boat.yaw = 1.25
+        assert wait_for(lambda: abs(link.autopilot.telemetry.heading[0] - 1.25) < 1e-3)
+        sent = link.stop()
+        assert sent.heading_rad == pytest.approx((1.25 - math.radians(30.0)) % TURN, abs=1e-3)
+        assert sent.speed_mps == 0.0
+
+
+def test_a_boat_that_does_not_stop_is_said_so(monkeypatch):
+    monkeypatch.setattr("steerclear.shield.bridge.mavlink.preparation.STOP_S", 0.5)
+    with linked() as (boat, link):
+        boat.obeys, boat.speed = False, 1.0
+        assert wait_for(lambda: link.read().speed_mps > 0.9)
+        assert link.close().endswith("in HOLD, speed 1.0 m/s; it was not seen to stop: watch it")
+
+
+def test_a_boat_that_cannot_be_held_is_said_so(monkeypatch):
+    monkeypatch.setattr("steerclear.shield.bridge.mavlink.preparation.HOLD_S", 0.5)
+    with linked() as (boat, link):
+        boat.refuses_mode = "no"
+        assert "HOLD not confirmed; its own time-out keeps it stopped" in link.close()
+        assert link.endpoint.is_open is False
+
+
+def test_health_says_what_the_link_knows():
+    with linked() as (boat, link):
+        assert wait_for(lambda: len(link.health().round_trips_s) > 3)
+        health = link.health()
+        assert health.version == (4, 6, 0)
+        assert health.parameters["WP_SPEED"] == 2.0
+        assert health.missing == ""
+        assert health.rates_hz["GLOBAL_POSITION_INT"] > 5.0
+        assert 0.0 <= min(health.round_trips_s) < 1.0
+        boat.send(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 0, 252, 190))
+        assert wait_for(lambda: math.isfinite(link.health().other_commander_s))
+
+
+def test_texts_in_pieces_come_whole_and_harmless():
+    with linked() as (boat, link):
+        link.read()
+        boat.send(mavlink.MAVLink_statustext_message(4, b"x" * 50, 7, 0))
+        boat.send(mavlink.MAVLink_statustext_message(4, b" and \x1b[2J\x07 the rest", 7, 1))
+        texts = []
+        assert wait_for(lambda: texts.extend(link.read().texts) or texts)
+        assert texts == ["x" * 50 + " and ?[2J? the rest"]

@@ -1,0 +1,199 @@
+"""Wires: addresses, ports that are taken, peers that go and come back, whole frames or none."""
+
+import contextlib
+import os
+import pty
+import socket
+import time
+
+import pytest
+from steerclear.shield.bridge.mavlink.addresses import Address, parse_address
+from steerclear.shield.bridge.mavlink.serial_port import SerialWire
+from steerclear.shield.bridge.mavlink.sockets import TcpWire, UdpWire
+from steerclear.shield.exceptions import LinkError
+
+
+@contextlib.contextmanager
+def closing(*things):
+    try:
+        yield things[0] if len(things) == 1 else things
+    finally:
+        for thing in things:
+            thing.close()
+
+
+def received(wire, count=1, seconds=5.0):
+    """Bytes of one or more packets, waited for."""
+    end, got = time.monotonic() + seconds, []
+    while len(got) < count and time.monotonic() < end:
+        packet = wire.receive()
+        got.append(packet) if packet else time.sleep(0.005)
+    return got
+
+
+def free_port(kind=socket.SOCK_STREAM):
+    with closing(socket.socket(socket.AF_INET, kind)) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("udpin:127.0.0.1:14550", Address("udpin", "127.0.0.1", 14550)),
+        ("tcp:boat.local:5760", Address("tcp", "boat.local", 5760)),
+        ("udpout:[::1]:14550", Address("udpout", "::1", 14550)),
+        ("serial:/dev/ttyUSB0:115200", Address("serial", "/dev/ttyUSB0", 115200)),
+        ("serial:/dev/ttyUSB0", Address("serial", "/dev/ttyUSB0", 57600)),
+    ],
+)
+def test_addresses_that_are(text, address):
+    assert parse_address(text) == address
+
+
+@pytest.mark.parametrize(
+    "text", ["", "udp:127.0.0.1:14550", "udpin:", "udpin:14550", "tcp:host:", "tcp:host:99999", "tcp:host:1٣", "com3"]
+)
+def test_addresses_that_are_not(text):
+    with pytest.raises(LinkError, match="give"):
+        parse_address(text)
+
+
+def test_udpin_answers_where_it_was_spoken_to_from():
+    with closing(UdpWire(Address("udpin", "127.0.0.1", 0)), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as both:
+        wire, boat = both
+        wire.open()
+        assert not wire.send(b"nobody yet", None)
+        boat.bind(("127.0.0.1", 0))
+        boat.settimeout(5.0)
+        boat.sendto(b"hello", ("127.0.0.1", wire.port))
+        [(data, peer)] = received(wire)
+        assert (data, peer) == (b"hello", boat.getsockname())
+        assert wire.send(b"answer", peer)
+        assert boat.recv(100) == b"answer"
+
+
+def test_a_udp_port_that_is_taken_is_said_so():
+    with closing(UdpWire(Address("udpin", "127.0.0.1", 0))) as first:
+        first.open()
+        second = UdpWire(Address("udpin", "127.0.0.1", first.port))
+        with pytest.raises(LinkError, match="another program uses that port: end it or give another"):
+            second.open()
+
+
+def test_udpout_to_nobody_waits_and_does_not_fail():
+    with closing(UdpWire(Address("udpout", "127.0.0.1", free_port(socket.SOCK_DGRAM)))) as wire:
+        wire.open()
+        for _ in range(5):
+            wire.send(b"anybody there", None)
+            assert wire.receive() is None
+
+
+def test_a_host_that_does_not_exist_is_said_so(monkeypatch):
+    def none(*args, **kwargs):
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "getaddrinfo", none)
+    for wire in (UdpWire(Address("udpout", "nowhere", 1)), TcpWire(Address("tcp", "nowhere", 1))):
+        with pytest.raises(LinkError, match="no host 'nowhere'"):
+            wire.open()
+
+
+def test_tcp_to_nobody_is_said_so():
+    with pytest.raises(LinkError, match="nothing listens there: start the boat"):
+        TcpWire(Address("tcp", "127.0.0.1", free_port())).open()
+
+
+def test_tcp_lost_and_opened_again():
+    with closing(socket.socket()) as server, closing(TcpWire(Address("tcp", "127.0.0.1", 0))) as unused:
+        server.bind(("127.0.0.1", 0))
+        server.listen(2)
+        del unused
+        with closing(TcpWire(Address("tcp", "127.0.0.1", server.getsockname()[1]))) as wire:
+            wire.open()
+            boat, _ = server.accept()
+            boat.sendall(b"one")
+            assert received(wire)[0][0] == b"one"
+            boat.close()
+            with pytest.raises(ConnectionError):
+                received(wire)
+            assert wire.fileno() == -1
+            assert not wire.send(b"gone", None)
+            wire.open()
+            with closing(server.accept()[0]) as again:
+                assert wire.send(b"two", None)
+                again.settimeout(5.0)
+                assert again.recv(100) == b"two"
+
+
+def test_tcpin_takes_one_peer_and_the_next_after_it():
+    with closing(TcpWire(Address("tcpin", "127.0.0.1", 0))) as wire:
+        wire.open()
+        for text in (b"first", b"second"):
+            with closing(socket.create_connection(("127.0.0.1", wire.port), 5.0)) as boat:
+                boat.sendall(text)
+                assert received(wire)[0][0] == text
+                assert wire.send(b"ok", None)
+                assert boat.recv(10) == b"ok"
+            with pytest.raises(ConnectionError):
+                received(wire)
+        assert wire.fileno() >= 0, "it listens on"
+
+
+def test_a_peer_that_does_not_read_gets_whole_frames_or_none():
+    with closing(socket.socket()) as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen(1)
+        with closing(TcpWire(Address("tcp", "127.0.0.1", server.getsockname()[1]))) as wire:
+            wire.open()
+            frame = bytes(range(256))
+            with closing(server.accept()[0]) as boat:
+                delivered = 0
+                while wire.send(frame, None):
+                    delivered += 1
+                assert not wire.send(frame, None), "full: said so, and not kept for later"
+                boat.settimeout(5.0)
+                data, size = b"", delivered * len(frame)
+                while len(data) < size:
+                    data += boat.recv(1 << 20)
+                    wire.send(b"", None)
+                assert data[:size] == frame * delivered
+
+
+def test_a_serial_port_carries_bytes_as_they_are():
+    boat, device = pty.openpty()
+    name = os.ttyname(device)
+    try:
+        with closing(SerialWire(Address("serial", name, 57600))) as wire:
+            wire.open()
+            assert wire.receive() is None
+            os.write(boat, b"\xfd\x00\r\n\x03\xff")
+            assert received(wire)[0][0] == b"\xfd\x00\r\n\x03\xff"
+            assert wire.send(b"\n\x11\x13", None)
+            assert os.read(boat, 10) == b"\n\x11\x13"
+    finally:
+        os.close(boat)
+        os.close(device)
+
+
+def test_serial_ports_that_are_none(tmp_path):
+    with pytest.raises(LinkError, match="no such device: plug it in"):
+        SerialWire(Address("serial", str(tmp_path / "none"), 57600)).open()
+    file = tmp_path / "file"
+    file.touch()
+    with pytest.raises(LinkError, match="that is no serial port"):
+        SerialWire(Address("serial", str(file), 57600)).open()
+    with pytest.raises(LinkError, match=r"no baud rate 12345; give one of .*57600"):
+        SerialWire(Address("serial", str(file), 12345)).open()
+
+
+def test_a_serial_port_that_is_pulled_out_is_lost():
+    boat, device = pty.openpty()
+    with closing(SerialWire(Address("serial", os.ttyname(device), 57600))) as wire:
+        wire.open()
+        os.close(device)
+        os.close(boat)
+        with pytest.raises(OSError, match=r".*"):
+            received(wire)
+        assert wire.fileno() == -1
+        assert not wire.send(b"x", None)
