@@ -66,9 +66,8 @@ def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:
 
 @dataclass(frozen=True)
 class _Fit:
-    """How one delay fits: delay s, rms of heading deg and speed m/s, highest turn rates measured and foretold deg/s."""
+    """How one delay fits: rms of heading deg and speed m/s, highest turn rates measured and foretold deg/s."""
 
-    delay_s: float
     heading_deg: float
     speed_mps: float
     measured_dps: float
@@ -87,18 +86,20 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
     if len(told) < 5.0 / dt_s or not np.isfinite(measured).all():
         text = "commands or telemetry were missing during the drill; see the other checks, then run again"
         return CheckResult(name, False, text)
-    fit = min((_fit(told, measured, platform, dt_s, k) for k in range(LONGEST_DELAY_STEPS + 1)), key=lambda f: f.cost)
+    fits = [_fit(told, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
+    fit = min(fits, key=lambda f: f.cost)
+    delay_s = _delay_s([f.heading_deg**2 for f in fits], dt_s)
     figures = {
-        "delay_s": fit.delay_s,
+        "delay_s": delay_s,
         "heading_rms_deg": fit.heading_deg,
         "speed_rms_mps": fit.speed_mps,
         "turn_rate_dps": fit.measured_dps,
         "turn_rate_foretold_dps": fit.foretold_dps,
     }
-    fault = _fault(fit, measured, told, platform)
+    fault = _fault(fit, delay_s, measured, told, platform)
     text = fault or (
         f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
-        f"effect after {fit.delay_s:.1f} s"
+        f"effect after {delay_s:.2f} s"
     )
     return CheckResult(name, not fault, text, figures)
 
@@ -124,12 +125,21 @@ def _fit(told: Sequence[DrillSample], measured: Array, platform: Platform, dt_s:
     heading = _half_turn(measured[:, 0] - foretold[:, 0])
     speed = measured[:, 1] - foretold[:, 1]
     return _Fit(
-        steps * dt_s,
         float(np.sqrt(np.mean(heading**2))),
         float(np.sqrt(np.mean(speed**2))),
         _fastest_dps(measured[:, 0], dt_s),
         _fastest_dps(foretold[:, 0], dt_s),
     )
+
+
+def _delay_s(costs: Sequence[float], dt_s: float) -> float:
+    """Delay of the least cost, between steps by the parabola through its neighbours, s."""
+    best = int(np.argmin(costs))
+    if not 0 < best < len(costs) - 1:
+        return best * dt_s
+    before, here, after = costs[best - 1 : best + 2]
+    bend = before - 2.0 * here + after
+    return float(best + (0.5 * (before - after) / bend if bend > 0.0 else 0.0)) * dt_s
 
 
 def _fastest_dps(headings_deg: Array, dt_s: float) -> float:
@@ -138,7 +148,7 @@ def _fastest_dps(headings_deg: Array, dt_s: float) -> float:
     return float(np.abs(_half_turn(headings_deg[apart:] - headings_deg[:-apart])).max()) / (apart * dt_s)
 
 
-def _fault(fit: _Fit, measured: Array, told: Sequence[DrillSample], platform: Platform) -> str:
+def _fault(fit: _Fit, delay_s: float, measured: Array, told: Sequence[DrillSample], platform: Platform) -> str:
     if float(np.median(measured[:, 1])) < -0.2:
         return "it goes astern when told to go ahead; check the motors' direction"
     if _turned_away(measured, told):
@@ -154,8 +164,8 @@ def _fault(fit: _Fit, measured: Array, told: Sequence[DrillSample], platform: Pl
             f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; give the platform that fits it, "
             "or tune its speed"
         )
-    if fit.delay_s > LONGEST_DELAY_S:
-        return f"commands take {fit.delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that"
+    if delay_s > LONGEST_DELAY_S:
+        return f"commands take {delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that"
     return ""
 
 

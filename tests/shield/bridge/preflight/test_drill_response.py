@@ -1,0 +1,182 @@
+"""The drill: boats drive a short way inside the fence, and what they did is held against their platform."""
+
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.link import BoatReading, Sent
+from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
+from steerclear.shield.bridge.preflight.response import check_course, check_response, drill_checks
+from steerclear.shield.bridge.preflight.result import run_checks
+from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.platforms import fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+
+DT_S = 0.1
+HERON = get_platform("heron")
+FLEET = parse_fleet("""
+version: 1
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
+geofence: {xmin_m: -5, ymin_m: -5, xmax_m: 85, ymax_m: 45}
+team: blue
+boats:
+  - {name: blue_1, agent: agent_0, platform: heron, link: {kind: mavlink, address: "tcp:127.0.0.1:5760", system_id: 1}}
+  - {name: blue_2, agent: agent_1, platform: heron, link: {kind: mavlink, address: "tcp:127.0.0.1:5761", system_id: 2}}
+  - {name: red_1, agent: agent_2, platform: heron, contact: feed}
+  - {name: red_2, agent: agent_3, platform: heron, contact: feed}
+feed: {listen: "127.0.0.1:14700"}
+""")
+
+
+class Water:
+    """Boats of the file on their platforms, or on others than the file says, driven by a drill."""
+
+    def __init__(self, platform=HERON, delay_steps=0, noise=0.0, reverse=False, compass_deg=0.0, seed=1):
+        self.params = platform.pack()
+        self.rows = [fresh_state(5.0 + 20.0 * i, 5.0 + 8.0 * i, 40.0 * i, 0.0) for i in range(4)]
+        self.waiting = deque([None] * delay_steps)
+        self.random, self.noise, self.reverse, self.compass = np.random.default_rng(seed), noise, reverse, compass_deg
+        self.trails = [[] for _ in self.rows]
+
+    def seen(self):
+        return np.array([[row[L.X], row[L.Y], row[L.HEADING], row[L.SPEED]] for row in self.rows])
+
+    def reading(self, i, now):
+        x, y, heading, speed = self.seen()[i] + self.noise * self.random.standard_normal(4)
+        return BoatReading(
+            FLEET.names[i], now, (x, y), 0.0, math.radians(heading + self.compass) % (2 * math.pi), 0.0, speed,
+            math.radians(heading) % (2 * math.pi), 0.0, 0.0, 0.0, "GUIDED", True, "", 0.1,
+        )  # fmt: skip
+
+    def step(self, values):
+        self.waiting.append(values)
+        values = self.waiting.popleft()
+        for i, row in enumerate(self.rows):
+            if values is not None:
+                error = (math.degrees(values[i][1]) - row[L.HEADING] + 180.0) % 360.0 - 180.0
+                step_boat(self.params, row, values[i][0], -error if self.reverse else error, DT_S)
+            self.trails[i].append((row[L.X], row[L.Y]))
+
+
+def driven(boats=("blue_1",), **water):
+    """A drill that has been driven, and the water it was driven on."""
+    drill, water = Drill(FLEET, boats), Water(**water)
+    for k in range(round(drill.seconds / DT_S) + 5):
+        now = 50.0 + DT_S * k
+        readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}
+        drill.offer(Snapshot(k, now, water.seen()))
+        values = drill.latest().commands.values
+        sent = {
+            name: Sent(name, now, values[i][1], values[i][0], "fake", True) for i, name in enumerate(FLEET.names[:2])
+        }
+        drill.take(Tick(k, now, now, now, readings, (), None, None, None, None, False, sent, 0.0))
+        water.step(values)
+    return drill, water
+
+
+@pytest.fixture(scope="module")
+def good():
+    return driven(("blue_1", "blue_2"), noise=0.01)
+
+
+def test_boats_that_are_what_the_file_says_pass(good):
+    results = run_checks(drill_checks(good[0], dict(FLEET.platform_of), DT_S))
+    assert [r.name for r in results] == ["course:blue_1", "response:blue_1", "course:blue_2", "response:blue_2"]
+    assert all(r.passed for r in results), [r.text for r in results]
+
+
+def test_boats_take_turns_and_stay_inside_the_fence(good):
+    drill, water = good
+    assert drill.seconds == 2 * EACH_S
+    for name in ("blue_1", "blue_2"):
+        assert len(drill.samples[name]) == pytest.approx(EACH_S / DT_S, abs=2)
+    first, second, *others = (np.array(trail) for trail in water.trails)
+    half = round(EACH_S / DT_S)
+    assert np.ptp(second[: half - 10], axis=0).max() < 0.5, "the second lies still meanwhile"
+    assert np.ptp(first[half + 40 :], axis=0).max() < 3.0, "and the first afterwards"
+    assert all(np.ptp(trail, axis=0).max() < 0.5 for trail in others)
+    xmin, ymin, xmax, ymax = FLEET.geofence.box
+    for trail in (first, second):
+        assert (trail > (xmin, ymin)).all()
+        assert (trail < (xmax, ymax)).all()
+        assert np.ptp(trail, axis=0).max() > 5.0
+
+
+@pytest.mark.parametrize("steps", [0, 2, 4])
+def test_the_delay_is_measured(steps):
+    drill, _ = driven(delay_steps=steps, noise=0.01)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert result.passed, result.text
+    assert result.figures["delay_s"] == pytest.approx(steps * DT_S, abs=0.06)
+
+
+def test_a_delay_that_is_too_long_is_found():
+    drill, _ = driven(delay_steps=7)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert not result.passed
+    assert "commands take 0.7 s to work" in result.text
+
+
+@pytest.mark.parametrize(
+    ("platform", "words"),
+    [
+        (replace(HERON, name="lame", turn_gain=HERON.turn_gain * 0.25), "it turns slower than heron"),
+        (replace(HERON, name="slow", max_speed_mps=0.6, speed_factor=0.0), "its speed is"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_a_boat_that_is_not_what_the_file_says_is_found(platform, words):
+    drill, _ = driven(platform=platform)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert not result.passed
+    assert words in result.text
+
+
+def test_steering_the_wrong_way_round_is_found():
+    drill, _ = driven(reverse=True)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert not result.passed
+    assert "turns away from the heading it is told" in result.text
+
+
+def test_a_compass_that_is_off_is_found():
+    drill, _ = driven(compass_deg=25.0)
+    result = check_course("blue_1", drill.samples["blue_1"])
+    assert not result.passed
+    assert "+25 deg off its course; calibrate its compass" in result.text
+
+
+def test_a_boat_that_does_not_move_passes_nothing():
+    drill, _ = driven(platform=replace(HERON, name="aground", max_speed_mps=0.01))
+    for check in drill_checks(drill, dict(FLEET.platform_of), DT_S):
+        assert not check.run().passed
+
+
+def test_going_astern_is_found():
+    drill, _ = driven()
+    samples = [replace(s, reading=replace(s.reading, speed_mps=-s.reading.speed_mps)) for s in drill.samples["blue_1"]]
+    assert "goes astern" in check_response("blue_1", samples, HERON, DT_S).text
+
+
+def test_missing_and_impossible_samples_do_not_pass():
+    nothing = BoatReading("blue_1", 0.0)
+    assert not check_response("blue_1", [], HERON, DT_S).passed
+    assert not check_course("blue_1", []).passed
+    unknown = [DrillSample(0.1 * i, nothing, 1.0, 1.0) for i in range(200)]
+    assert not check_response("blue_1", unknown, HERON, DT_S).passed
+    assert not check_course("blue_1", unknown).passed
+    drill, _ = driven()
+    unsent = [replace(s, heading_rad=math.nan) for s in drill.samples["blue_1"]]
+    assert not check_response("blue_1", unsent, HERON, DT_S).passed
+
+
+def test_nothing_is_wanted_before_anything_is_seen_and_a_boat_nobody_sees_lies_still():
+    drill = Drill(FLEET, ("blue_1",))
+    assert drill.latest().commands is None
+    drill.offer(Snapshot(0, 5.0, np.full((4, 4), np.nan)))
+    assert drill.latest().commands.values[0][0] == 0.0
+    drill.close()

@@ -1,0 +1,204 @@
+"""Checks of links: each passes on a good link, and each fault is found, named, and comes with what to do."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.bridge.mavlink.health import LinkHealth
+from steerclear.shield.bridge.preflight.link_checks import (
+    check_autopilot,
+    check_clock,
+    check_commanders,
+    check_latency,
+    check_rates,
+    check_spread,
+    link_checks,
+)
+from steerclear.shield.bridge.preflight.result import run_checks
+from steerclear.shield.platforms import get_platform
+
+HERON = get_platform("heron")
+GOOD = LinkHealth(
+    boat="blue_1",
+    address="127.0.0.1:14550",
+    rates_hz={"GLOBAL_POSITION_INT": 20.0, "ATTITUDE": 20.0},
+    missing="",
+    round_trips_s=(0.03, 0.04, 0.05),
+    shortest_delay_s=0.02,
+    clock_offset_s=100.0,
+    clock_starts=1,
+    wall_ahead_s=0.2,
+    fix_type=3,
+    version=(4, 6, 0),
+    parameters={"WP_SPEED": HERON.max_speed_mps, "FS_GCS_ENABLE": 0.0},
+    signs=False,
+    stations=frozenset(),
+    other_commander_s=-math.inf,
+    faults={},
+)
+
+
+def readings(count=100, *, spread_m=0.03, speed=0.0, age=0.05, faults=None, seed=0):
+    random = np.random.default_rng(seed)
+    return [
+        BoatReading(
+            "blue_1",
+            float(i),
+            position_m=tuple(10.0 + spread_m * random.standard_normal(2)),
+            position_age_s=age,
+            heading_rad=1.0,
+            heading_age_s=age,
+            speed_mps=speed,
+            velocity_age_s=age,
+            turn_rate_rads=0.0,
+            turn_rate_age_s=age,
+            faults=(faults or {}) if i == 3 else {},
+        )
+        for i in range(count)
+    ]
+
+
+class FakeLink:
+    def __init__(self, health=GOOD, said=None):
+        self._health, self._said, self.asked = health, iter(said or readings(1000)), 0
+
+    def read(self):
+        return next(self._said)
+
+    def learn(self, timeout_s):
+        self.asked += 1
+
+    def health(self):
+        return self._health
+
+
+def test_a_good_link_passes_everything_and_is_watched_once():
+    clock, link = ManualClock(10.0), FakeLink()
+    checks = link_checks({"blue_1": link}, {"blue_1": HERON}, clock, seconds=5.0)
+    results = run_checks(checks)
+    assert [r.name for r in results] == [
+        f"{kind}:blue_1" for kind in ("rates", "latency", "clock", "spread", "autopilot", "commanders")
+    ]
+    assert all(r.passed for r in results), [r.text for r in results]
+    assert clock.now_s() == pytest.approx(15.0), "one watch for all checks"
+    assert link.asked == 1
+
+
+def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
+    class Broken(FakeLink):
+        def read(self):
+            raise OSError("no such wire")
+
+    results = run_checks(link_checks({"blue_1": Broken()}, {"blue_1": HERON}, ManualClock(), 1.0))
+    assert not any(r.passed for r in results)
+    assert all("no such wire" in r.text for r in results)
+
+
+@pytest.mark.parametrize(
+    ("said", "changes", "words"),
+    [
+        ({}, {"missing": "ATTITUDE at 3.0 of 20 Hz"}, "ATTITUDE at 3.0 of 20 Hz; lower rate_hz"),
+        ({"age": 0.8}, {}, "0.80 s old, more than 0.5 s"),
+        ({"age": math.inf}, {}, "wait for GPS"),
+        ({"age": math.nan}, {}, "check the radio"),
+        ({"faults": {"jump": 2, "duplicate": 9}}, {}, "refused while watched: 2 jump;"),
+        ({"count": 0}, {}, "inf s old"),
+    ],
+)
+def test_rates(said, changes, words):
+    result = check_rates("blue_1", readings(**said), replace(GOOD, **changes))
+    assert not result.passed
+    assert words in result.text
+
+
+def test_repeats_and_disorder_are_no_reason_not_to_start():
+    assert check_rates("blue_1", readings(faults={"duplicate": 4, "out_of_order": 2}), GOOD).passed
+
+
+def test_latency():
+    assert check_latency("blue_1", GOOD).figures["round_trip_median_s"] == pytest.approx(0.04)
+    slow = check_latency("blue_1", replace(GOOD, round_trips_s=(0.05,) * 18 + (0.9,) * 4))
+    assert not slow.passed
+    assert "0.90 s (95 of 100), more than 0.2 s" in slow.text
+    silent = check_latency("blue_1", replace(GOOD, round_trips_s=()))
+    assert not silent.passed
+    assert "answers no TIMESYNC" in silent.text
+    assert not check_latency("blue_1", replace(GOOD, round_trips_s=(math.nan,) * 3)).passed
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"clock_starts": 0}, "no time-stamped telemetry"),
+        ({"clock_starts": 2}, "restarted while connected; check its power"),
+        ({"signs": True, "wall_ahead_s": -90.0}, "-90 s from the boat's GPS time"),
+    ],
+)
+def test_clock(changes, words):
+    result = check_clock("blue_1", replace(GOOD, **changes))
+    assert not result.passed
+    assert words in result.text
+
+
+def test_a_wrong_wall_clock_matters_to_signing_only():
+    assert check_clock("blue_1", replace(GOOD, wall_ahead_s=3600.0)).passed
+    assert check_clock("blue_1", replace(GOOD, signs=True, wall_ahead_s=math.nan)).passed
+
+
+def test_spread():
+    assert check_spread("blue_1", readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
+    wide = check_spread("blue_1", readings(spread_m=1.0))
+    assert not wide.passed
+    assert "wait for a better fix" in wide.text
+    moving = check_spread("blue_1", readings(speed=1.0))
+    assert not moving.passed
+    assert "moves at 1.0 m/s" in moving.text
+    assert not check_spread("blue_1", readings(age=1.0)).passed
+    assert not check_spread("blue_1", readings(spread_m=math.nan)).passed
+    assert not check_spread("blue_1", []).passed
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"WP_SPEED": 0.0}, "WP_SPEED is not known or 0"),
+        ({"WP_SPEED": math.nan}, "WP_SPEED is not known or 0"),
+        ({"WP_SPEED": 0.5}, "is below the platform's"),
+        ({"GUID_TIMEOUT": 10.0}, "GUID_TIMEOUT is 10 s: set it to 3 or less"),
+        ({"GUID_TIMEOUT": 0.0}, "GUID_TIMEOUT is 0 s"),
+        ({"ARMING_CHECK": 0.0}, "all checks off: set it to 1"),
+        ({"SYSID_MYGCS": 250.0, "SYSID_ENFORCE": 1.0}, "SYSID_MYGCS is 250 and ours is 255"),
+        ({"SYSID_MYGCS": 250.0, "FS_GCS_ENABLE": 1.0}, "SYSID_MYGCS is 250"),
+    ],
+)
+def test_autopilot(parameters, words):
+    result = check_autopilot("blue_1", replace(GOOD, parameters={**GOOD.parameters, **parameters}), HERON)
+    assert not result.passed
+    assert words in result.text
+
+
+def test_an_autopilot_that_told_nothing_does_not_pass():
+    assert not check_autopilot("blue_1", replace(GOOD, parameters={}, version=None), HERON).passed
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"stations": frozenset({(255, 190)})}, "another ground station is on the link (system 255 component 190)"),
+        ({"other_commander_s": 97.0}, "somebody else commanded it 3 s ago; end that program"),
+        ({"faults": {"bad_signature": 4}}, "refused 4 bad_signature: somebody sends in this boat's name"),
+        ({"faults": {"second_sender": 1}}, "find them before you start"),
+    ],
+)
+def test_commanders(changes, words):
+    result = check_commanders("blue_1", replace(GOOD, **changes), 100.0)
+    assert not result.passed
+    assert words in result.text
+
+
+def test_signing_is_said():
+    assert check_commanders("blue_1", GOOD, 0.0).text.endswith("not signed")
+    assert check_commanders("blue_1", replace(GOOD, signs=True, faults={"unsigned": 3, "replayed": 1}), 0.0).passed
