@@ -9,6 +9,7 @@ from pathlib import Path
 
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
 from steerclear.shield.bridge.tick import TickSink
@@ -92,20 +93,18 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
 
     Raises:
         FleetFileError: it cannot be used, or there is nothing to command.
+        ConfigError: its signing key cannot be read, or others can read it.
     """
     fleet = load_fleet(orders.fleet_file)
     if fleet.agent_ids:
         game_config(fleet)
     if not fleet.commanded(orders.boat):
         raise FleetFileError(f"{orders.fleet_file}: no boat of team {fleet.team} has a link; give one to command it")
+    if fleet.signing is not None:
+        read_key(fleet.signing.key_file)
     if "delay_s" not in fleet.shield:
         measured = measured_delay_s(fleet, orders.boat)
         fleet = fleet.with_shield(delay_s=fleet.dt_s if measured is None else measured)
-        LOG.info(
-            "commands are taken to work after %.1f s (%s)",
-            fleet.shield_config.delay_s,
-            "not measured" if measured is None else "measured by the drill",
-        )
     return fleet, orders.fleet_file.read_text(encoding="utf-8")
 
 

@@ -1,0 +1,218 @@
+"""`steerclear preflight` and `deploy` on simulated boats behind real sockets, and what they refuse."""
+
+import json
+import os
+import socket
+import stat
+
+import pytest
+from steerclear.experiments.boats import AutopilotSettings, SimFleet
+from steerclear.experiments.cli import app
+from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
+from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
+from steerclear.experiments.deploy.preflighting import preflight
+from steerclear.experiments.deploy.run import deploy
+from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
+from typer.testing import CliRunner
+
+SPEED = 3.0
+LIMITS = "{navigation: {max_age_s: 2.0, then: stop, lost_after_s: 5.0}, contact: {max_age_s: 3.0, then: slow}}"
+
+
+def free_ports(count):
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    for entry in sockets:
+        entry.bind(("127.0.0.1", 0))
+    ports = [entry.getsockname()[1] for entry in sockets]
+    for entry in sockets:
+        entry.close()
+    return ports
+
+
+@pytest.fixture
+def fleet_file(tmp_path):
+    link, feed = free_ports(2)
+    text = f"""
+version: 1
+field: {{origin: {{latitude_deg: 42.0, longitude_deg: -71.0}}, size_m: [80, 40]}}
+geofence: {{xmin_m: -10, ymin_m: -10, xmax_m: 90, ymax_m: 50}}
+team: blue
+boats:
+  - name: blue_1
+    agent: agent_0
+    platform: heron
+    link: {{kind: mavlink, address: "udpin:127.0.0.1:{link}", system_id: 1}}
+  - {{name: red_1, agent: agent_1, platform: heron, contact: feed}}
+feed: {{listen: "127.0.0.1:{feed}"}}
+limits: {LIMITS}
+"""
+    path = tmp_path / "FLEET.yaml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def entry(write_entry):
+    return write_entry("return (1.0, 30.0)")
+
+
+@pytest.fixture
+def boats(fleet_file):
+    with SimFleet.from_file(
+        load_fleet(fleet_file), opponents="", autopilot=AutopilotSettings(boot_s=0.0), speed=SPEED, waits=True
+    ) as fleet:
+        yield fleet
+
+
+def orders_of(fleet_file, policy="easy", **settings):
+    return Orders(fleet_file, policy, **{"speed": SPEED, "connect_s": 90.0, **settings})
+
+
+BUSY = ("latency", "rates", "spread", "course", "response")
+"""Checks that a busy machine may fail on boats that live three times as fast."""
+
+
+def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, entry):
+    seen = []
+    first = preflight(orders_of(fleet_file, accept=BUSY), Surface(seen.append))
+    assert [result.text for result in first.refused] == []
+    assert {"disk", "known", "geofence", "certificate", "course:blue_1", "response:blue_1"} <= {r.name for r in seen}
+    outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
+    assert outcome.refused == []
+    assert outcome.ended.startswith("ran for")
+    assert outcome.figures["decided"] > 10
+    assert "HOLD" in outcome.left[0]
+    with LogReader(outcome.log) as log:
+        ticks = list(log.ticks())
+    assert len(ticks) == outcome.figures["ticks"]
+    assert any(tick.sent["blue_1"].speed_mps > 0.5 for tick in ticks)
+    assert ticks[0].shield_reset
+    assert boats.states()["blue_1"][3] < 0.5
+
+
+def test_deploy_refuses_to_start_without_its_preflight_and_moves_nothing(fleet_file, boats, entry):
+    boats.place("blue_1", 20.0, 70.0, 0.0)
+    before = boats.states()["blue_1"][:2].copy()
+    outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
+    assert {"drill", "geofence"} <= {result.name for result in outcome.refused}
+    assert outcome.log is None
+    assert "left alone" in outcome.left[0]
+    assert boats.states()["blue_1"][:2] == pytest.approx(before)
+
+
+def test_an_operator_ends_it_before_boats_move(fleet_file, boats, entry):
+    operator = Operator()
+    operator.end("test")
+    outcome = deploy(orders_of(fleet_file, entry, accept=("drill", *BUSY)), operator=operator)
+    assert outcome.log is None
+
+
+def taken(path, kind):
+    """Take the port of a file's link or feed."""
+    fleet = load_fleet(path)
+    text = fleet.boats[0].link.address if kind == "link" else fleet.feed.listen
+    entry = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    entry.bind(("127.0.0.1", int(text.rpartition(":")[2])))
+    return entry
+
+
+@pytest.mark.parametrize("kind", ["link", "feed"])
+def test_a_port_that_is_taken_is_said_and_nothing_is_sent(fleet_file, kind):
+    with taken(fleet_file, kind), pytest.raises(BridgeError, match="in use"):
+        preflight(orders_of(fleet_file))
+
+
+def test_a_boat_that_does_not_answer_is_named(fleet_file):
+    with pytest.raises(LinkError, match="blue_1"):
+        preflight(orders_of(fleet_file, connect_s=0.5))
+
+
+def test_an_unknown_check_to_accept_is_refused(fleet_file, boats):
+    with pytest.raises(ConfigError, match="no such check"):
+        preflight(orders_of(fleet_file, accept=("latencies",)))
+
+
+def test_a_policy_that_does_not_load_is_said_before_anything_is_opened(fleet_file):
+    with taken(fleet_file, "link"), pytest.raises(PolicyError):
+        deploy(orders_of(fleet_file, "no_such_policy"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("geofence:", "geofense:"),
+        ("    platform: heron\n", ""),
+        ("team: blue", "team: blue\nsigning: {key_file: my.key}"),
+        ("team: blue", "team: blue\npreset: chess"),
+        ("team: blue", "team: red"),
+        ("team: blue", "team: blue\ncoordination: per_boat"),
+        ("system_id: 1", "system_id: 0"),
+    ],
+)
+@pytest.mark.parametrize("command", ["deploy", "preflight"])
+def test_a_bad_file_is_one_line_and_exit_2(fleet_file, old, new, command):
+    text = fleet_file.read_text()
+    assert old in text
+    fleet_file.write_text(text.replace(old, new, 1))
+    key = fleet_file.parent / "my.key"
+    key.write_text("ab" * 32)
+    os.chmod(key, 0o644)
+    result = CliRunner().invoke(app, [command, str(fleet_file)])
+    assert result.exit_code == 2, result.output
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert stat.S_IMODE(key.stat().st_mode) == 0o644
+
+
+def test_no_file_and_no_demo_is_said():
+    result = CliRunner().invoke(app, ["deploy"])
+    assert (result.exit_code, "--demo" in result.stderr) == (2, True)
+
+
+def good(kind, passed=True, **figures):
+    return CheckResult(f"{kind}:blue_1", passed, "as heron" if passed else "it turns slower", figures)
+
+
+def test_a_drill_counts_for_the_same_file_for_a_while_and_when_it_passed(fleet_file, monkeypatch):
+    fleet, text = load_fleet(fleet_file), fleet_file.read_text()
+
+    def check(file_text=text):
+        return check_drill(fleet, file_text, None, ["blue_1"])
+
+    assert "no preflight" in check().text
+    keep(fleet, text, None, [good("course"), good("response", delay_s=0.23)], [])
+    assert check().passed
+    assert measured_delay_s(fleet, None) == 0.23
+    assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.23
+    assert "changed" in check(text + "\n").text
+    keep(fleet, text, None, [good("course"), good("response", False)], ["response:blue_1"])
+    assert "turns slower" in check().text
+    keep(fleet, text, None, [good("course"), good("response", False)], [])
+    assert check().passed, "it was accepted at the preflight"
+    keep(fleet, text, None, [good("course")], [])
+    assert "lacks response:blue_1" in check().text
+    monkeypatch.setattr("time.time", lambda: 4e9)
+    assert "h old" in check().text
+    path_of(fleet, None).write_text("{")
+    assert "no preflight" in check().text
+
+
+def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(fleet_file):
+    assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == pytest.approx(0.1)
+    fleet_file.write_text(fleet_file.read_text() + "\nshield: {delay_s: 0.4}\n")
+    assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.4
+
+
+def test_nothing_to_command_is_said(fleet_file):
+    fleet_file.write_text(fleet_file.read_text().replace("system_id: 1}", "system_id: 1}\n    commanded: false"))
+    with pytest.raises(FleetFileError, match="has a link"):
+        read_fleet(orders_of(fleet_file))
+
+
+def test_the_kept_preflight_is_json(fleet_file):
+    fleet = load_fleet(fleet_file)
+    path = keep(fleet, "x", None, [good("response", delay_s=float("nan"))], [])
+    assert json.loads(path.read_text())["checks"][0]["figures"] == {}
