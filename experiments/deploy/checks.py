@@ -58,9 +58,9 @@ def checks_of(station: Station, minutes: float) -> list[Check]:
     return [disk, *links, *situation]
 
 
-def drilled_check(station: Station, text: str, boat: str | None) -> Check:
-    """The check that these boats were drilled lately."""
-    return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links)))
+def drilled_check(station: Station, text: str, boat: str | None, accept: Sequence[str]) -> Check:
+    """The check that these boats were drilled lately, and did well but for what is accepted."""
+    return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links), accept))
 
 
 def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] = ()) -> list[Check]:

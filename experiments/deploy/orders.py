@@ -109,7 +109,7 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
 
 
 def may_start(
-    checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome, later: Sequence[str] = ()
+    checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome, elsewhere: Sequence[str] = ()
 ) -> bool:
     """Run checks; whether they allow to go on.
 
@@ -118,13 +118,13 @@ def may_start(
         accept: names that may fail.
         surface: where results are shown.
         outcome: gets results and refusals.
-        later: kinds of checks that come later and may be accepted too.
+        elsewhere: kinds of checks that are made in the drill and may be accepted too.
 
     Raises:
         ConfigError: a name to accept is no check's.
     """
-    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in later)]
-    validate_accepted([name for name in accept if name.split(":")[0] not in later], known)
+    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in elsewhere)]
+    validate_accepted([name for name in accept if name.split(":")[0] not in elsewhere], known)
     outcome.checks = run_checks(checks, surface.shown)
     outcome.refused = not_passed(outcome.checks, accept)
     for result in outcome.checks:

@@ -17,6 +17,7 @@ from steerclear.shield.bridge.timing import Timing
 from .checks import checks_of, drilled_check
 from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
 from .policy_process import PolicyProcess
+from .preflight_file import DRILLED
 from .quiet import ended_by_signals, undisturbed, warm_up
 from .station import Station
 from .tally import Tally
@@ -52,8 +53,8 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
             with station, ended_by_signals(operator):
                 station.connect(orders.connect_s)
                 checks = checks_of(station, orders.minutes or LONGEST_MINUTES)
-                checks.append(drilled_check(station, text, orders.boat))
-                if may_start(checks, orders.accept, surface, outcome) and not operator.ended:
+                checks.append(drilled_check(station, text, orders.boat, orders.accept))
+                if may_start(checks, orders.accept, surface, outcome, DRILLED) and not operator.ended:
                     station.prepare()
                     _run(station, policy, orders, text, surface, operator, outcome)
         finally:
