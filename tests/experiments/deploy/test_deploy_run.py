@@ -19,7 +19,7 @@ from steerclear.shield.bridge.preflight.result import CheckResult
 from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
 from typer.testing import CliRunner
 
-SPEED = 3.0
+SPEED = 5.0
 LIMITS = "{navigation: {max_age_s: 2.0, then: stop, lost_after_s: 5.0}, contact: {max_age_s: 3.0, then: slow}}"
 
 
@@ -73,7 +73,7 @@ def orders_of(fleet_file, policy="easy", **settings):
 
 
 BUSY = ("latency", "rates", "spread", "course", "response")
-"""Checks that a busy machine may fail on boats that live three times as fast."""
+"""Checks that a busy machine may fail on boats that live five times as fast."""
 
 
 def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, entry):
