@@ -76,22 +76,27 @@ def sets_config(radius_m: float, settings: Mapping[str, Any]) -> ShieldConfig:
     return ShieldConfig.of(separation_m=radius_m, buffer_m=0.0, **settings)
 
 
+def places(values: ValueTable) -> list[tuple[float, float, float]]:
+    """What is compared: relative headings, deg, own and the other's speeds, m/s."""
+    grid = values.card.make_grid()
+    return [(h, a * grid.own_top_mps, b * grid.other_top_mps) for a, b in SPEED_SHARES for h in HEADINGS_DEG]
+
+
 def compare_sets(
-    values: ValueTable, config: ShieldConfig, notice: Callable[[int, int], None] | None = None
+    values: ValueTable, config: ShieldConfig, notice: Callable[[int], None] | None = None
 ) -> list[SetPair]:
     """Areas of both sets at `SPEED_SHARES` and `HEADINGS_DEG`, both boats at full thrust.
 
     Args:
         values: worst-case table of the pair.
         config: settings; both sets are of the radius it keeps, buffer and position error included.
-        notice: called with pairs done and all.
+        notice: called with the number of `places` done.
     """
-    grid, found = values.card.make_grid(), []
-    places = [(h, a * grid.own_top_mps, b * grid.other_top_mps) for a, b in SPEED_SHARES for h in HEADINGS_DEG]
-    for place in places:
+    found: list[SetPair] = []
+    for place in places(values):
         found.append(compare_pair(values, config, *place))
         if notice is not None:
-            notice(len(found), len(places))
+            notice(len(found))
     return found
 
 

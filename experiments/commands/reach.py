@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,17 +26,12 @@ from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
 from ..reach_show import draw_sets, show_card
-from ..store import write_json
-from ..tables import bars_table, titled
-from ..unsafe_sets import compare_sets, sets_config
-from ..unsafe_sets_page import HEADS, content_of, rows_of
 from . import options as o
 from .console import Interrupted, command, err, finish, out
+from .reach_compare import OtherBoat, OwnBoat, compare
 
 app = typer.Typer(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
 
-OwnBoat = Annotated[str, typer.Option("--own", metavar="NAME", help="Platform of the own boat.")]
-OtherBoat = Annotated[str, typer.Option("--other", metavar="NAME", help="Platform of the other boat.")]
 OtherMay = Annotated[str, typer.Option(metavar="MODE", help="What the other boat may do: worst-case or cooperative.")]
 Radius = Annotated[
     list[float] | None,
@@ -149,34 +143,7 @@ def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable
     return table
 
 
-@app.command()
-@command
-def compare(
-    own: OwnBoat,
-    other: OtherBoat,
-    radius: Annotated[float, typer.Option(metavar="M", help="Separation radius, m.")] = 2.5,
-    shield_set: o.ShieldSet = None,
-    json_file: o.JsonFile = None,
-) -> None:
-    """Compare the set the shield cannot promise to save with the reachability set, both of --radius.
-
-    Exit status: 0 the shield's is nowhere more than 1.15 times as large, and nowhere calls safe more than 2 % of what
-    the table calls lost; 1 somewhere it does, 2 bad input.
-    """
-    values, started = load_table(own, other, "worst-case"), time.perf_counter()
-    check_radii(problem_of(own, other), (radius,))
-    given = o.key_values(shield_set, "--shield-set")
-    config = sets_config(radius, given)
-    with _stages() as stage:
-        notice = stage("sets")
-        pairs = compare_sets(values, config, lambda done, total: notice(done, total, 0.0))
-    settings = {"own": own, "other": other, "radius_m": radius, "shield": given}
-    content = content_of(settings, pairs, time.perf_counter() - started)
-    out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(pairs)))
-    out().print(bars_table(content["bars"]))
-    if json_file is not None:
-        write_json(json_file, content)
-    finish(all(bar["met"] for bar in content["bars"]))
+app.command()(compare)
 
 
 @app.command()

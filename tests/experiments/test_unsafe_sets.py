@@ -149,7 +149,7 @@ def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_o
 @pytest.mark.parametrize("pair", [(40.0, 30.0, 0.0), (30.0, 30.0, 1.0)])
 def test_a_bar_that_is_not_met_is_an_exit_status(pair, monkeypatch):
     found = [SetPair(2.0, 2.0, 180.0, *pair)]
-    monkeypatch.setattr("steerclear.experiments.commands.reach.compare_sets", lambda *_: found)
+    monkeypatch.setattr("steerclear.experiments.commands.reach_compare.compare_sets", lambda *_: found)
     assert compare().exit_code == 1
 
 
