@@ -94,7 +94,7 @@ class Boat:
     def step(self, time_s: float, order: Order | None = None) -> None:
         """Move by one step, to ``time_s``, as its autopilot orders or as given."""
         self.order = self.autopilot.vehicle.order() if order is None else order
-        self.helmsman.step(self.order)
+        self.helmsman.step(self.faults.misled(self.order))
         self.seen = self._sensors.sense(self.hull, time_s)
 
     def tick(self, now_s: float) -> None:

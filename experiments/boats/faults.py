@@ -13,6 +13,7 @@ from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.exceptions import ConfigError
 
 from .autopilot import Autopilot
+from .orders import Order, Steer
 from .radio import Bend, Radio
 from .sensing import Snapshot
 
@@ -31,6 +32,7 @@ class Fault:
         dark: the autopilot is off.
         hidden: the position feed leaves the boat out.
         feed_late_s: age of what the position feed says of the boat.
+        compass_off_rad: error of the compass, clockwise.
     """
 
     ends_s: float = math.inf
@@ -40,6 +42,7 @@ class Fault:
     dark: bool = False
     hidden: bool = False
     feed_late_s: float = 0.0
+    compass_off_rad: float = 0.0
 
 
 def _drop(packet: bytes) -> list[tuple[float, bytes]]:
@@ -79,6 +82,13 @@ class Faults:
     def feed_late_s(self) -> float:
         """Age of what the position feed says of the boat, s."""
         return max((fault.feed_late_s for fault in self._active.values()), default=0.0)
+
+    def misled(self, order: Order) -> Order:
+        """What the hull does under an order, the compass being what it is."""
+        off = sum(fault.compass_off_rad for fault in self._active.values())
+        if off == 0.0 or not isinstance(order, Steer):
+            return order
+        return Steer((order.heading_rad - off) % (2.0 * math.pi), order.speed_mps)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -154,7 +164,11 @@ class Faults:
 
     def _compass(self, now_s: float, offset_deg: float = 30.0) -> Fault:
         offset = math.radians(offset_deg)
-        return Fault(change=lambda truth, time_s: dataclasses.replace(truth, heading_rad=truth.heading_rad + offset))
+
+        def turned(truth: Snapshot, time_s: float) -> Snapshot:
+            return dataclasses.replace(truth, heading_rad=truth.heading_rad + offset)
+
+        return Fault(change=turned, compass_off_rad=offset)
 
     def _late(self, now_s: float, delay_s: float = 1.0) -> Fault:
         return Fault(down=lambda packet: [(delay_s, packet)], feed_late_s=delay_s)
