@@ -1,4 +1,4 @@
-"""Commands boats from a process of its own, ``python boat_commander.py SECONDS ADDRESS=ID ...``; tells packets heard."""
+"""Commands boats from a process of its own: ``boat_commander.py SECONDS ADDRESS=ID ...``; counts packets heard."""
 
 from __future__ import annotations
 
