@@ -12,6 +12,7 @@ from typing import Any
 
 from .attack.keys import ATTACK as _ATTACK
 from .boats_keys import SIM_BOATS as _SIM_BOATS
+from .deploy.deploy_keys import DEPLOY as _DEPLOY
 from .deploy.referee_keys import REFEREE as _REFEREE
 from .deploy.replay_keys import REPLAY as _REPLAY
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
@@ -215,6 +216,8 @@ SIM_BOATS = {**_PROVENANCE, **_SIM_BOATS, **{f"breaches[].{name}": words for nam
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
 
+DEPLOY = {**_PROVENANCE, **_DEPLOY}
+
 REFEREE = {**_PROVENANCE, **_REFEREE}
 
 REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for name, words in BREACH.items()}}
@@ -229,6 +232,8 @@ KEYS = {
     "attack": ATTACK,
     "reach compare": SETS,
     "render": RENDER,
+    "deploy": DEPLOY,
+    "preflight": DEPLOY,
     "replay": REPLAY,
     "sim-boats": SIM_BOATS,
     "referee": REFEREE,

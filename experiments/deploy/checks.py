@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from steerclear.shield.bridge.blackbox import check_disk
-from steerclear.shield.bridge.loop import Loop, Parts
+from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.preflight.drill import Drill
 from steerclear.shield.bridge.preflight.link_checks import link_checks
 from steerclear.shield.bridge.preflight.response import drill_checks

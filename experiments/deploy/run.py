@@ -8,8 +8,9 @@ from steerclear.shield.bridge.blackbox import McapWriter, header_of_fleet, log_p
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.loop import Loop, Parts
+from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.publishing import PositionPublisher
 from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.bridge.timing import Timing
@@ -96,6 +97,7 @@ def _run(
         with undisturbed():
             outcome.ended = loop.run(None if orders.minutes is None else 60.0 * orders.minutes)
         outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
+        outcome.figures |= {f"delay_{name}_s": delay for name, delay in loop.delays.measured_s().items()}
 
 
 def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:

@@ -14,10 +14,10 @@ from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import FeedReceiver
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.fleet_settings import BoatSettings
-from steerclear.shield.bridge.loop import contact_of
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
 from steerclear.shield.bridge.mavlink.signing import Signing, read_key
+from steerclear.shield.bridge.parts import contact_of
 
 LOG = logging.getLogger(__name__)
 

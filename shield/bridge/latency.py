@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 
 import numpy as np
 
+from ..config import ShieldConfig
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
 from ..tracks import thrust_at
-from .link import BoatReading
+from .link import BoatReading, Sent
+from .tick import Action
 
 LONGEST_STEPS = 8
 """Delays up to this many steps are told apart."""
@@ -25,6 +28,9 @@ MEMORY_S = 60.0
 
 TELLING_DEG = 0.3
 """Models that foretell headings closer together than this, deg per step, tell nothing."""
+
+LATER_S = 0.15
+"""Commands that work later than declared by more than this are told of, s."""
 
 ENOUGH_DEG2 = 30.0
 """Sum of squared disagreement needed before an answer is given, deg^2."""
@@ -90,6 +96,44 @@ class DelayMeter:
                 error = (command[0] - row[L.HEADING] + 180.0) % 360.0 - 180.0
                 step_boat(self._params, row, command[1], error, self._dt_s)
         return rows[:, L.HEADING].copy()
+
+
+class Delays:
+    """The meters of all boats of a process.
+
+    Args:
+        platforms: of each boat, by name.
+        config: what the shield counts on.
+    """
+
+    def __init__(self, platforms: Mapping[str, Platform], config: ShieldConfig) -> None:
+        self._declared_s = config.delay_s
+        self._meters = {name: DelayMeter(platform, config.dt_s) for name, platform in platforms.items()}
+
+    def update(self, readings: Mapping[str, BoatReading], sent: Mapping[str, Sent]) -> None:
+        """Take what came in and what left at one turn of the loop."""
+        for name, meter in self._meters.items():
+            meter.update(readings[name])
+            meter.sent(sent[name].heading_rad, sent[name].speed_mps)
+
+    def measured_s(self) -> dict[str, float]:
+        """Delay of each boat of which enough was seen, s."""
+        found = {name: meter.delay_s for name, meter in self._meters.items()}
+        return {name: delay for name, delay in found.items() if delay is not None}
+
+    def actions(self) -> list[Action]:
+        """Boats whose commands take longer to work than the shield counts on."""
+        return [
+            Action(
+                name,
+                "delay",
+                "none",
+                f"{name}: commands work after {delay:.1f} s, the shield counts on {self._declared_s:.1f} s; "
+                "run preflight again, or set shield.delay_s",
+            )
+            for name, delay in self.measured_s().items()
+            if delay > self._declared_s + LATER_S
+        ]
 
 
 def _seen_of(reading: BoatReading) -> Array:

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol
-
-import numpy as np
+from collections.abc import Callable, Mapping
 
 from ..commands import Commands
-from ..exceptions import BridgeError
 from ..shield import Shield
 from .assemble import seen_now
 from .clock import Clock
-from .contact import Contact, ContactSource
+from .contact import Contact
 from .fleet_file import FleetFile
 from .freshness import RIVAL_S, Seen, Verdict, judge
 from .helm import Helm, Steered
+from .latency import Delays
 from .link import BoatReading, Link
 from .operator import Operator
 from .overruns import Overruns
+from .parts import GameState, Parts, contact_of
 from .policy_watch import PolicyWatch
+from .recording import Recorder
 from .roster import Roster
-from .tick import Action, Tick, TickSink
+from .tick import Action, Tick
 from .wanted import Snapshot, WantedSource
+
+__all__ = ["Loop", "Parts", "contact_of"]
 
 LOG = logging.getLogger(__name__)
 
@@ -40,46 +40,6 @@ REST_MPS = 0.2
 
 SECOND_COMMANDER = "second_commander"
 """Key of `BoatReading.faults` under which a link counts commands of somebody else."""
-
-
-class GameState(Protocol):
-    """The state of the game as a referee sent it."""
-
-    over: bool
-
-    def as_dict(self) -> dict[str, Any]:
-        """As the feed has it."""
-
-
-class GameSource(Protocol):
-    """Gives the latest state of the game; never waits."""
-
-    def game(self) -> GameState | None:
-        """None: none yet."""
-
-    def game_age_s(self) -> float:
-        """Its age, s; inf: none yet."""
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What the loop works with.
-
-    Attributes:
-        links: of the boats this process commands, connected and prepared.
-        ears: links that are only listened to, of boats somebody else commands.
-        contacts: other sources of positions.
-        game: the referee's state of the game; None: none.
-        policy: where wanted commands come from.
-        sinks: get every tick; the black box among them.
-    """
-
-    links: Mapping[str, Link]
-    policy: WantedSource
-    ears: Mapping[str, Link] = field(default_factory=dict)
-    contacts: Sequence[ContactSource] = ()
-    game: GameSource | None = None
-    sinks: Sequence[TickSink] = ()
 
 
 class Loop:
@@ -103,16 +63,17 @@ class Loop:
         self.overruns = Overruns(fleet.dt_s)
         self.roster = Roster(fleet, parts.links)
         chosen = Shield(fleet.shield_config, fleet.surroundings) if shield is None else shield
+        self.delays = Delays({name: fleet.platform_of[name] for name in parts.links}, fleet.shield_config)
         self._helm = Helm(fleet, chosen, parts.links, clock)
         self._watch = PolicyWatch(fleet, tuple(parts.links))
         self._has_referee = fleet.feed is not None and fleet.feed.referee is not None
         self._mates = _mates(fleet, parts.links)
         self._number = 0
-        self._log_fault = ""
-        self._broken: set[int] = set()
+        self._recorder = Recorder(parts.sinks)
         self._rivals_s: dict[str, float] = {}
         self._broke_s = -math.inf
         self._ending = ""
+        self._readings: dict[str, BoatReading] = {}
 
     def run(self, seconds: float | None = None) -> str:
         """Turn at the file's rate until the operator ends it or the time is over, then bring boats to rest.
@@ -147,8 +108,7 @@ class Loop:
 
     def _at_rest(self) -> bool:
         """Whether every own boat that is known and obeys lies still."""
-        readings = (link.read() for link in self.parts.links.values())
-        return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in readings)
+        return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in self._readings.values())
 
     def _turn_or_stop(self, due_s: float) -> None:
         """A turn that breaks where none should leaves boats told to stop, and the next one is tried."""
@@ -167,7 +127,7 @@ class Loop:
             due_s: when it was due.
         """
         began = self.clock.now_s()
-        readings = {name: link.read() for name, link in self.parts.links.items()}
+        self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
         answer, policy_age, fault = _latest(self.parts.policy)
@@ -176,6 +136,7 @@ class Loop:
         verdict = judge(self.fleet, self.roster, self._seen(began, readings, game, game_age))
         steered = self._steer(answer, verdict)
         self.roster.sent(began, steered.sent)
+        self.delays.update(readings, steered.sent)
         tick = Tick(
             number=self._number,
             due_s=due_s,
@@ -190,11 +151,11 @@ class Loop:
             shield_reset=steered.shield_reset,
             sent=steered.sent,
             policy_age_s=policy_age,
-            actions=(*self.operator.actions(began), *verdict.actions, *steered.actions),
+            actions=(*self.operator.actions(began), *verdict.actions, *steered.actions, *self.delays.actions()),
             game={} if game is None else game.as_dict(),
         )
         self._number += 1
-        self._record(tick)
+        self._recorder.take(tick)
         self.parts.policy.offer(Snapshot(tick.number, began, seen_now(self.roster), tick.game, game_age))
         return tick
 
@@ -224,7 +185,7 @@ class Loop:
             game_age_s=game_age_s,
             game_expected=self.parts.game is not None and self._has_referee,
             game_over=game is not None and game.over,
-            log_fault=self._log_fault,
+            log_fault=self._recorder.fault,
             overrides=self.operator.active(now_s),
         )
 
@@ -238,25 +199,6 @@ class Loop:
         source = self.parts.game
         return (None, math.inf) if source is None else (source.game(), source.game_age_s())
 
-    def _record(self, tick: Tick) -> None:
-        """Give the tick to all; a sink that can keep no more is named, and the others still get it."""
-        for k, sink in enumerate(self.parts.sinks):
-            try:
-                sink.take(tick)
-            except BridgeError as error:
-                if k not in self._broken:
-                    LOG.error("%s", error)
-                self._broken.add(k)
-                self._log_fault = str(error)
-            except Exception:
-                if k not in self._broken:
-                    LOG.exception("a sink broke; it gets no boat into danger")
-                self._broken.add(k)
-            else:
-                self._broken.discard(k)
-        if not self._broken:
-            self._log_fault = ""
-
 
 def _latest(policy: WantedSource) -> tuple[Commands | None, float, str]:
     answer = policy.latest()
@@ -268,19 +210,3 @@ def _mates(fleet: FleetFile, links: Mapping[str, Link]) -> tuple[str, ...]:
     if fleet.coordination == "team":
         return ()
     return tuple(boat.name for boat in fleet.ours if boat.name not in links)
-
-
-def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
-    """A boat's own telemetry as a contact; None while something of it was never received."""
-    values = (*reading.position_m, reading.heading_rad, reading.speed_mps, reading.age_s)
-    if not np.isfinite(values).all():
-        return None
-    return Contact(
-        boat=reading.boat,
-        position_m=reading.position_m,
-        heading_rad=reading.heading_rad,
-        speed_mps=reading.speed_mps,
-        fixed_s=reading.read_s - reading.age_s,
-        error_m=error_m,
-        source="telemetry",
-    )

@@ -10,8 +10,9 @@ from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.loop import Loop, Parts
+from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.exceptions import BridgeError, LinkError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -344,3 +345,41 @@ def test_a_boat_outside_the_geofence_is_steered_back():
     assert ("geofence", "return") in world.responses("blue_1")
     world.run(40.0)
     assert world.fleet.geofence.holds(*world.links["blue_1"].row[:2])
+
+
+def test_a_wall_clock_that_steps_by_an_hour_changes_nothing(monkeypatch):
+    plain = pair().run(6.0)
+    stepped = pair()
+    wall = time.time
+
+    def strike(world):
+        if world.clock.now_s() >= 1002.0:
+            monkeypatch.setattr(time, "time", lambda: wall() + 3600.0)
+        if world.clock.now_s() >= 1004.0:
+            monkeypatch.setattr(time, "time", lambda: wall() - 3600.0)
+
+    stepped.run(6.0, strike)
+    for before, after in zip(plain.sink.ticks, stepped.sink.ticks, strict=True):
+        np.testing.assert_array_equal(before.decisions.sent.values, after.decisions.sent.values)
+        assert before.actions == after.actions
+
+
+def test_boats_that_obey_later_than_declared_are_told_of():
+    def weaving(snapshot):
+        heading = 1.0 if (snapshot.number // 40) % 2 else 0.0
+        return np.array([[2.0, heading], [0.0, 0.0]])
+
+    world = World(fleet_of(blue=1, red=1), [(20.0, 0.0, 0.0, 2.0)], weaving, others=[("red_1", 90.0, 50.0, 0.0, 0.0)])
+    link, queue = world.links["blue_1"], [None] * 4
+
+    def late(dt_s, advance=link.advance):
+        now = link.command
+        queue.append(now)
+        link.command = queue.pop(0)
+        advance(dt_s)
+        link.command = now
+
+    link.advance = late
+    world.run(15.0)
+    assert ("delay", "none") in world.responses("blue_1")
+    assert any("0.4 s" in action.text for action in world.last.actions)
