@@ -14,14 +14,17 @@ from .dialogue import Dialogue
 from .endpoint import Endpoint
 from .health import RoundTrips
 from .modes import GUIDED, Heartbeat, read_heartbeat
+from .obedience import Obedience
 from .preparation import TOP_SPEED
 from .reception import AUTOPILOT
 from .routes import AttitudeRoute, Route
-from .streams import Streams, interval_request
+from .streams import ATTITUDE, Streams, interval_request
 from .telemetry import Telemetry
 
 HEARTBEAT_LOST_S = 3.5
 """Without a heartbeat for so long the boat is not taken to obey."""
+OLD_S = 1.0
+"""Older telemetry says nothing about obedience."""
 _RECHECK_S = 5.0
 
 
@@ -60,6 +63,7 @@ class Autopilot:
         self.telemetry = Telemetry(frame)
         self.commanders = Commanders(boat, system_id, endpoint.codec.source)
         self.trips = RoundTrips()
+        self.obedience = Obedience()
         self.heartbeat: Heartbeat | None = None
         self.route: Route | None = None
         self.expects_guided = False
@@ -94,6 +98,16 @@ class Autopilot:
     def send(self, message: Any) -> bool:
         """Send any message to the boat; False when it did not leave."""
         return self.endpoint.send(self.system_id, message)
+
+    def told(self, heading_rad: float, speed_mps: float, now_s: float) -> None:
+        """A command left, heading rad clockwise from true north: from now on the boat is expected to do that."""
+        with self.dialogue.changed:
+            if self.why_not(now_s):
+                self.telemetry.told_speed(0.0, now_s)
+                self.obedience.forget()
+            else:
+                self.telemetry.told_speed(speed_mps, now_s)
+                self.obedience.told(heading_rad, speed_mps, now_s)
 
     def refused(self) -> Counter[str]:
         """What was refused so far of what claimed to be this boat's, not taken."""
@@ -155,6 +169,18 @@ class Autopilot:
         self._note("", f"{self.boat}: {text}" if text else "", received_s)
         if self.telemetry.clock.starts != starts:
             self.streams.restart()
+        if message.get_msgId() == ATTITUDE:
+            self._check_obedience(received_s)
+
+    def _check_obedience(self, now_s: float) -> None:
+        seen = self.telemetry
+        if self.why_not(now_s) or now_s - min(seen.heading[1], seen.velocity_s) > OLD_S:
+            self.obedience.forget()
+            return
+        fault = self.obedience.fault(seen.heading[0], seen.turn_rate_rads, seen.speed_mps, now_s)
+        if fault:
+            text = f"{self.boat}: {fault}: see who else commands it, or take it over by hand and check its steering"
+            self._note("disobeys", text, now_s)
 
     def _hear_heartbeat(self, message: Any, received_s: float) -> None:
         beat = read_heartbeat(message, received_s)

@@ -86,12 +86,12 @@ class BoatClock:
     def _check_lost(self, least_s: float, most_s: float, received_s: float) -> None:
         """An answer cannot come before its question: if it seems to, the boat's clock has lost time since."""
         lost_s = least_s - (self._quickest_s + DRIFT * max(0.0, received_s - self._heard_s))
-        if lost_s <= 0.0:
-            return
         if lost_s > AHEAD_S:
             self._forget()
-        self._quickest_s, self._heard_s = most_s, received_s
-        self._middle_s, self._trip_s = math.nan, math.inf
+            self._quickest_s, self._heard_s = most_s, received_s
+        elif lost_s > 0.0:
+            self._quickest_s, self._heard_s = least_s, received_s
+            self._middle_s = max(self._middle_s, least_s)
 
     def _is_odd(self, boot_s: float, difference: float) -> bool:
         """Earlier than the latest by far, or much quicker than any before, and than the round trip allows."""

@@ -192,9 +192,8 @@ class MavlinkLink:
         boat = self.autopilot
         delivered = boat.send(encoded.message)
         now_s = self._clock.now_s()
-        with boat.dialogue.changed:
-            obeys = delivered and not boat.why_not(now_s)
-            boat.telemetry.told_speed(encoded.speed_mps if obeys else 0.0, now_s)
+        if delivered:
+            boat.told(encoded.heading_rad, encoded.speed_mps, now_s)
         self._last_rad = encoded.heading_rad
         heading_rad = self._frame.heading_to_field_rad(encoded.heading_rad)
         return Sent(self.boat, now_s, heading_rad, encoded.speed_mps, route, delivered)

@@ -1,0 +1,278 @@
+"""Links on simulated boats that behave as measured: faults of a boat, each with what the link makes of it.
+
+Boats live on a clock moved by hand, by a thread that gives the links time to listen after each step: several times
+faster than real time, and no slower machine makes anything late.
+"""
+
+import math
+import threading
+import time
+
+import pytest
+from pymavlink import mavutil
+from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
+from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.mavlink.endpoint import Endpoint
+from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.mavlink.signing import Signing
+from steerclear.shield.exceptions import LinkRefused
+from steerclear.shield.platforms import layout as L
+
+STEP_S = 0.06
+LISTEN_S = 0.008
+KEY = bytes(range(32))
+FRAME = FieldFrame(42.0, -71.0)
+
+
+class Lake:
+    """One simulated boat and its link."""
+
+    def __init__(self, *, boot_s=0.0, key=None, signing=None, noise=1.0, prepared=True):
+        self.clock = ManualClock(1000.0)
+        boat = SimBoat("blue_1", start=(40.0, 20.0, 90.0), system_id=7)
+        settings = AutopilotSettings(boot_s=boot_s)
+        self.fleet = SimFleet([boat], clock=self.clock, autopilot=settings, noise=noise, key=key, seed=3)
+        self.endpoint = Endpoint(self.fleet.addresses["blue_1"], self.clock, signing=signing)
+        self.link = MavlinkLink("blue_1", self.endpoint, 7, FRAME, self.clock, rate_hz=10.0)
+        self.command = None
+        self.prepared = prepared
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def _run(self):
+        sent_s = 0.0
+        while not self._ending.is_set():
+            self.clock.sleep_until(self.clock.now_s() + STEP_S)
+            self.fleet.advance(STEP_S)
+            if self.command is not None and self.clock.now_s() - sent_s >= 0.2:
+                sent_s = self.clock.now_s()
+                self.link.send(*self.command)
+            time.sleep(LISTEN_S)
+
+    def __enter__(self):
+        self._thread.start()
+        try:
+            if self.prepared:
+                self.link.connect(30.0)
+                self.link.prepare(60.0)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        self.command = None
+        self._ending.set()
+        self._thread.join(10.0)
+        self.link.release()
+        self.endpoint.close()
+        self.fleet.close()
+
+    def wait(self, holds, seconds):
+        """Time until something held, s of the boats' clock; None when it did not in time."""
+        began, real = self.clock.now_s(), time.monotonic() + 60.0
+        while self.clock.now_s() - began < seconds and time.monotonic() < real:
+            if holds():
+                return self.clock.now_s() - began
+            time.sleep(0.005)
+        return self.clock.now_s() - began if holds() else None
+
+    def under_way(self, heading=1.0, speed=1.5, most=0.9):
+        self.command = (heading, speed)
+        assert self.wait(lambda: self.link.read().speed_mps > most, 20.0) is not None
+
+    def true_speed(self):
+        return float(self.fleet.states()["blue_1"][L.SPEED])
+
+    def error_m(self):
+        row, (x, y) = self.fleet.states()["blue_1"], self.link.read().position_m
+        return math.hypot(x - row[L.X], y - row[L.Y])
+
+
+@pytest.fixture
+def lake():
+    with Lake() as made:
+        yield made
+
+
+def collect(lake, holds, seconds):
+    """Faults and texts until something of them holds."""
+    faults, texts = {}, []
+
+    def seen():
+        reading = lake.link.read()
+        for kind, count in reading.faults.items():
+            faults[kind] = faults.get(kind, 0) + count
+        texts.extend(reading.texts)
+        return holds(faults, texts)
+
+    assert lake.wait(seen, seconds) is not None, (faults, texts)
+    return faults, texts
+
+
+def test_it_steers_by_what_it_is_told_and_is_left_in_hold(lake):
+    lake.under_way()
+    lake.wait(lambda: False, 6.0)
+    row = lake.fleet.states()["blue_1"]
+    assert row[L.HEADING] == pytest.approx(math.degrees(1.0), abs=6.0)
+    assert row[L.SPEED] == pytest.approx(1.5, abs=0.25)
+    reading = lake.link.read()
+    assert reading.age_s < 0.3
+    assert lake.error_m() < 0.7
+    lake.command = None
+    text = lake.link.close()
+    assert text.startswith("blue_1: in HOLD, speed 0.")
+    assert lake.true_speed() < 0.5
+
+
+def test_a_boat_that_boots_is_waited_for_and_one_that_boots_too_long_refuses_in_its_own_words():
+    with Lake(boot_s=8.0, prepared=False) as lake:
+        lake.link.connect(30.0)
+        lake.link.prepare(60.0)
+        assert lake.link.read().ready
+    with Lake(boot_s=1000.0, prepared=False) as lake:
+        lake.link.connect(30.0)
+        with pytest.raises(LinkRefused, match=r"blue_1 refuses .*: .*\w+.*; put that right"):
+            lake.link.prepare(6.0)
+
+
+def test_commands_that_end_stop_the_boat_by_its_own_time_out(lake):
+    lake.under_way()
+    lake.command = None
+    ended = lake.clock.now_s()
+    _, _texts = collect(lake, lambda faults, texts: any("stopping" in text for text in texts), 8.0)
+    assert 2.5 < lake.clock.now_s() - ended < 5.0
+    assert lake.wait(lambda: abs(lake.true_speed()) < 0.2, 10.0) is not None
+
+
+def test_telemetry_that_stops_grows_old_at_once(lake):
+    lake.under_way()
+    lake.fleet.fault("blue_1", "telemetry_stop")
+    assert lake.wait(lambda: lake.link.read().age_s > 0.5, 2.0) < 1.2
+    assert lake.wait(lambda: not lake.link.read().ready, 6.0) is not None
+    lake.fleet.clear("blue_1")
+    assert lake.wait(lambda: lake.link.read().ready and lake.link.read().age_s < 0.3, 6.0) is not None
+
+
+def test_frozen_telemetry_with_fresh_stamps_grows_old(lake):
+    lake.under_way()
+    lake.fleet.fault("blue_1", "freeze")
+    took = lake.wait(lambda: lake.link.read().age_s > 0.5, 4.0)
+    assert took is not None
+    assert took < 1.5
+    lake.fleet.clear("blue_1")
+    assert lake.wait(lambda: lake.link.read().age_s < 0.3, 6.0) is not None
+
+
+def test_a_freeze_at_rest_is_found_once_the_boat_should_move(lake):
+    lake.wait(lambda: False, 2.0)
+    lake.fleet.fault("blue_1", "freeze")
+    lake.command = (1.0, 1.5)
+    took = lake.wait(lambda: lake.link.read().age_s > 0.5, 6.0)
+    assert took is not None
+    assert took < 3.5
+
+
+def test_a_jump_of_30_m_is_refused_for_two_seconds_and_then_told(lake):
+    lake.under_way()
+    lake.fleet.fault("blue_1", "jump")
+    faults, texts = collect(lake, lambda faults, texts: any("jumped" in text for text in texts), 3.0)
+    assert faults["jump"] >= 1
+    assert "not believed until it holds" in " ".join(texts)
+    assert lake.error_m() < 5.0
+    assert lake.wait(lambda: lake.link.read().position_age_s > 0.5, 3.0) is not None
+    assert lake.wait(lambda: 25.0 < lake.error_m() < 35.0, 6.0) is not None
+
+
+def test_telemetry_a_second_late_is_known_to_be_a_second_old(lake):
+    lake.under_way()
+    assert lake.link.read().age_s < 0.3
+    lake.fleet.fault("blue_1", "late", delay_s=1.0)
+    lake.wait(lambda: False, 3.0)
+    ages = [lake.link.read().age_s for _ in range(5)]
+    assert all(0.8 < age < 1.5 for age in ages)
+    lake.fleet.clear("blue_1")
+    assert lake.wait(lambda: lake.link.read().age_s < 0.3, 4.0) is not None
+
+
+@pytest.mark.parametrize("kind", ["out_of_order", "duplicate", "corrupt"])
+def test_disorder_copies_and_damage_are_counted_and_do_no_harm(lake, kind):
+    lake.under_way()
+    lake.link.read()
+    lake.fleet.fault("blue_1", kind)
+    fault = {"corrupt": "bad_checksum", "duplicate": "out_of_order"}.get(kind, kind)
+    collect(lake, lambda faults, texts: faults.get(fault, 0) > 5, 10.0)
+    fixed, worst = [], 0.0
+    for _ in range(40):
+        lake.wait(lambda: False, 0.05)
+        reading = lake.link.read()
+        fixed.append(reading.read_s - reading.position_age_s)
+        worst = max(worst, lake.error_m())
+    assert fixed == sorted(fixed), "what is read never goes back in time"
+    assert worst < 2.5
+
+
+def test_a_restart_is_told_is_not_obeyed_and_can_be_prepared_again(lake):
+    lake.under_way()
+    lake.fleet.fault("blue_1", "restart")
+    assert lake.wait(lambda: not lake.link.read().ready, 10.0) is not None
+    lake.command = None
+    assert lake.wait(lambda: lake.link.read().age_s < 0.3, 20.0) is not None, "streams are asked for again"
+    assert lake.link.read().mode == "MANUAL", "nobody but the operator puts it back"
+    lake.link.prepare(60.0)
+    assert lake.link.read().ready
+
+
+def test_a_link_lost_for_five_seconds_comes_back_with_the_boat_stopped_meanwhile(lake):
+    lake.under_way()
+    lake.fleet.fault("blue_1", "link_loss")
+    assert lake.wait(lambda: not lake.link.read().ready, 6.0) is not None
+    assert lake.wait(lambda: abs(lake.true_speed()) < 0.2, 12.0) is not None, "its own time-out, commands still sent"
+    lake.fleet.clear("blue_1")
+    assert lake.wait(lambda: lake.link.read().ready, 6.0) is not None
+    assert lake.wait(lambda: lake.true_speed() > 0.5, 10.0) is not None, "and it goes on as told"
+
+
+def test_a_second_commander_is_told_by_the_answers_he_gets(lake):
+    lake.under_way()
+    place = lake.fleet.addresses["blue_1"].removeprefix("udpout:")
+    other = mavutil.mavlink_connection(f"udpout:{place}", dialect="ardupilotmega", source_system=252)
+    try:
+        other.mav.command_long_send(7, 1, 176, 0, 1, 15, 0, 0, 0, 0, 0)
+        _, texts = collect(lake, lambda faults, texts: faults.get("second_commander", 0) > 0, 5.0)
+    finally:
+        other.close()
+    assert any("a second commander (system 252" in text for text in texts)
+
+
+def test_a_second_commander_nobody_hears_is_told_by_what_the_boat_does(lake):
+    lake.under_way(heading=1.0)
+    place = lake.fleet.addresses["blue_1"].removeprefix("udpout:")
+    other = mavutil.mavlink_connection(f"udpout:{place}", dialect="ardupilotmega", source_system=252)
+    turn = 1.0
+
+    def steer():
+        nonlocal turn
+        turn -= 0.02
+        q = [math.cos(turn / 2.0), 0.0, 0.0, math.sin(turn / 2.0)]
+        for _ in range(3):
+            other.mav.set_attitude_target_send(0, 7, 1, 7, q, 0, 0, 0, 0.7)
+
+    try:
+        _, texts = collect(lake, lambda faults, texts: (steer(), faults.get("disobeys", 0) > 0)[1], 60.0)
+    finally:
+        other.close()
+    assert any("see who else commands it" in text for text in texts)
+
+
+def test_signed_boats_are_steered_and_ignore_who_does_not_sign():
+    with Lake(key=KEY, signing=Signing(KEY)) as lake:
+        lake.under_way()
+        place = lake.fleet.addresses["blue_1"].removeprefix("udpout:")
+        other = mavutil.mavlink_connection(f"udpout:{place}", dialect="ardupilotmega", source_system=252)
+        other.mav.command_long_send(7, 1, 176, 0, 1, 4, 0, 0, 0, 0, 0)
+        lake.wait(lambda: False, 2.0)
+        other.close()
+        assert lake.link.read().ready
+        assert lake.true_speed() > 0.8
