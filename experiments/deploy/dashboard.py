@@ -106,6 +106,8 @@ class Dashboard:
         self._keyboard.close()
         self._thread.join(timeout=5.0)
         atexit.unregister(self.close)
+        if self._thread.is_alive():
+            return  # the terminal takes nothing any more; what would be written now would wait for ever
         for line in self._log.kept():
             self._console.print(line, markup=False, soft_wrap=True)
 

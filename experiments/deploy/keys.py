@@ -9,13 +9,13 @@ import select
 import sys
 import termios
 import threading
-import tty
 from collections.abc import Callable
 
 logger = logging.getLogger(__name__)
 
 WAIT_S = 0.1
 ESCAPE = "\x1b"
+_NO_KEY = b"\x00"
 
 
 class Keyboard:
@@ -78,12 +78,19 @@ class Keyboard:
                 logger.exception("key %r failed", key)
 
     def _take_over(self, descriptor: int) -> None:
-        """Keys one by one and unseen; repeated, since a shell may have set the terminal back meanwhile."""
+        """Keys one by one and unseen; repeated, since a shell may have set the terminal back meanwhile.
+
+        Ctrl-Z would stop the process, and with it the shield; Ctrl-S would freeze the picture. Both are taken away.
+        """
         present = termios.tcgetattr(descriptor)
         if self._before is None:
-            self._before = present
+            self._before = termios.tcgetattr(descriptor)
         if present[3] & (termios.ICANON | termios.ECHO):
-            tty.setcbreak(descriptor, termios.TCSANOW)
+            present[0] &= ~(termios.IXON | termios.ICRNL)
+            present[3] &= ~(termios.ICANON | termios.ECHO)
+            for key, value in ((termios.VMIN, 1), (termios.VTIME, 0), (termios.VSUSP, _NO_KEY)):
+                present[6][key] = value
+            termios.tcsetattr(descriptor, termios.TCSANOW, present)
 
     def _give_back(self, descriptor: int) -> None:
         with contextlib.suppress(OSError, termios.error):

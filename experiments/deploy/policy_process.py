@@ -11,10 +11,12 @@ import math
 import pickle
 import time
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+from steerclear.policies.registry import looks_like_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.wanted import Answer, Snapshot
@@ -71,7 +73,8 @@ class PolicyProcess:
         seed: int = 0,
         start_within_s: float = START_WITHIN_S,
     ) -> None:
-        self.policy = policy
+        self.policy = Path(policy).name if looks_like_path(policy) else policy
+        """Its short name, for messages."""
         self._orders = pickle.dumps(Orders(cast_of(fleet, boats), policy, dict(options or {}), seed))
         self._shape = (len(fleet.names), 2)
         self._deadline_s = fleet.limits.policy.give_up_after_s if deadline_s is None else deadline_s

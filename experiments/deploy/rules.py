@@ -15,6 +15,7 @@ from steerclear.shield.bridge.feed import BoatStatus, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
 from steerclear.shield.jit import IntArray
+from steerclear.shield.platforms import layout as L
 
 FROM_FILE = {
     "team_size": "boats",
@@ -75,6 +76,7 @@ class Umpire:
     def __init__(self, config: GameConfig, names: Sequence[str], lost_after_s: float = 5.0) -> None:
         if len(names) != config.n_boats:
             raise GameError(f"{len(names)} names for {config.n_boats} boats; name each boat of the game")
+        _warm_up(config)
         self.core = BatchedMctf(config)
         self.names = tuple(names)
         self.lost_after_s = lost_after_s
@@ -148,6 +150,15 @@ class Umpire:
         if self.over:
             told.append("the game is over")
         return told
+
+
+def _warm_up(config: GameConfig) -> None:
+    """Compile the rules, so that the game's first seconds are not spent on it."""
+    core = BatchedMctf(config)
+    seen = core.state[..., : L.SPEED + 1].copy()
+    core.start_seen(seen)
+    core.follow(seen, config.dt_s)
+    core.commands(np.zeros((1, config.n_boats, 2)))
 
 
 def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameState:

@@ -94,6 +94,8 @@ def is_among(host: str, networks: Sequence[Network]) -> bool:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
         return False
+    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped is not None:
+        address = address.ipv4_mapped  # IPv4 heard on a socket that hears both
     return any(address in network for network in networks)
 
 

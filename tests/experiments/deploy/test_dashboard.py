@@ -283,6 +283,9 @@ def test_keys_come_one_by_one_and_the_terminal_is_left_as_it_was(terminal):
     os.write(outer, b" q\xff")
     wait_for(lambda: len(came) == 4)
     assert came[:3] == ["!", " ", "q"]
+    os.write(outer, b"\x1a\x13")
+    wait_for(lambda: len(came) == 6)
+    assert came[4:] == ["\x1a", "\x13"], "neither suspends the process nor freezes the picture"
     keyboard.close()
     keyboard.close()
     assert termios.tcgetattr(inner) == before

@@ -58,7 +58,7 @@ def test_scripted_policies_answer_bit_for_bit_what_they_answer_in_the_game(fleet
 def test_a_submission_sees_and_answers_bit_for_bit_what_it_does_in_the_game(fleet_of, snapshot_of, write_entry):
     entry = write_entry(EXACT, start="self.calls = 0", head="import zlib\nimport numpy as np")
     driven = 0
-    for env, play, commands, ours, player, observations, infos in play_both(fleet_of(), entry, snapshot_of, 400):
+    for env, play, commands, ours, player, observations, infos in play_both(fleet_of(), entry, snapshot_of, 250):
         assert play.problems == ()
         np.testing.assert_array_equal(play.relative[ours], commands[ours])
         np.testing.assert_array_equal(play.driven, env.core.driven[0])

@@ -14,6 +14,7 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
+from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.referee import Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
 from steerclear.experiments.keys import KEYS, undocumented
@@ -54,7 +55,7 @@ def test_the_umpire_of_a_simulated_game_says_what_the_game_says():
     names = [f"boat {i}" for i in range(6)]
     umpire = Umpire(config, names)
     happened = set()
-    for step in range(1500):
+    for step in range(1000):
         state = env.core.state[0]
         seen = [
             Contact(name, tuple(row[:2].tolist()), math.radians(row[L.HEADING]), row[L.SPEED], step * dt_s, 0.0, "hub")
@@ -170,6 +171,11 @@ boats:
         return path
 
     return build
+
+
+@pytest.fixture(autouse=True)
+def _brief_endings(monkeypatch):
+    monkeypatch.setattr(referee_module, "LINGER_S", 0.3)
 
 
 def free_port():

@@ -200,7 +200,8 @@ def test_packets_from_hosts_not_allowed_are_not_even_read():
         assert receiver.read() == ()
         receiver.take(positions(contact()), "10.1.200.3")
         receiver.take(positions(contact(), seq=2), "::1")
-        assert len(receiver.read()) == 1
+        receiver.take(positions(contact(speed_mps=0.25), seq=3), "::ffff:10.1.0.9")
+        assert [found.speed_mps for found in receiver.read()] == [0.25]
         assert receiver.faults() == {"foreign": 4}
 
 
