@@ -17,7 +17,7 @@ from steerclear.shield.platforms import layout as L
 from .replaying_tracks import Array, Tracks
 
 OFF_M = 1e6
-"""Where boats are that are not there, m, each a kilometre from the next."""
+"""Where boats are that are not there, m, each as far from the next."""
 _MARKS = {"has_flag": "has_flag", "is_tagged": "tagged", "oob": "oob"}
 
 
@@ -27,7 +27,7 @@ def placed(states: Array) -> Array:
     for i in range(states.shape[1]):
         gone = ~np.isfinite(states[:, i, L.X])
         found[gone, i] = 0.0
-        found[gone, i, L.X] = OFF_M + 1e3 * i
+        found[gone, i, L.X] = OFF_M * (i + 1)
         found[gone, i, L.Y] = OFF_M
     return found
 

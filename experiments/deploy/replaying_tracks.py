@@ -30,7 +30,7 @@ class Tracks:
     Attributes:
         names: of the n boats: in the header's order, then others as they were met.
         team: (n,) 0 blue, 1 red, 2 outside the game.
-        ours: (n,) bool, boats the shield ever decided for.
+        ours: (n,) bool, boats this process commanded and its shield decided for.
         platforms: names.
         params: (n, N_PARAM) platform rows.
         time_s: (T+1,) since the log began, s.
@@ -91,6 +91,7 @@ class TrackBuilder:
         self._header = header
         self._team = {boat.name: boat.team for boat in header.boats}
         self._kind: dict[str, Any] = {boat.name: boat.platform for boat in header.boats}
+        self._mine = {boat.name for boat in header.boats if boat.ours}
         self._ours: set[str] = set()
         self._fixes: dict[str, list[tuple[float, Array]]] = {boat.name: [] for boat in header.boats}
         self._times: list[float] = []
@@ -152,8 +153,8 @@ class TrackBuilder:
             return {}
         found = {}
         for i, name in enumerate(decisions.fleet.names):
-            if not decisions.fleet.controlled[i]:
-                continue
+            if not decisions.fleet.controlled[i] or (self._header.boats and name not in self._mine):
+                continue  # team-mates with a shield of their own are steered by another process
             own_rad = float(decisions.fleet.heading_rad[i])
             self._ours.add(name)
             found[name] = _Decided(

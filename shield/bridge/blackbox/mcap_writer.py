@@ -126,6 +126,11 @@ class McapWriter:
         return self._spool.dropped
 
     @property
+    def behind_s(self) -> float:
+        """How far the disk is behind, s."""
+        return self._spool.behind_s
+
+    @property
     def waiting(self) -> int:
         """Ticks not yet written."""
         return self._spool.waiting

@@ -13,6 +13,10 @@ from ...exceptions import BridgeError
 from .disk import explain
 
 LOG = logging.getLogger(__name__)
+
+LATE_S, TALK_EVERY_S = 1.0, 30.0
+"""A disk that is so much behind is told, s, and again after the other."""
+
 Item = TypeVar("Item")
 Taken = TypeVar("Taken", contravariant=True)
 
@@ -53,7 +57,9 @@ class Spool(Generic[Item]):
     ) -> None:
         self.name, self.dropped, self.fault = name, 0, ""
         self._store, self._flush_s, self._give_up_s = store, flush_s, give_up_s
-        self._queue: queue.Queue[Item | None] = queue.Queue(capacity)
+        self._queue: queue.Queue[tuple[float, Item] | None] = queue.Queue(capacity)
+        self._oldest_s: float | None = None
+        self._told_s = -TALK_EVERY_S
         self._closing = threading.Event()
         self._progress_s = time.monotonic()
         self._thread = threading.Thread(target=self._run, name=f"log {name}", daemon=True)
@@ -68,7 +74,7 @@ class Spool(Generic[Item]):
         if self.fault or self._closing.is_set():
             raise BridgeError(self.fault or f"the log {self.name} is closed; open another one")
         try:
-            self._queue.put_nowait(item)
+            self._queue.put_nowait((time.monotonic(), item))
         except queue.Full:
             self._drop()
         stuck_s = time.monotonic() - self._progress_s
@@ -93,6 +99,12 @@ class Spool(Generic[Item]):
         """Things not yet taken by the thread."""
         return self._queue.qsize()
 
+    @property
+    def behind_s(self) -> float:
+        """Age of the oldest thing that is not on the disk, s, as far as the thread has taken it; 0 when all is."""
+        oldest_s = self._oldest_s
+        return 0.0 if oldest_s is None else time.monotonic() - oldest_s
+
     def _drop(self) -> None:
         if self.dropped == 0:
             LOG.warning("the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting)
@@ -109,20 +121,27 @@ class Spool(Generic[Item]):
             self._fail(f"the log {self.name} cannot be written ({type(error).__name__}: {error}); report this")
 
     def _work(self) -> None:
-        due_s, unwritten = time.monotonic() + self._flush_s, False
+        due_s = time.monotonic() + self._flush_s
         while not (self._closing.is_set() and self._queue.empty()):
-            item = self._next(due_s - time.monotonic())
-            if item is not None:
-                self._store.keep(item)
-                unwritten = True
+            taken = self._next(due_s - time.monotonic())
+            if taken is not None:
+                self._oldest_s = taken[0] if self._oldest_s is None else self._oldest_s
+                self._store.keep(taken[1])
             self._progress_s = time.monotonic()
             if self._progress_s >= due_s:
-                if unwritten:
-                    self._store.flush()
-                self._progress_s = time.monotonic()
-                due_s, unwritten = self._progress_s + self._flush_s, False
+                self._flush()
+                due_s = self._progress_s + self._flush_s
 
-    def _next(self, wait_s: float) -> Item | None:
+    def _flush(self) -> None:
+        if self._oldest_s is not None:
+            self._store.flush()
+        self._progress_s, behind_s = time.monotonic(), self.behind_s
+        self._oldest_s = None
+        if behind_s > LATE_S and self._progress_s - self._told_s > TALK_EVERY_S:
+            self._told_s = self._progress_s
+            LOG.warning("the log %s was %.1f s behind: the disk is slow", self.name, behind_s)
+
+    def _next(self, wait_s: float) -> tuple[float, Item] | None:
         try:
             return self._queue.get(timeout=max(0.0, wait_s)) if wait_s > 0.0 else self._queue.get_nowait()
         except queue.Empty:

@@ -207,6 +207,20 @@ def test_breaches_of_the_record_are_those_of_the_track(run):
     assert np.array_equal(record["wanted"], record["sent"], equal_nan=True)
 
 
+def test_team_mates_of_another_process_are_not_ours(run):
+    header, ticks, _ = run
+    boats = tuple(dataclasses.replace(boat, ours=boat.name == "blue_1") for boat in header.boats)
+    tracks = tracks_of(ticks, dataclasses.replace(header, boats=boats))
+    assert tracks.ours.tolist() == [True, False, False, False]
+    assert not sail_without(tracks).away[:, 1].any()
+
+
+def test_boats_that_are_not_there_are_far_from_all(run):
+    states = np.full((5, 4, L.N_STATE), np.nan)
+    far = placed(states)[..., :2]
+    assert closest_m(far, [0, 1, 2, 3]) > 1e5
+
+
 def test_a_log_without_boats_has_no_tracks(run):
     header, ticks, _ = run
     none = [dataclasses.replace(tick, fleet=None, decisions=None) for tick in ticks[:5]]

@@ -214,6 +214,22 @@ def test_a_stuck_disk_is_said_and_forgiven_when_it_goes_on(tmp_path, ticks):
     assert writer.dropped == 0
 
 
+def test_a_disk_that_falls_behind_is_told(tmp_path, ticks, caplog):
+    found = []
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
+    assert writer.behind_s == 0.0
+    found[0].free.clear()
+    writer.take(ticks[0])
+    until(lambda: writer.behind_s > 1.1)
+    found[0].free.set()
+    until(lambda: writer.behind_s == 0.0)
+    writer.close()
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) == 1
+    assert "s behind: the disk is slow" in told[0]
+    assert kept(tmp_path / "run.mcap") == ([0], True)
+
+
 def test_closing_does_not_wait_for_ever(tmp_path, ticks):
     found = []
     writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
