@@ -1,0 +1,114 @@
+"""Bars measured over real sockets in real time: rate, delay, memory, and a runner that is killed.
+
+STEERCLEAR_STUDY_MINUTES says how long the first one plays (default 10).
+"""
+
+import json
+import logging
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from steerclear.env.record import load
+from steerclear.experiments.boats import AutopilotSettings, SimFleet
+from steerclear.experiments.boats.demo import demo_text
+from steerclear.experiments.deploy.demo import Demo
+from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.fleet_file import load_fleet
+from test_deploy_run import free_ports
+
+logger = logging.getLogger(__name__)
+pytestmark = pytest.mark.study
+MINUTES = float(os.environ.get("STEERCLEAR_STUDY_MINUTES", "10"))
+CLI = [sys.executable, "-m", "steerclear.experiments.cli"]
+
+
+@pytest.fixture
+def fleet_file(tmp_path):
+    text = demo_text()
+    for old, new in zip((14550, 14700, 14701), free_ports(3), strict=True):
+        text = text.replace(f":{old}", f":{new}")
+    path = tmp_path / "FLEET.yaml"
+    path.write_text(text)
+    return path
+
+
+def deploying(fleet_file, *more):
+    """A runner without its screen."""
+    command = [*CLI, "deploy", str(fleet_file), "--accept", "drill", "--plain", "--wait", "300", *more]
+    with (fleet_file.parent / "deploy.txt").open("wb") as out:
+        return subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
+
+
+def resident_mib(pid):
+    with open(f"/proc/{pid}/status") as status:
+        line = next(line for line in status if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024.0
+
+
+def test_rate_delay_and_memory_of_three_against_three(fleet_file):
+    """Jitter p99.9 <= 10 ms, telemetry to command p99 <= 20 ms, memory flat, no breach of ours."""
+    truth, result = fleet_file.with_name("truth.npz"), fleet_file.with_name("deploy.json")
+    memory = []
+    with Demo(fleet_file, "medium", more=("--record", str(truth))):
+        runner = deploying(fleet_file, "--minutes", f"{MINUTES:g}", "--json", str(result))
+        while runner.poll() is None:
+            time.sleep(5.0)
+            memory.append(resident_mib(runner.pid) if runner.poll() is None else np.nan)
+        assert runner.returncode == 0, (fleet_file.parent / "deploy.txt").read_text()
+    figures = json.loads(result.read_text())["figures"]
+    late, turn = 1e3 * figures["jitter_p999_s"], 1e3 * figures["read_to_sent_p99_s"]
+    settled = np.array(memory[len(memory) // 4 : -2])
+    growth = float(np.polyfit(5.0 * np.arange(len(settled)), settled, 1)[0]) * 3600.0
+    logger.warning(
+        "%g min: jitter p99.9 %.1f ms, read to sent p99 %.1f ms, %d missed, memory %.0f MiB %+.1f MiB per hour",
+        MINUTES, late, turn, figures["missed_turns"], settled[-1], growth,
+    )  # fmt: skip
+    record = load(truth)
+    own = [i for i, team in enumerate(record.meta["team"]) if team == 0]
+    at = np.asarray(record.arrays["position"])
+    closest = min(np.hypot(*(at[:, i] - at[:, j]).T).min() for i in own for j in range(at.shape[1]) if j != i)
+    logger.warning("closest approach of our boats: %.2f m", closest)
+    assert late <= 10.0
+    assert turn <= 20.0
+    assert growth * max(1.0, MINUTES / 60.0) < 20.0
+    assert closest >= 2.5
+
+
+def test_boats_stop_by_themselves_when_the_runner_is_killed(fleet_file):
+    """The autopilots' own 3 s; the log loses at most 1 s."""
+    text = fleet_file.read_text()
+    fleet_file.write_text(re.sub(r', referee: "[^"]*"', "", text))  # nobody keeps the game here
+    fleet = load_fleet(fleet_file)
+    with SimFleet.from_file(fleet, opponents="", autopilot=AutopilotSettings(boot_s=0.0)) as boats:
+        runner = deploying(fleet_file, "--minutes", "5")
+        try:
+            wait_for(lambda: max(row[3] for row in boats.states().values()) > 1.0, 300.0)
+            time.sleep(5.0)
+        finally:
+            runner.send_signal(signal.SIGKILL)
+            killed, killed_unix_ns = time.monotonic(), time.time_ns()
+            runner.wait()
+        start = {name: row[:2].copy() for name, row in boats.states().items()}
+        wait_for(lambda: max(abs(row[3]) for row in boats.states().values()) < 0.1, 30.0)
+        stopped = time.monotonic() - killed
+        run = max(float(np.hypot(*(row[:2] - start[name]))) for name, row in boats.states().items())
+    (path,) = fleet.log_dir.glob("*.mcap")
+    with LogReader(path) as log:
+        ticks = list(log.ticks())
+        lost_s = 1e-9 * (killed_unix_ns - log.header.time_ns(ticks[-1].sent_s))
+    logger.warning("boats below 0.1 m/s %.1f s after the kill, %.1f m run; log lost %.2f s", stopped, run, lost_s)
+    assert stopped < 8.0
+    assert lost_s <= 1.0
+
+
+def wait_for(done, seconds):
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.05)
