@@ -101,14 +101,18 @@ def _measure(buffer: bytes, at: int, follows: bool) -> int:
     length = header + buffer[at + 1] + _CHECKSUM + signed
     if len(buffer) - at < length:
         return _SHORT
-    return length if _is_right(buffer, at, header + buffer[at + 1], at + length, follows) else _BAD
-
-
-def _is_right(buffer: bytes, at: int, covered: int, end: int, follows: bool) -> bool:
-    """Whether the checksum is; of messages we do not know, whether it stands between frames."""
     kind = mavlink.mavlink_map.get(message_id(buffer[at : at + 10]))
     if kind is None:
-        return follows and (end == len(buffer) or buffer[end] in _HEADER)
-    checksum = mavlink.x25crc(buffer[at + 1 : at + covered])
+        return _measure_unknown(buffer, at + length, length) if follows else _BAD
+    covered = at + header + buffer[at + 1]
+    checksum = mavlink.x25crc(buffer[at + 1 : covered])
     checksum.accumulate(bytes([kind.crc_extra]))
-    return checksum.crc == int.from_bytes(buffer[at + covered : at + covered + _CHECKSUM], "little")
+    return length if checksum.crc == int.from_bytes(buffer[covered : covered + _CHECKSUM], "little") else _BAD
+
+
+def _measure_unknown(buffer: bytes, end: int, length: int) -> int:
+    """Length of a frame whose checksum nobody knows: nothing follows it, or a right frame does."""
+    if end == len(buffer):
+        return length
+    after = _measure(buffer, end, False)
+    return length if after > 0 else after

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.mavlink.boat_clock import BELIEVED_AFTER, BoatClock
 
@@ -39,6 +39,7 @@ def test_a_delay_there_from_the_start_is_found_by_the_round_trip():
     assert clock.round_trip_s == pytest.approx(0.8)
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=60))
 def test_nothing_is_ever_younger_than_it_is_compared_with_the_quickest(delays):
     clock = BoatClock()

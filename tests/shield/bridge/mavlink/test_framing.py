@@ -27,6 +27,7 @@ def frames_of(count, *, signed=False, first=False):
     return frames
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=40), st.booleans(), st.booleans())
 def test_a_stream_chopped_anyhow_gives_every_frame(cuts, signed, first):
     frames = frames_of(12, signed=signed, first=first)
@@ -41,6 +42,7 @@ def test_a_stream_chopped_anyhow_gives_every_frame(cuts, signed, first):
     assert framer.damaged == 0
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=40), st.binary(max_size=40))
 def test_noise_around_frames_in_a_stream_costs_no_frame(before, after):
     frames = frames_of(6)
@@ -48,7 +50,7 @@ def test_noise_around_frames_in_a_stream_costs_no_frame(before, after):
     assert [f for f in frames if f in got] == frames
 
 
-@settings(max_examples=200)
+@settings(max_examples=200, deadline=None)
 @given(st.data())
 def test_a_damaged_frame_in_a_stream_costs_only_itself(data):
     frames = frames_of(8)
@@ -63,6 +65,7 @@ def test_a_damaged_frame_in_a_stream_costs_only_itself(data):
     assert [frame for frame in got if frame in rest] == rest
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300))
 def test_a_whole_datagram_never_waits_for_the_rest_of_a_broken_one(noise):
     framer, frames = Framer(True), frames_of(4)

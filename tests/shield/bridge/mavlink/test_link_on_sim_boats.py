@@ -20,7 +20,7 @@ from steerclear.shield.exceptions import LinkRefused
 from steerclear.shield.platforms import layout as L
 
 STEP_S = 0.06
-LISTEN_S = 0.008
+LISTEN_S = 0.004
 KEY = bytes(range(32))
 FRAME = FieldFrame(42.0, -71.0)
 

@@ -4,7 +4,7 @@ import math
 import random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.clock import ManualClock
@@ -129,6 +129,7 @@ def test_after_all_that_a_good_boat_is_heard():
     assert bench.link.read().position_age_s < 0.1
 
 
+@settings(deadline=None)
 @given(st.lists(st.binary(max_size=300), max_size=20), st.booleans())
 def test_any_bytes_at_all(pieces, datagrams):
     bench = Bench(datagrams)

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.mavlink.routes import (
@@ -32,6 +32,7 @@ def apart(a, b):
     return abs((a - b + math.pi) % (2 * math.pi) - math.pi)
 
 
+@settings(deadline=None)
 @given(headings, st.floats(-3.0, 3.0))
 def test_attitude_says_the_heading_and_a_share_of_the_top_speed(heading, speed):
     encoded = AttitudeRoute(2.0).encode(TARGET, 5, heading, speed)
@@ -44,6 +45,7 @@ def test_attitude_says_the_heading_and_a_share_of_the_top_speed(heading, speed):
     assert 0.0 <= encoded.heading_rad <= 2 * math.pi
 
 
+@settings(deadline=None)
 @given(headings, speeds)
 def test_velocity_says_heading_and_speed_and_nothing_else(heading, speed):
     encoded = VelocityRoute(1.5).encode(TARGET, 5, heading, speed)
@@ -59,6 +61,7 @@ def test_velocity_never_asks_for_a_boat_to_go_astern():
     assert VelocityRoute(None).encode(TARGET, 0, 1.0, -2.0).speed_mps == pytest.approx(1e-3)
 
 
+@settings(deadline=None)
 @given(headings, speeds)
 def test_no_route_uses_a_mask_that_was_seen_to_fail(heading, speed):
     for route in (AttitudeRoute(2.0), VelocityRoute(2.0)):

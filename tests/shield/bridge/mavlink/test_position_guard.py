@@ -2,7 +2,7 @@
 
 import math
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.mavlink.position_guard import SETTLED_S, PositionGuard
 
@@ -18,6 +18,7 @@ def drive(guard, count, start=(0.0, 0.0), velocity=(1.0, 0.5), at=0.0):
     return verdicts, (start[0] + velocity[0] * DT * count, start[1] + velocity[1] * DT * count), at + DT * count
 
 
+@settings(deadline=None)
 @given(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0), st.floats(0.0, 6.28))
 def test_a_boat_that_drives_is_believed(speed, rate, heading):
     guard, x, y = PositionGuard(), 0.0, 0.0

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.frame import FieldFrame
@@ -251,6 +251,7 @@ shorts = st.integers(-(2**15), 2**15 - 1)
 floats = st.floats(width=32)
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.integers(0, 2**32 - 1), ints, ints, shorts, shorts, st.integers(0, 65535), floats, floats))
 )
