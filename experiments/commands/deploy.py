@@ -74,8 +74,9 @@ def deploy(
     with ExitStack() as stack:
         stack.enter_context(logging_aside(d.text_log(file.log_dir), shown=not dashboard))
         if demo:
-            stack.enter_context(Demo(orders.fleet_file, opponents, speed))
-            err().print("the demonstration's boats are starting; the first time all is compiled, which takes minutes")
+            water = stack.enter_context(Demo(orders.fleet_file, opponents, speed))
+            with err().status("simulated boats are starting; the first time all is compiled, which takes minutes"):
+                water.wait(DEMO_WAIT_S)
         outcome = run_boats(orders, Surface(lambda result: d.show_check(console, result), sinks), operator)
     if outcome.figures:
         console.print(_table(outcome.figures))
@@ -111,7 +112,7 @@ def _orders(
         seed=seed,
         tlog=tlog,
         speed=speed,
-        connect_s=max(wait_s, DEMO_WAIT_S) if demo else wait_s,
+        connect_s=max(wait_s, 60.0) if demo else wait_s,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -64,9 +65,26 @@ class Demo:
         """Which process ended and what it said last; empty: all run."""
         for name, process in self._processes.items():
             if process.poll() is not None:
-                said = (self._folder / f"{name}.txt").read_text(encoding="utf-8", errors="replace").strip()
+                said = self._said(name)
                 return f"the demonstration's {name} ended: {said.splitlines()[-1] if said else 'without a word'}"
         return ""
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait until the boats live; the first time all of it is compiled.
+
+        Raises:
+            BridgeError: a process ended, or the boats do not come.
+        """
+        end = time.monotonic() + timeout_s
+        while "Simulated boats" not in self._said("boats"):
+            if self.fault():
+                raise BridgeError(self.fault())
+            if time.monotonic() > end:
+                raise BridgeError(f"the demonstration's boats did not come in {timeout_s:g} s; see {self._folder}")
+            time.sleep(0.1)
+
+    def _said(self, name: str) -> str:
+        return (self._folder / f"{name}.txt").read_text(encoding="utf-8", errors="replace").strip()
 
     def close(self) -> None:
         """End the processes; may be called again."""

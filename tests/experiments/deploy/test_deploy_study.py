@@ -55,7 +55,8 @@ def test_rate_delay_and_memory_of_three_against_three(fleet_file):
     """Jitter p99.9 <= 10 ms, telemetry to command p99 <= 20 ms, memory flat, no breach of ours."""
     truth, result = fleet_file.with_name("truth.npz"), fleet_file.with_name("deploy.json")
     memory = []
-    with Demo(fleet_file, "medium", more=("--record", str(truth))):
+    with Demo(fleet_file, "medium", more=("--record", str(truth))) as water:
+        water.wait(300.0)
         runner = deploying(fleet_file, "--minutes", f"{MINUTES:g}", "--json", str(result))
         while runner.poll() is None:
             time.sleep(5.0)

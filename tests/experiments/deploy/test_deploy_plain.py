@@ -1,0 +1,86 @@
+"""Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
+
+import logging
+import time
+
+import numpy as np
+import pytest
+from deploy_ticks import Stream
+from steerclear.experiments.deploy.demo import Demo, demo_file
+from steerclear.experiments.deploy.plain import PlainLines, logging_aside
+from steerclear.experiments.deploy.tally import Tally
+from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.tick import Action
+from steerclear.shield.exceptions import BridgeError
+
+
+@pytest.fixture
+def ticks(fleet_of):
+    stream = Stream(fleet_of(2))
+    return [stream.tick() for _ in range(5)]
+
+
+def told(lines, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not lines and time.monotonic() < end:
+        time.sleep(0.01)
+    return lines
+
+
+def test_lines_say_how_it_goes(ticks):
+    lines = []
+    sink = PlainLines(lines.append, every_s=0.02)
+    sink.take(type(ticks[0])(**{**vars(ticks[0]), "actions": (Action("red_1", "contact", "slow", "red_1 old"),)}))
+    said = told(lines)
+    sink.close()
+    assert "closest" in said[0]
+    assert any("red_1 old" in line for line in lines)
+
+
+def test_nothing_is_said_before_the_first_tick():
+    lines = []
+    sink = PlainLines(lines.append, every_s=0.01)
+    time.sleep(0.1)
+    sink.close()
+    assert lines == []
+
+
+def test_logs_go_to_the_file(tmp_path):
+    path = tmp_path / "logs" / "run.log"
+    before = list(logging.getLogger().handlers)
+    with logging_aside(path, shown=False):
+        logging.getLogger("steerclear.test").warning("override of %s", "red_1")
+    assert "override of red_1" in path.read_text()
+    assert logging.getLogger().handlers == before
+
+
+def test_a_run_is_counted(ticks):
+    tally = Tally()
+    for tick in ticks:
+        tally.take(tick)
+    figures = tally.figures()
+    at = ticks[-1].fleet.state[:, :2]
+    assert figures["ticks"] == figures["decided"] == 5.0
+    assert figures["closest_m"] <= np.hypot(*(at[0] - at[1])) + 1e-9
+    assert 0.0 <= figures["changed_share"] <= 1.0
+    assert Tally().figures()["ticks"] == 0.0
+
+
+def test_the_demonstrations_file_is_written_once_and_kept(tmp_path):
+    path = demo_file(tmp_path / "demo")
+    assert load_fleet(path).team == "blue"
+    path.write_text("changed")
+    assert demo_file(tmp_path / "demo").read_text() == "changed"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BridgeError, match="cannot write"):
+        demo_file(tmp_path / "file")
+
+
+def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path):
+    path = tmp_path / "FLEET.yaml"
+    path.write_text("version: 2")
+    with Demo(path, "medium") as demo:
+        with pytest.raises(BridgeError, match="ended: .*version"):
+            demo.wait(60.0)
+        processes = list(demo._processes.values())
+    assert all(process.poll() is not None for process in processes)
