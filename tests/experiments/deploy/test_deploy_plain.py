@@ -80,7 +80,7 @@ def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path)
     path = tmp_path / "FLEET.yaml"
     path.write_text("version: 2")
     with Demo(path, "medium") as demo:
-        with pytest.raises(BridgeError, match="ended: .*version"):
+        with pytest.raises(BridgeError, match=r"ended: .*version"):
             demo.wait(60.0)
         processes = list(demo._processes.values())
     assert all(process.poll() is not None for process in processes)
