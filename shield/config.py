@@ -27,6 +27,8 @@ class ShieldConfig:
         opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
             takes opponents to hold course and speed.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
+        table_response_per_s: the same for boats whose opponents are looked up in value tables.
+        table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are reported as infinite, m.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
@@ -49,11 +51,13 @@ class ShieldConfig:
     separation_m: float = 2.5
     buffer_m: float = 0.05
     dt_s: float = 0.1
-    certificate: str = "turning_circle"
+    certificate: str = "auto"
     coordination: str = "team"
     solver: str = "daqp"
     opponent_share: float = 1.0
     response_per_s: float = 1.0
+    table_response_per_s: float = 0.3
+    table_margin_m: float = 0.45
     margin_cap_m: float = 2.0
     tail_s: float = 5.0
     horizon_s: float | None = None
@@ -98,9 +102,9 @@ class ShieldConfig:
 
 
 _TEXTS = {"certificate", "coordination", "solver"}
-_POSITIVE = {"separation_m", "dt_s", "response_per_s", "speed_weight", "horizon_s", "hunt_s"}
+_POSITIVE = {"separation_m", "dt_s", "response_per_s", "table_response_per_s", "speed_weight", "horizon_s", "hunt_s"}
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = {"response_per_s", "max_track_age_s"}
+_MAY_BE_INFINITE = {"response_per_s", "table_response_per_s", "max_track_age_s"}
 
 
 def _check_number(name: str, value: object) -> None:

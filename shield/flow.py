@@ -15,9 +15,10 @@ from .active_set import OPTIMAL, project
 from .certificates.assign import assign_plans, hold, recheck
 from .certificates.clearance import MARGIN
 from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, look_around
+from .certificates.values import run_opponents
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
-from .platforms.actuator import command_for_turn
+from .platforms.actuator import command_for_turn, full_turn
 from .platforms.step import step_boat
 from .platforms.usv import wrap_degrees
 from .rows import BOX_ROW, build_rows, inputs_of
@@ -51,6 +52,8 @@ class Plan(NamedTuple):
     kept_commands: Array
     wanted_turn: Array
     held: Array
+    answer: Array
+    answer_held: Array
     movers: IntArray
     place: IntArray
     moving: BoolArray
@@ -73,6 +76,8 @@ def new_plan(boats: int, rows: int) -> Plan:
         kept_commands=np.zeros((boats, 2)),
         wanted_turn=np.zeros(boats),
         held=np.zeros((boats, 3)),
+        answer=np.zeros((boats, 2)),
+        answer_held=np.zeros((boats, 3)),
         movers=np.zeros(boats, np.int64),
         place=np.full(boats, -1, np.int64),
         moving=np.zeros(boats, np.bool_),
@@ -97,12 +102,12 @@ def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning,
 
 
 @kernel
-def set_targets(ours: BoolArray, tuning: Tuning, memory: Memory, work: Work) -> None:
+def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> None:
     """Margin each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0."""
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
         if ours[i] and memory.kept[i] and memory.margin_m[i] > 0.0:
-            work.target[i] = tuning.decay * min(memory.margin_m[i], tuning.margin_cap_m)
+            work.target[i] = boats.decay[i] * min(memory.margin_m[i], boats.cap_m[i])
 
 
 @kernel
@@ -125,8 +130,8 @@ def screen(
     the check.
     """
     n = state.shape[0]
-    look_around(state, margin_m, boats, tuning, work)
-    set_targets(ours, tuning, memory, work)
+    look_around(state, margin_m, ours, boats, tuning, work)
+    set_targets(ours, boats, memory, work)
     for i in range(n):
         plan.commands[i] = wanted[i]
         plan.slack_m[i] = 0.0
@@ -316,9 +321,21 @@ def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
 @kernel
 def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
     """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
-    turn = work.plan[i, 0] * work.plan[i, 1]
-    plan.commands[i, 0] = work.plan[i, 2]
-    plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], work.plan[i, 2], turn, tuning.dt_s)
+    side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
+    if togo > 0.0:
+        togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
+    plan.commands[i, 0] = speed
+    plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
+
+
+@kernel
+def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
+    """Make boat i's command and plan those of its escape; the program's answer is put aside."""
+    plan.answer[i], plan.answer_held[i] = plan.commands[i], plan.held[i]
+    first_move(i, state, boats, tuning, work, plan)
+    side, togo = work.plan[i, 0], work.plan[i, 1]
+    plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
+    plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
 
 
 @kernel
@@ -342,18 +359,28 @@ def ladder(
     no escape does better by them than the program's answer or the wanted command, that one is sent.
     """
     before = worst_merit(ours, work)
+    look = 1
     for m in range(count):
-        work.target[plan.movers[m]] = 0.0
-        hold(plan.movers[m], plan.held, work)
+        i = plan.movers[m]
+        work.target[i] = 0.0
+        hold(i, plan.held, work)
+        look = max(look, boats.look[i])
+    run_opponents(look, ours, state, boats, tuning, work)
     good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
+    run_opponents(1, ours, state, boats, tuning, work)
+    for m in range(count):
+        set_off(plan.movers[m], state, boats, tuning, work, plan)
+    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     after = worst_merit(ours, work)
     if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
+        for m in range(count):
+            i = plan.movers[m]
+            plan.commands[i], plan.held[i] = plan.answer[i], plan.answer_held[i]
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
         mark_relaxed(count, work, plan)
         return
     for m in range(count):
         i = plan.movers[m]
-        first_move(i, state, boats, tuning, work, plan)
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
         plan.slack_m[i] = max(0.0, -work.clear[i, MARGIN])
 
@@ -366,16 +393,16 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
             memory.kept[i] = False
             memory.escaping[i] = False
             continue
-        ladder_move = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
-        start = state[i, L.HEADING] if ladder_move else work.next_state[i, L.HEADING]
         memory.kept[i] = True
         memory.side[i] = work.plan[i, 0]
         memory.target_deg[i] = np.nan
         if work.plan[i, 1] > LEAST_TURN_DEG:
-            memory.target_deg[i] = wrap_degrees(start + work.plan[i, 0] * work.plan[i, 1])
+            memory.target_deg[i] = wrap_degrees(
+                work.next_state[i, L.HEADING] + math.copysign(work.plan[i, 1], work.plan[i, 0])
+            )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
-        memory.escaping[i] = ladder_move
+        memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
 
 
 @kernel

@@ -19,13 +19,14 @@ from __future__ import annotations
 import math
 
 from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
-from .certificates.manoeuvre import clear_of_boat, clear_of_hunter, hunts
+from .certificates.hunters import clear_of_hunter, hunts
+from .certificates.manoeuvre import clear_of_boat
 from .certificates.surroundings import clear_of_surroundings
+from .certificates.values import WAYS, looked_up, table_slope
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
-from .platforms.actuator import thrust_after
+from .platforms.actuator import full_turn
 from .platforms.step import step_boat
-from .platforms.usv import turn_of_rudder
 from .scene import Boats, Fixed, Tuning, Work
 
 AIM_M = 0.02
@@ -36,15 +37,6 @@ SLOW_MPS = 0.3
 
 PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
 """Classes of rows, in the order in which they give way last: boats, fixed things, and limits (never)."""
-
-
-@kernel
-def turn_range(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
-    """Largest turn, deg, that this step can make under a speed command."""
-    if params[L.KIND] == L.KIND_USV:
-        thrust = thrust_after(params, state, speed_mps, dt_s)
-        return turn_of_rudder(params, thrust, min(params[L.MAX_RUDDER], 100.0), dt_s)
-    return params[L.MAX_TURN_RATE] * dt_s
 
 
 @kernel
@@ -123,7 +115,7 @@ def inputs_of(
     root = math.sqrt(tuning.speed_weight)
     for m in range(movers.shape[0]):
         i = movers[m]
-        full = max(turn_range(boats.params[i], state[i], commands[i, 0], tuning.dt_s), 1e-6)
+        full = max(full_turn(boats.params[i], state[i], commands[i, 0], tuning.dt_s), 1e-6)
         top = boats.params[i, L.MAX_SPEED]
         gain[i, 0] = math.radians(full)
         gain[i, 1] = speed_effect(i, commands[i], state, boats, tuning, work) * top / root
@@ -165,6 +157,32 @@ def _pair_row(
     _add_effect(C, r, i, 1.0, k, nx, ny, work.path[i], 2 * m, gain, work)
     if place[j] >= 0:
         _add_effect(C, r, j, -1.0, k, nx, ny, work.path[j], 2 * place[j], gain, work)
+    if _out_of_reach(C, r, lack, tuning):
+        return False
+    return _close_row(C, d, lack, r, z_now)
+
+
+@kernel
+def _table_row(
+    i: int,
+    j: int,
+    way: int,
+    m: int,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    gain: Array,
+    z_now: Array,
+    C: Array,
+    d: Array,
+    r: int,
+) -> bool:
+    """Row of boat i (mover m) against opponent j moved on in one of its ways, from the slope of the value table."""
+    slope = table_slope(i, j, way, boats, work)
+    C[r, :] = 0.0
+    C[r, 2 * m] = slope.own_heading * gain[i, 0]
+    C[r, 2 * m + 1] = slope.own_speed * gain[i, 1]
+    lack = work.target[i] + AIM_M + work.radius[i, j] + boats.table_margin_m - slope.value_m
     if _out_of_reach(C, r, lack, tuning):
         return False
     return _close_row(C, d, lack, r, z_now)
@@ -227,8 +245,14 @@ def build_rows(
         for j in range(n):
             if j == i or not work.near[i, j] or (place[j] >= 0 and j < i):
                 continue
-            if r + 1 + 5 * movers.shape[0] > C.shape[0]:
+            if r + WAYS + 5 * movers.shape[0] > C.shape[0]:
                 return -1
+            if looked_up(i, j, i, ours, boats, work):
+                for way in range(WAYS):
+                    if _table_row(i, j, way, m, boats, tuning, work, gain, z_now, C, d, r):
+                        kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
+                        r += 1
+                continue
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1

@@ -13,6 +13,7 @@ import numpy as np
 from .certificates.clearance import N_CLEARANCE
 from .jit import Array, BoolArray, IntArray
 from .platforms import layout as L
+from .tables.lookup import Tables
 
 
 class Boats(NamedTuple):
@@ -32,6 +33,14 @@ class Boats(NamedTuple):
         static_samples: samples over which fixed things are looked at, (n,).
         stride: model steps between path samples.
         sample_s: time between path samples, s.
+        plans: escape manoeuvres each boat looks at, the first so many of the family, (n,).
+        decay: factor by which each boat's margin may shrink in one step; 0 lets it fall to 0 at once, (n,).
+        cap_m: margins above this may shrink freely, (n,), m.
+        tables: value tables.
+        table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
+        table_margin_m: added to the radius where a table is looked into, m.
+        look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
+        feared: whether some boat's table is about this boat, (n,).
     """
 
     params: Array
@@ -47,6 +56,14 @@ class Boats(NamedTuple):
     static_samples: IntArray
     stride: int
     sample_s: float
+    plans: IntArray
+    decay: Array
+    cap_m: Array
+    tables: Tables
+    table: IntArray
+    table_margin_m: float
+    look: IntArray
+    feared: BoolArray
 
 
 class Fixed(NamedTuple):
@@ -74,8 +91,7 @@ class Tuning(NamedTuple):
         buffer_m: the buffer in it, m.
         tail_s: how long straight runs are continued beyond the horizon, s.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
-        decay: factor by which a margin may shrink in one step; 0 lets it fall to 0 at once.
-        margin_cap_m: margins above this may shrink freely, m.
+        margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
     """
 
@@ -84,7 +100,6 @@ class Tuning(NamedTuple):
     buffer_m: float
     tail_s: float
     hysteresis_m: float
-    decay: float
     margin_cap_m: float
     speed_weight: float
 
@@ -128,6 +143,10 @@ class Work(NamedTuple):
         breach: (n, n) pairs inside the separation.
         radius: (n, n) radius to keep, m.
         course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
+        ways: (n, 3, 5) places opponents may be at when tables are looked into, see `certificates.values`.
+        place: (n + 1, 5) place at which the boat itself is looked up.
+        sealed: (n + 1,) whether a table alone made the plan fail.
+        nobody: (n,) False.
     """
 
     next_state: Array
@@ -147,6 +166,10 @@ class Work(NamedTuple):
     breach: BoolArray
     radius: Array
     course: Array
+    ways: Array
+    place: Array
+    sealed: BoolArray
+    nobody: BoolArray
 
 
 def new_memory(*shape: int) -> Memory:
@@ -175,4 +198,8 @@ def new_work(boats: int, samples: int) -> Work:
         breach=np.zeros((boats, boats), np.bool_),
         radius=np.zeros((boats, boats)),
         course=np.zeros((boats, 4)),
+        ways=np.zeros((boats, 3, 5)),
+        place=np.zeros((boats + 1, 5)),
+        sealed=np.zeros(boats + 1, np.bool_),
+        nobody=np.zeros(boats, np.bool_),
     )

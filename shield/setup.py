@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from .certificates import CERTIFICATES
 from .certificates.paths import SAG_M
 from .config import ShieldConfig
-from .jit import Array
+from .exceptions import TableError
+from .jit import Array, IntArray
 from .platforms import Platform, get_platform
 from .platforms import layout as L
 from .platforms.limits import Limits, limits_of
 from .scene import Boats, Tuning
+from .tables.files import ValueTable, load_table, stack_tables
+from .tables.grid import CAP
+from .tables.lookup import Tables, no_tables
+from .tables.settings import OtherMay
+
+_LOG = logging.getLogger(__name__)
 
 FADE = 4.0
 """A negative margin against a hunter at the end of the time it is followed counts exp(-FADE) of one now."""
@@ -25,14 +34,12 @@ STATIC_REACTION_S = 0.5
 
 def tuning_of(config: ShieldConfig) -> Tuning:
     """Scalar settings for compiled code."""
-    decay = 0.0 if math.isinf(config.response_per_s) else math.exp(-config.response_per_s * config.dt_s)
     return Tuning(
         dt_s=config.dt_s,
         radius_m=config.separation_m + config.buffer_m,
         buffer_m=config.buffer_m,
         tail_s=config.tail_s,
         hysteresis_m=config.hysteresis_m,
-        decay=decay,
         margin_cap_m=config.margin_cap_m,
         speed_weight=config.speed_weight,
     )
@@ -50,7 +57,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     Raises:
         PlatformError: a platform is unknown.
     """
-    kinds = [get_platform(name) for name in platforms]
+    kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
     share = config.opponent_share if certificate.hunters else 0.0
@@ -58,6 +65,8 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     sample_s = stride * config.dt_s
+    looked = _tables_of(config, kinds, team) if share == 1.0 else _no_tables(len(kinds))
+    with_table = (looked.table >= 0).any(axis=1)
     hunt_s = [
         max(value, config.hunt_s or certificate.hunt_s(limit)) if share > 0.0 else value
         for value, limit in zip(horizon_s, limits, strict=True)
@@ -82,7 +91,71 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         ),
         stride=stride,
         sample_s=sample_s,
+        plans=np.where(with_table, len(certificate.plans), certificate.nimble),
+        decay=np.where(with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)),
+        cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
+        tables=looked.tables,
+        table=looked.table,
+        table_margin_m=config.table_margin_m,
+        look=np.where(with_table, looked.steps, 0),
+        feared=(looked.table >= 0).any(axis=0),
     )
+
+
+class _LookedUp(NamedTuple):
+    """Value tables of a fleet: all of them, which holds for each pair (-1: none), and the steps of one table step."""
+
+    tables: Tables
+    table: IntArray
+    steps: int
+
+
+def _no_tables(boats: int) -> _LookedUp:
+    return _LookedUp(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1)
+
+
+def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]) -> _LookedUp:
+    """Tables of all pairs of opponents whose own boat looks them up; pairs without one are run through instead."""
+    looked = _no_tables(len(kinds))
+    found: dict[tuple[Platform, Platform], int] = {}
+    tables: list[ValueTable] = []
+    for i, own in enumerate(kinds):
+        if not CERTIFICATES[config.certificate].looks_up(limits_of(own, config.dt_s)):
+            continue
+        for j, other in enumerate(kinds):
+            if team[i] == team[j]:
+                continue
+            if (own, other) not in found:
+                table = _table_or_none(own, other)
+                if table is None:
+                    continue
+                found[own, other] = len(tables)
+                tables.append(table)
+            looked.table[i, j] = found[own, other]
+    steps = max((round(table.card.dt_s / config.dt_s) for table in tables), default=1)
+    return _LookedUp(stack_tables(tables), looked.table, max(1, steps))
+
+
+@lru_cache(maxsize=64)
+def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
+    """The table of a pair; without a usable one its opponents are run through as hunters, which the log says once."""
+    try:
+        return load_table(own, other, OtherMay.WORST_CASE)
+    except TableError as error:
+        _LOG.warning("%s; opponents are run through as hunters instead", error)
+        return None
+
+
+def _decay(response_per_s: float, config: ShieldConfig) -> float:
+    """Factor by which a margin may shrink in one step."""
+    return 0.0 if math.isinf(response_per_s) else math.exp(-response_per_s * config.dt_s)
+
+
+def _table_cap(config: ShieldConfig, looked: _LookedUp) -> float:
+    """Margins above this may shrink freely, m: no more than the tables can tell."""
+    kept_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m + config.table_margin_m
+    told_m = min((float(axes[CAP]) for axes in looked.tables.axes), default=math.inf)
+    return max(0.0, min(config.margin_cap_m, told_m - kept_m))
 
 
 def _stride(kind: Platform, limit: Limits, dt_s: float) -> int:

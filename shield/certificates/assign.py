@@ -29,6 +29,8 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
     """Make the trial in ``slot`` boat i's plan."""
     work.plan[i] = work.plan[slot]
     work.path[i] = work.path[slot]
+    work.place[i] = work.place[slot]
+    work.sealed[i] = work.sealed[slot]
     work.clear[i] = work.clear[slot]
     work.fixed[i] = work.fixed[slot]
     work.bound[i] = work.bound[slot]
@@ -73,6 +75,19 @@ def hysteresis(merit: float, tuning: Tuning) -> float:
 
 
 @kernel
+def preference(
+    i: int, p: int, side: float, togo_deg: float, merit: float, boats: Boats, tuning: Tuning, memory: Memory
+) -> float:
+    """What manoeuvre number p of a boat on its escape gains or loses in merit by the hysteresis."""
+    if not memory.escaping[i]:
+        return 0.0
+    if boats.look[i] == 0:
+        return hysteresis(merit, tuning) if p == 0 else 0.0
+    turning = togo_deg > 0.0 and not math.isnan(memory.target_deg[i])
+    return -hysteresis(merit, tuning) if turning and side * memory.side[i] < 0.0 else 0.0
+
+
+@kernel
 def choose_plan(
     i: int,
     wanted_mps: float,
@@ -89,24 +104,26 @@ def choose_plan(
 ) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``exhaustive`` the best of all.
 
-    The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept.
+    The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept; with a
+    table the choice is made anew at every step, so that is asked of the other side only. What a table refuses one step
+    on it refuses for every manoeuvre: then the first that keeps clear of all else will do.
     """
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
-    for p in range(plans.shape[0] + 1):
+    for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
         lay_path(i, trial, side, togo, speed, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
-        kept_merit = merit
-        if p == 0 and memory.escaping[i]:
-            kept_merit += hysteresis(merit, tuning)
+        kept_merit = merit + preference(i, p, side, togo, merit, boats, tuning, memory)
         if kept_merit > best:
             best = kept_merit
             _take(i, trial, merit, work)
-        if merit >= PAIR_SAFE and not exhaustive:
+        if exhaustive:
+            continue
+        if merit >= PAIR_SAFE or (done == 1 and work.sealed[trial]):
             return
 
 
@@ -143,7 +160,7 @@ def hold(i: int, held: Array, work: Work) -> None:
     """Note the manoeuvre boat i has from its predicted state: side, heading it ends on (NaN: no turn), speed."""
     side, togo = work.plan[i, 0], work.plan[i, 1]
     held[i, 0], held[i, 2] = side, work.plan[i, 2]
-    held[i, 1] = work.next_state[i, L.HEADING] + side * togo if togo > 0.0 else np.nan
+    held[i, 1] = work.next_state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
 
 
 @kernel

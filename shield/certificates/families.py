@@ -1,12 +1,13 @@
-"""The certificates by name: which escape manoeuvres they look at.
+"""The certificates by name: which escape manoeuvres they look at, and whether opponents are run through or looked up.
 
 A certificate of this kind is a family of manoeuvres; h is as in `manoeuvre`. Each row of a family is
-(side, turn deg, speed), side 1 clockwise or -1, speed a fraction of top speed or `COMMANDED`.
+(side, turn deg, speed): side clockwise when > 0, its size the share of full rudder; speed a fraction of top speed or
+`COMMANDED`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +17,17 @@ from ..platforms.limits import Limits, limits_of
 from .assign import COMMANDED
 
 TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
+
+GENTLE_TURNS_DEG = (30.0, 90.0, 180.0)
+GENTLE_SHARES = (0.75, 0.5, 0.25)
+"""Turns and rudders that boats with a value table look at besides: a hard turn costs speed, and with it room."""
+
+SLOW_TO_REGAIN_S = 5.0
+"""Boats that take longer than this to be up to speed again are looked up under the certificate "auto".
+
+What a boat can do against hunters after it has lost its speed hangs on play too long to be run through well; nimble
+boats are better run through, one manoeuvre against all hunters at once.
+"""
 
 REACTION_S = 4.0
 """Time beyond a half turn over which a turning escape is followed, s."""
@@ -34,6 +46,7 @@ class Certificate:
         plans: (m, 3) rows of side, turn deg, speed.
         braking: whether the horizon is the stopping time rather than the time of a turn.
         hunters: whether opponents are granted a turn against us.
+        tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
     """
 
     name: str
@@ -41,11 +54,22 @@ class Certificate:
     plans: Array
     braking: bool
     hunters: bool
+    tables: str = "none"
 
     def horizon_s(self, platform: Platform, dt_s: float) -> float:
         """Time over which the manoeuvres are followed, s."""
         limits = limits_of(platform, dt_s)
         return limits.stop_s + 1.0 if self.braking else limits.half_turn_s + REACTION_S
+
+    @property
+    def nimble(self) -> int:
+        """Number of manoeuvres, the first ones, that boats without a value table look at."""
+        return int((np.abs(self.plans[:, 0]) == 1.0).sum())
+
+    def looks_up(self, limits: Limits) -> bool:
+        """Whether a boat looks opponents up where there is a table."""
+        slow = limits.top_speed_mps > SLOW_TO_REGAIN_S * limits.acceleration_mps2
+        return self.tables == "all" or (self.tables == "slow" and slow)
 
     def hunt_s(self, limits: Limits) -> float:
         """Time over which hunting opponents are followed, s: a boat outruns them only once it is up to speed again."""
@@ -53,11 +77,14 @@ class Certificate:
         return min(LONGEST_HUNT_S, limits.half_turn_s + REACTION_S + regain_s)
 
 
-def _turning_family() -> Array:
+def _turning_family(gentle: bool = False) -> Array:
     rows = [(1.0, 0.0, COMMANDED)]
     for turn in TURNS_DEG:
         rows += [(1.0, turn, 1.0), (-1.0, turn, 1.0)]
     rows += [(1.0, 0.0, 1.0), (1.0, 0.0, 0.0)]
+    for share in GENTLE_SHARES if gentle else ():
+        for turn in GENTLE_TURNS_DEG:
+            rows += [(share, turn, 1.0), (-share, turn, 1.0)]
     return np.array(rows)
 
 
@@ -77,4 +104,20 @@ TURNING_CIRCLE = Certificate(
     hunters=True,
 )
 
-CERTIFICATES = {certificate.name: certificate for certificate in (TURNING_CIRCLE, BRAKING)}
+VALUE_TABLE = Certificate(
+    "value_table",
+    "distance that can be kept from the worst opponent, by value table; without a table as turning_circle",
+    _turning_family(gentle=True),
+    braking=False,
+    hunters=True,
+    tables="all",
+)
+
+AUTO = replace(
+    VALUE_TABLE,
+    name="auto",
+    summary="value_table for boats that are long in gaining speed, turning_circle for nimble ones",
+    tables="slow",
+)
+
+CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_CIRCLE, VALUE_TABLE, BRAKING)}

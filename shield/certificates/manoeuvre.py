@@ -17,9 +17,11 @@ import math
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
-from .clearance import FAR, MARGIN, clear_of_course, clear_of_pursuer
+from .clearance import FAR, MARGIN, clear_of_course
+from .hunters import closing, worst_hunter
 from .paths import trace_path
 from .surroundings import clear_of_surroundings
+from .values import looked_up, run_opponents, set_place
 
 PAIR_SAFE = 1e3
 """Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
@@ -39,22 +41,9 @@ REGAIN_M = 0.01
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
-RUDDERS = (1.0, 0.6, 0.3, 0.0)
-"""Hardest turns hunters are followed with, shares of the granted one.
-
-A hard turn costs speed, a gentle one time. Each of these turns as hard as its own entry and loses the speed of the next
-gentler one, and so does better than any that turn steadily in between; the last entry is only that, none is followed.
-"""
-
-FORGOTTEN_LOSS = 0.1
-"""Hunters that lose less of their speed for good in their hardest turn are followed with that turn only."""
-
-LEAD_SHARE = 0.15
-"""Share of the time it is followed by which a hunter leads the boat at most."""
-
 
 @kernel
-def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
     A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + tail). No boat ever
@@ -66,6 +55,7 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
     n = state.shape[0]
+    run_opponents(1, ours, state, boats, tuning, work)
     for i in range(n):
         work.hunted[i] = False
         heading = math.radians(state[i, L.HEADING])
@@ -99,14 +89,6 @@ def look_around(state: Array, margin_m: Array, boats: Boats, tuning: Tuning, wor
 
 
 @kernel
-def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
-    """Most the distance of a pair can shrink from sample to sample, m."""
-    top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
-    top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
-    return (top_i + top_j) * boats.sample_s
-
-
-@kernel
 def clear_of_opponent(
     i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
 ) -> None:
@@ -129,59 +111,6 @@ def clear_of_opponent(
         cap_m,
         work.out,
     )
-
-
-@kernel
-def clear_of_hunter(
-    i: int,
-    j: int,
-    path: Array,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-    cap_m: float,
-) -> None:
-    """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
-
-    The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently.
-    """
-    sample_s = boats.sample_s
-    speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
-    course = work.course[j]
-    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
-    work.out[MARGIN] = FAR
-    manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
-    for manner in range(manners):
-        share = RUDDERS[manner // 2]
-        clear_of_pursuer(
-            path,
-            course[0],
-            course[1],
-            course[2],
-            course[3],
-            speed,
-            top,
-            boats.granted_acc_mps2[j],
-            boats.granted_dec_mps2[j],
-            boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
-            share * turn,
-            manner % 2 == 1,
-            LEAD_SHARE * boats.hunt_samples[i],
-            sample_s,
-            boats.hunt_samples[i],
-            closing(i, j, state, boats, tuning),
-            work.radius[i, j],
-            boats.fade[i],
-            floor_m,
-            cap_m,
-            work.spare,
-        )
-        if work.spare[MARGIN] < work.out[MARGIN]:
-            work.out[:] = work.spare
-            if work.out[MARGIN] < floor_m:
-                return
 
 
 @kernel
@@ -244,12 +173,6 @@ def clear_of_boat(
 
 
 @kernel
-def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
-    """Whether boat j is an opponent of boat i that is granted more than holding its course."""
-    return not ours[j] and boats.team[i] != boats.team[j] and boats.granted_turn_dps[j] > 0.0
-
-
-@kernel
 def worst_clearance(
     i: int,
     slot: int,
@@ -265,38 +188,11 @@ def worst_clearance(
     clear[MARGIN] = FAR
     work.bound[slot] = -1
     for j in range(state.shape[0]):
-        if j == i or not work.near[i, j]:
+        if j == i or not work.near[i, j] or looked_up(i, j, slot, ours, boats, work):
             continue
         clear_of_boat(
             i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
         )
-        if work.out[MARGIN] < clear[MARGIN]:
-            clear[:] = work.out
-            work.bound[slot] = j
-            if clear[MARGIN] < floor_m:
-                return
-
-
-@kernel
-def worst_hunter(
-    i: int,
-    slot: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-) -> None:
-    """Lower the clearance in ``slot`` to that from hunting opponents where it is worse."""
-    clear = work.clear[slot]
-    for j in range(state.shape[0]):
-        if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
-            continue
-        if work.breach[i, j]:
-            continue
-        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
         if work.out[MARGIN] < clear[MARGIN]:
             clear[:] = work.out
             work.bound[slot] = j
@@ -324,6 +220,7 @@ def rate_path(
     """
     target = work.target[i]
     clear = work.clear[slot]
+    work.sealed[slot] = False
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
@@ -353,6 +250,19 @@ def rate_path(
 
 
 @kernel
+def _runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
+    """Whether some opponent near boat i is to be run through as a hunter, which takes the long path."""
+    if not work.hunted[i] or boats.look[i] == 0:
+        return work.hunted[i]
+    for j in range(work.near.shape[0]):
+        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j]:
+            continue
+        if boats.granted_turn_dps[j] > 0.0 and not looked_up(i, j, slot, work.nobody, boats, work):
+            return True
+    return False
+
+
+@kernel
 def lay_path(
     i: int,
     slot: int,
@@ -368,6 +278,7 @@ def lay_path(
     """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
     path = work.path[slot]
+    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+    samples = boats.hunt_samples[i] if _runs_hunters(i, slot, boats, work) else boats.samples[i]
     work.row[:] = work.next_state[i] if done == 1 else state[i]
-    samples = boats.hunt_samples[i] if work.hunted[i] else boats.samples[i]
     trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)

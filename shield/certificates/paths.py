@@ -1,4 +1,6 @@
-"""Where a boat goes under an escape manoeuvre: turn to one side at full rudder, then straight, at a set speed.
+"""Where a boat goes under an escape manoeuvre: turn to one side, then straight, at a set speed.
+
+The sign of ``side`` is the side, 1 clockwise; its size, up to 1, the share of full rudder the turn is made with.
 
 Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
 candidate command, or after the manoeuvre's own first step.
@@ -10,7 +12,7 @@ import math
 
 from ..jit import Array, kernel
 from ..platforms import layout as L
-from ..platforms.actuator import actuate
+from ..platforms.actuator import actuate, full_turn
 from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 
 SAG_M = 0.022
@@ -22,18 +24,21 @@ STEADY_SPEED = 1e-4
 
 @kernel
 def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
-    """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side 1) or the other way (-1)."""
-    return ((target_deg - heading_deg) * side) % 360.0
+    """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
+    return ((target_deg - heading_deg) * math.copysign(1.0, side)) % 360.0
 
 
 @kernel
 def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
     """One model step of an escape manoeuvre on ``row``, in place; returns the turn still to make, deg."""
-    before = row[L.HEADING]
-    actuate(params, row, speed_mps, side * togo_deg, dt_s)
+    before, sign = row[L.HEADING], math.copysign(1.0, side)
+    turn = togo_deg
+    if togo_deg > 0.0 and abs(side) < 1.0:
+        turn = min(togo_deg, abs(side) * full_turn(params, row, speed_mps, dt_s))
+    actuate(params, row, speed_mps, sign * turn, dt_s)
     if togo_deg <= 0.0:
         return 0.0
-    turned = (row[L.HEADING] - before) * side
+    turned = (row[L.HEADING] - before) * sign
     if turned < -180.0:
         turned += 360.0
     togo_deg -= turned
@@ -58,7 +63,7 @@ def trace_path(
     Args:
         params: platform row of the boat.
         row: state to start from; used up.
-        side: 1 clockwise, -1 the other way.
+        side: clockwise when > 0; its size is the share of full rudder.
         togo_deg: turn to make before running straight, deg, >= 0.
         speed_mps: speed commanded throughout, m/s.
         dt_s: model step, s.
@@ -98,14 +103,15 @@ def _trace_usv(
 ) -> None:
     """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
 
-    The turn of a step is rudder, thrust and sign in one: full rudder until less than a full step's turn is left, then
-    the rudder that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
+    The turn of a step is rudder, thrust and sign in one: the rudder held until less than such a step's turn is left,
+    then the one that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
     """
     x, y, v = row[L.X], row[L.Y], row[L.SPEED]
     thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
     heading = math.radians(row[L.HEADING])
     ux, uy = math.sin(heading), math.cos(heading)
-    most = min(params[L.MAX_RUDDER], 100.0)
+    most = min(params[L.MAX_RUDDER], 100.0) * abs(side)
+    sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
     k, step = 0, done - 1
@@ -127,7 +133,7 @@ def _trace_usv(
         if turn > 0.0:
             togo_deg = togo_deg - turn if togo_deg - turn > 1e-9 else 0.0
             if turn != half:
-                angle = math.radians(0.5 * turn) * side
+                angle = math.radians(0.5 * turn) * sign
                 half, c, s = turn, math.cos(angle), math.sin(angle)
             mx, my = ux * c + uy * s, uy * c - ux * s
             ux, uy = mx * c + my * s, my * c - mx * s

@@ -37,6 +37,15 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
 
 
 @kernel
+def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
+    """Largest turn, deg, that this step can make under a speed command."""
+    if params[L.KIND] == L.KIND_USV:
+        thrust = thrust_after(params, state, speed_mps, dt_s)
+        return turn_of_rudder(params, thrust, min(params[L.MAX_RUDDER], 100.0), dt_s)
+    return params[L.MAX_TURN_RATE] * dt_s
+
+
+@kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
     """Advance one step turning by ``turn_deg`` as nearly as the actuators allow; changes ``state`` in place.
 

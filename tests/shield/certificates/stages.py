@@ -63,11 +63,11 @@ def screened(at, wanted):
 def screened_with_all_pairs(at, wanted):
     """`flow.screen` again, with no pair left out."""
     n = len(wanted)
-    look_around(at.state, np.zeros(n), at.boats, at.tuning, at.work)
+    look_around(at.state, np.zeros(n), at.ours, at.boats, at.tuning, at.work)
     left_out = ~at.work.near & ~np.eye(n, dtype=bool)
     at.work.radius[left_out] = at.tuning.radius_m
     at.work.near[left_out] = True
-    flow.set_targets(at.ours, at.tuning, at.memory, at.work)
+    flow.set_targets(at.ours, at.boats, at.memory, at.work)
     for i in range(n):
         at.plan.commands[i] = wanted[i]
         at.plan.slack_m[i], at.plan.moving[i] = 0.0, False

@@ -7,7 +7,8 @@ import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.clearance import MARGIN
-from steerclear.shield.certificates.manoeuvre import clear_of_hunter, lay_path, look_around
+from steerclear.shield.certificates.hunters import clear_of_hunter
+from steerclear.shield.certificates.manoeuvre import lay_path, look_around
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, largest_turn
@@ -50,8 +51,10 @@ def chase(platform, own, hunter, side, turn_deg, most, steps):
 
 def modelled(name, own, hunter, side, turn_deg):
     """Least margin, m, the certificate expects of the same escape, and the steps over which it looks."""
-    at = stages_of(ShieldConfig(buffer_m=0.0), np.array([own, hunter]), (name, name), (0, 1))
-    look_around(at.state, np.zeros(2), at.boats, at.tuning, at.work)
+    at = stages_of(
+        ShieldConfig(buffer_m=0.0, certificate="turning_circle"), np.array([own, hunter]), (name, name), (0, 1)
+    )
+    look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
     top = get_platform(name).max_speed_mps
     lay_path(0, 0, side, turn_deg, top, 0, at.state, at.boats, at.tuning, at.work)
     clear_of_hunter(0, 1, at.work.path[0], at.state, at.boats, at.tuning, at.work, -1e6, 50.0)

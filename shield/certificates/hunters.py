@@ -1,0 +1,131 @@
+"""The worst of what opponents may do against a boat: run through as hunters, or looked up where a table answers."""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, BoolArray, kernel
+from ..platforms import layout as L
+from ..scene import Boats, Tuning, Work
+from .clearance import FAR, MARGIN
+from .pursuer import clear_of_pursuer
+from .values import looked_up, table_margin
+
+RUDDERS = (1.0, 0.6, 0.3, 0.0)
+"""Hardest turns hunters are followed with, shares of the granted one.
+
+A hard turn costs speed, a gentle one time. Each of these turns as hard as its own entry and loses the speed of the next
+gentler one, and so does better than any that turn steadily in between; the last entry is only that, none is followed.
+"""
+
+FORGOTTEN_LOSS = 0.1
+"""Hunters that lose less of their speed for good in their hardest turn are followed with that turn only."""
+
+LEAD_SHARE = 0.15
+"""Share of the time it is followed by which a hunter leads the boat at most."""
+
+
+@kernel
+def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
+    """Most the distance of a pair can shrink from sample to sample, m."""
+    top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
+    top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
+    return (top_i + top_j) * boats.sample_s
+
+
+@kernel
+def clear_of_hunter(
+    i: int,
+    j: int,
+    path: Array,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+    cap_m: float,
+) -> None:
+    """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
+
+    The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently.
+    """
+    sample_s = boats.sample_s
+    speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
+    course = work.course[j]
+    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
+    work.out[MARGIN] = FAR
+    manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
+    for manner in range(manners):
+        share = RUDDERS[manner // 2]
+        clear_of_pursuer(
+            path,
+            course[0],
+            course[1],
+            course[2],
+            course[3],
+            speed,
+            top,
+            boats.granted_acc_mps2[j],
+            boats.granted_dec_mps2[j],
+            boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
+            share * turn,
+            manner % 2 == 1,
+            LEAD_SHARE * boats.hunt_samples[i],
+            sample_s,
+            boats.hunt_samples[i],
+            closing(i, j, state, boats, tuning),
+            work.radius[i, j],
+            boats.fade[i],
+            floor_m,
+            cap_m,
+            work.spare,
+        )
+        if work.spare[MARGIN] < work.out[MARGIN]:
+            work.out[:] = work.spare
+            if work.out[MARGIN] < floor_m:
+                return
+
+
+@kernel
+def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
+    """Whether boat j is an opponent of boat i that is granted more than holding its course."""
+    return not ours[j] and boats.team[i] != boats.team[j] and boats.granted_turn_dps[j] > 0.0
+
+
+@kernel
+def worst_hunter(
+    i: int,
+    slot: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+) -> None:
+    """Lower the clearance in ``slot`` to that from hunting opponents where it is worse.
+
+    ``work.sealed[slot]`` says whether a table had the last word: then no other manoeuvre changes it.
+    """
+    clear = work.clear[slot]
+    for j in range(state.shape[0]):
+        if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
+            continue
+        if work.breach[i, j]:
+            continue
+        if looked_up(i, j, slot, ours, boats, work):
+            margin = table_margin(i, j, slot, boats, work)
+            if margin < clear[MARGIN]:
+                clear[MARGIN] = margin
+                work.bound[slot] = j
+                if margin < floor_m:
+                    work.sealed[slot] = True
+                    return
+            continue
+        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
+        if work.out[MARGIN] < clear[MARGIN]:
+            clear[:] = work.out
+            work.bound[slot] = j
+            if clear[MARGIN] < floor_m:
+                return

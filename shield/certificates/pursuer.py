@@ -1,0 +1,184 @@
+"""Clearance from one pursuer that steers for the boat as hard as it is granted."""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, kernel
+from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+
+LONGEST_STRIDE = 6
+"""Samples a hunter far away is moved on at once."""
+
+
+@kernel
+def _note_faded(
+    out: Array,
+    worst: float,
+    weight: float,
+    radius_m: float,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    k: int,
+    span: int,
+) -> float:
+    """Least margin over a straight segment, weighted when negative; noted in ``out`` when below ``worst``."""
+    limit = radius_m + (worst if worst >= 0.0 else worst / weight)
+    if limit <= 0.0:
+        return worst
+    dx, dy = x1 - x0, y1 - y0
+    length = dx * dx + dy * dy
+    part = 0.0
+    if length > 0.0:
+        part = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / length))
+    x, y = x0 + part * dx, y0 + part * dy
+    square = x * x + y * y
+    if square >= limit * limit:
+        return worst
+    distance = math.sqrt(square)
+    margin = distance - radius_m
+    worst = margin if margin >= 0.0 else margin * weight
+    out[MARGIN], out[SAMPLE] = worst, k - span * (1.0 - part)
+    if distance > 1e-9:
+        out[NORMAL_X], out[NORMAL_Y] = x / distance, y / distance
+    else:
+        out[NORMAL_X], out[NORMAL_Y] = 1.0, 0.0
+    return worst
+
+
+@kernel
+def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -> tuple[float, float]:
+    """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity.
+
+    Where there is none, or one far off, it steers ``ahead`` samples ahead of the boat: one about as fast as the boat
+    and on its quarter comes nearest by closing in slowly on an all but parallel course.
+    (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
+    """
+    a = vx * vx + vy * vy - way * way
+    b = rx * vx + ry * vy
+    c = rx * rx + ry * ry
+    root = b * b - a * c
+    if root <= 0.0:
+        return rx + ahead * vx, ry + ahead * vy
+    root = math.sqrt(root)
+    time = -1.0
+    if abs(a) < 1e-9:
+        time = -0.5 * c / b if b < 0.0 else -1.0
+    else:
+        early, late = (-b - root) / a, (-b + root) / a
+        if early > late:
+            early, late = late, early
+        time = early if early > 0.0 else late
+    if time <= 0.0:
+        return rx + ahead * vx, ry + ahead * vy
+    time = min(time, ahead)
+    return rx + time * vx, ry + time * vy
+
+
+@kernel
+def clear_of_pursuer(
+    own: Array,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    speed_mps: float,
+    top_speed_mps: float,
+    acc_mps2: float,
+    dec_mps2: float,
+    loss: float,
+    turn_rad: float,
+    lead: bool,
+    ahead: float,
+    sample_s: float,
+    samples: int,
+    closing_m: float,
+    radius_m: float,
+    fade: float,
+    floor_m: float,
+    cap_m: float,
+    out: Array,
+) -> None:
+    """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
+
+    Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
+    for hunters rarely play as well as they are granted to.
+
+    Args:
+        own: the boat's path, m.
+        x: the neighbour's position now, east, m.
+        y: north, m.
+        ux: its heading as a unit vector, east.
+        uy: north.
+        speed_mps: its speed, m/s.
+        top_speed_mps: its top speed, m/s.
+        acc_mps2: acceleration granted to it, m/s^2.
+        dec_mps2: rate at which it loses speed in a turn, m/s^2.
+        loss: share of its top speed it loses in a turn of ``turn_rad`` per sample.
+        turn_rad: granted turn per sample, rad.
+        lead: steer for the meeting point instead of the boat itself.
+        ahead: most samples by which it leads the boat.
+        sample_s: time between samples, s.
+        samples: last sample.
+        closing_m: most the distance can shrink per sample, m.
+        radius_m: radius to keep, m.
+        fade: factor of negative margins per sample, 0 to 1.
+        floor_m: margin below which the search stops, m.
+        cap_m: margin above which nothing is looked at closely, m.
+        out: the result row.
+    """
+    root = radius_m + cap_m
+    fastest_mps = max(top_speed_mps, speed_mps)
+    worst = cap_m
+    worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
+    weight = 1.0
+    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = cap_m, samples, 1.0, 0.0
+    c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
+    x0, y0 = own[0, 0] - x, own[0, 1] - y
+    k = 0
+    while k < samples:
+        stride = 1
+        square = x0 * x0 + y0 * y0
+        if square > worth:
+            stride = int((math.sqrt(square) - root) / closing_m)
+            if stride >= samples - k:
+                break
+            stride = min(stride, LONGEST_STRIDE)
+        c, s = c1, s1
+        for _ in range(stride - 1):
+            c, s = c * c1 - s * s1, s * c1 + c * s1
+        k += stride
+        ax, ay = own[k, 0] - x, own[k, 1] - y
+        if lead:
+            before = k - stride
+            vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
+            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
+        along, across = ux * ax + uy * ay, ux * ay - uy * ax
+        rudder = 1.0
+        if along > 0.0 and abs(across) * c <= along * s:
+            norm = math.sqrt(ax * ax + ay * ay)
+            if norm > 1e-12:
+                ux, uy = ax / norm, ay / norm
+                rudder = min(1.0, abs(across) / (norm * s)) if s > 0.0 else 0.0
+        elif across >= 0.0:
+            ux, uy = c * ux - s * uy, s * ux + c * uy
+        else:
+            ux, uy = c * ux + s * uy, c * uy - s * ux
+        time_s = stride * sample_s
+        steady = fastest_mps * (1.0 - loss * rudder)
+        new_speed = min(steady, speed_mps + acc_mps2 * time_s)
+        if speed_mps > steady:
+            new_speed = max(steady, speed_mps - dec_mps2 * time_s)
+        way = 0.5 * (speed_mps + new_speed) * time_s
+        speed_mps = new_speed
+        x += way * ux
+        y += way * uy
+        x1, y1 = own[k, 0] - x, own[k, 1] - y
+        for _ in range(stride):
+            weight *= fade
+        worst = _note_faded(out, worst, weight, radius_m, x0, y0, x1, y1, k, stride)
+        if worst < floor_m:
+            return
+        x0, y0 = x1, y1

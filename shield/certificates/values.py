@@ -1,0 +1,137 @@
+"""Margins against opponents from the value tables: the worst they can do is looked up instead of run through.
+
+With V(x_i, x_j) the distance boat i can keep from opponent j for as long as the table looks ahead (`shield.tables`),
+
+    h_ij(x) = V(x_i, x_j) - R_ij - m,
+
+where m is the margin for the table's own error. The table says what the worst opponent does from some moment on, not
+what it does until then; so it is moved on in each of a few ways, and the least of the values counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, BoolArray, kernel
+from ..platforms import layout as L
+from ..platforms.actuator import actuate
+from ..platforms.usv import turn_of_rudder
+from ..scene import Boats, Tuning, Work
+from ..tables.grid import CAP
+from ..tables.lookup import Gradient, table_gradient, table_value
+from .clearance import FAR
+from .paths import sail
+
+WAYS = 3
+"""Ways an opponent may move: straight on, hard to port, hard to starboard."""
+
+FULL_THRUST = 0.9
+"""Share of its full thrust from which a boat can do what the table says: the table is for full thrust."""
+
+ROOM_M = 0.5
+"""A table is looked into when it tells distances at least this much beyond the radius, m."""
+
+PLACE_X, PLACE_Y, PLACE_HEADING, PLACE_SPEED, PLACE_USABLE = range(5)
+"""Columns of a place: position m, heading rad, speed m/s, and whether the table holds for the boat there."""
+
+
+@kernel
+def _note_place(params: Array, row: Array, place: Array) -> None:
+    """Write the place of a state row."""
+    place[PLACE_X], place[PLACE_Y] = row[L.X], row[L.Y]
+    place[PLACE_HEADING], place[PLACE_SPEED] = math.radians(row[L.HEADING]), row[L.SPEED]
+    place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= FULL_THRUST * params[L.MAX_THRUST] else 0.0
+
+
+@kernel
+def run_opponents(steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Write where the opponents that tables are looked up for may be after some steps: ``work.ways`` (n, WAYS, 5)."""
+    for j in range(state.shape[0]):
+        if ours[j] or not boats.feared[j]:
+            continue
+        params = boats.params[j]
+        full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.dt_s)
+        for way in range(WAYS):
+            work.row[:] = state[j]
+            turn = full * (0.0 if way == 0 else 2.0 * way - 3.0)
+            speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
+            for _ in range(steps):
+                actuate(params, work.row, speed, turn, tuning.dt_s)
+            _note_place(params, work.row, work.ways[j, way])
+
+
+@kernel
+def set_place(
+    i: int,
+    slot: int,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    done: int,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+) -> None:
+    """Write where boat i is looked up for the manoeuvre in ``slot``.
+
+    That is its predicted state (done = 1), the same for every manoeuvre, or where it is ``boats.look`` steps into the
+    manoeuvre (done = 0): within one step manoeuvres hardly differ.
+    """
+    if boats.look[i] == 0:
+        return
+    if done == 1:
+        _note_place(boats.params[i], work.next_state[i], work.place[slot])
+        return
+    work.row[:] = state[i]
+    for _ in range(boats.look[i]):
+        togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
+    _note_place(boats.params[i], work.row, work.place[slot])
+
+
+@kernel
+def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
+    """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
+    table = boats.table[i, j]
+    if table < 0 or ours[j] or work.breach[i, j] or work.place[slot, PLACE_USABLE] == 0.0:
+        return False
+    return work.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
+
+
+@kernel
+def table_margin(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """Margin of boat i at the place in ``slot`` against the worst opponent j can do, m; `FAR` beyond the table."""
+    table, own = boats.table[i, j], work.place[slot]
+    least = FAR
+    for way in range(WAYS):
+        other = work.ways[j, way]
+        value = table_value(
+            boats.tables,
+            table,
+            other[PLACE_X] - own[PLACE_X],
+            other[PLACE_Y] - own[PLACE_Y],
+            own[PLACE_HEADING],
+            other[PLACE_HEADING],
+            own[PLACE_SPEED],
+            other[PLACE_SPEED],
+        )
+        least = min(least, value)
+    if least >= boats.tables.axes[table, CAP] - 1e-9:
+        return FAR
+    return least - work.radius[i, j] - boats.table_margin_m
+
+
+@kernel
+def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
+    """Value and derivatives for boat i one step on, opponent j moved on in one of its ways."""
+    own, other = work.place[i], work.ways[j, way]
+    return table_gradient(
+        boats.tables,
+        boats.table[i, j],
+        other[PLACE_X] - own[PLACE_X],
+        other[PLACE_Y] - own[PLACE_Y],
+        own[PLACE_HEADING],
+        other[PLACE_HEADING],
+        own[PLACE_SPEED],
+        other[PLACE_SPEED],
+    )

@@ -1,0 +1,132 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shield_scenes import fleet_of, quick, relative
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.actuator import actuate, largest_turn
+from steerclear.shield.platforms.step import step_boat
+from steerclear.shield.platforms.usv import fresh_state
+from steerclear.shield.tables.files import load_table, stack_tables
+from steerclear.shield.tables.lookup import table_value
+
+SURVEYOR = get_platform("surveyor")
+
+
+def at_thrust(fleet, percent):
+    state = fleet.state.copy()
+    state[:, L.THRUST] = percent
+    return replace(fleet, state=state)
+
+
+def apart(x, y, heading, own_mps=3.0, other_mps=3.0, kind="surveyor", percent=100.0):
+    """A boat of ours at the origin heading north, and an opponent, both at that thrust."""
+    return at_thrust(fleet_of([(0, 0, 0, own_mps), (x, y, heading, other_mps)], [0, 1], kind), percent)
+
+
+def answers(fleet, **settings):
+    decisions = Shield(**settings).decide(fleet, relative((3.0, 0.0), (3.0, 0.0)))
+    return decisions.sent.values.tolist(), decisions.reason.tolist(), decisions.certificate_m.tolist()
+
+
+def looked_up_by_hand(fleet):
+    """Least value over an opponent that goes straight on or turns hard, one step after the own boat went straight."""
+    params, tables = SURVEYOR.pack(), stack_tables([load_table("surveyor", "surveyor")])
+    own = fleet.state[0].copy()
+    step_boat(params, own, 3.0, 0.0, 0.1)
+    least = math.inf
+    for turn in (0.0, 1.0, -1.0):
+        other = fleet.state[1].copy()
+        speed = 3.0 if turn else other[L.SPEED]
+        actuate(params, other, speed, turn * 2.0 * largest_turn(params, other, 0.1), 0.1)
+        there = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
+        headings = math.radians(own[L.HEADING]), math.radians(other[L.HEADING])
+        least = min(least, table_value(tables, 0, *there, *headings, own[L.SPEED], other[L.SPEED]))
+    return least
+
+
+@quick
+@given(st.floats(6.0, 30.0), st.floats(-180.0, 180.0), st.floats(-180.0, 180.0), st.floats(1.0, 3.0))
+def test_the_certificate_is_the_value_less_radius_and_margin(distance, bearing, heading, speed):
+    x, y = distance * math.sin(math.radians(bearing)), distance * math.cos(math.radians(bearing))
+    fleet = apart(x, y, heading, other_mps=speed)
+    value = looked_up_by_hand(fleet)
+    _, reason, certificate = answers(fleet, buffer_m=0.05, table_margin_m=0.4)
+    if reason[0] != 0:
+        return  # another command was sent: the value is that of another state
+    if value < 6.0 - 1e-9:
+        assert certificate[0] == pytest.approx(value - 2.5 - 0.05 - 0.4, abs=1e-9)
+    else:
+        assert certificate[0] > 2.0
+
+
+def test_some_commands_pass_with_a_value_the_table_tells():
+    certificates = [answers(apart(9.0, 20.0 + k, 180.0))[1:] for k in range(10)]
+    assert any(reason[0] == 0 and margin[0] < 2.0 for reason, margin in certificates)
+
+
+@pytest.mark.parametrize(
+    ("fleet", "settings"),
+    [
+        (apart(1.0, 24.0, 180.0, percent=40.0), {}),
+        (apart(1.0, 9.0, 180.0, 2.0, 2.0, "heron"), {}),
+        (apart(1.0, 24.0, 180.0), {"opponent_share": 0.9}),
+        (apart(1.0, 24.0, 180.0), {"position_error_m": 1.5}),
+    ],
+    ids=["thrust the table is not for", "nimble boats", "tamer opponents", "a radius beyond the table"],
+)
+def test_where_no_table_answers_opponents_are_run_through(fleet, settings):
+    same = {"table_response_per_s": 1.0, **settings}  # the rate is the boat's, whoever answers
+    assert answers(fleet, **same) == answers(fleet, certificate="turning_circle", **same)
+
+
+def test_nimble_boats_are_looked_up_when_asked_for():
+    fleet = apart(1.0, 6.5, 180.0, 2.0, 2.0, "heron")
+    assert answers(fleet, certificate="value_table") != answers(fleet, certificate="auto")
+
+
+def test_a_boat_without_a_table_is_run_through_and_the_log_says_so(caplog):
+    stranger = replace(SURVEYOR, name="surveyor_lighter", max_acc=0.16)
+    fleet = replace(apart(1.0, 24.0, 180.0), platforms=(stranger, stranger))
+    same = {"table_response_per_s": 1.0}
+    assert answers(fleet, **same) == answers(fleet, certificate="turning_circle", **same)
+    assert "steerclear reach solve --own surveyor_lighter" in caplog.text
+
+
+def chased(count, seed):
+    """Closest distances of surveyors at full speed, each with a rammer that steers where they will be."""
+    rng, params = np.random.default_rng(seed), SURVEYOR.pack()
+    state = np.zeros((count, 2, L.N_STATE))
+    for game in state:
+        bearing, distance = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(35.0, 60.0)
+        game[0] = fresh_state(0.0, 0.0, rng.uniform(-180, 180), 3.0)
+        game[1] = fresh_state(distance * math.sin(bearing), distance * math.cos(bearing), rng.uniform(-180, 180), 3.0)
+        game[:, L.THRUST] = 100.0
+    guard = BatchedShield(ShieldConfig(), count, ("surveyor", "surveyor"), (0, 1))
+    ours, least = np.tile([True, False], (count, 1)), np.full(count, math.inf)
+    for _ in range(450):
+        gap = state[:, 0, [L.X, L.Y]] - state[:, 1, [L.X, L.Y]]
+        least = np.minimum(least, np.hypot(*gap.T))
+        heading = np.radians(state[:, 0, L.HEADING])
+        lead = state[:, 0, L.SPEED] * np.hypot(*gap.T) / 4.5
+        aim = gap + lead[:, None] * np.stack([np.sin(heading), np.cos(heading)], axis=1)
+        error = (np.degrees(np.arctan2(aim[:, 0], aim[:, 1])) - state[:, 1, L.HEADING] + 180.0) % 360.0 - 180.0
+        wanted = np.zeros((count, 2, 2))
+        wanted[:, :, 0], wanted[:, 1, 1] = 3.0, np.clip(5.0 * error, -180.0, 180.0)
+        sent = guard.decide(state, wanted, ours).copy()
+        for game, commands in zip(state, sent, strict=True):
+            for boat, (speed, turn) in zip(game, commands, strict=True):
+                step_boat(params, boat, speed, turn, 0.1)
+    return least
+
+
+def test_surveyors_get_away_from_a_rammer():
+    least = chased(12, 3)
+    assert least.min() > 2.5
+    assert least.min() < 20.0  # they did meet
