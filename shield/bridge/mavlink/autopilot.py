@@ -43,6 +43,7 @@ class Autopilot:
         dialogue: questions and answers; ``dialogue.changed`` is the lock of everything here.
         heartbeat: the last; None before the first.
         route: how heading and speed are commanded; None until prepared, or when that is known no more.
+        others: system ids of other vehicles heard on the wire.
         expects_guided: whether leaving GUIDED or being disarmed is somebody else's doing.
 
     Raises:
@@ -67,6 +68,7 @@ class Autopilot:
         self.heartbeat: Heartbeat | None = None
         self.route: Route | None = None
         self.expects_guided = False
+        self.others: set[int] = set()
         self._faults: Counter[str] = Counter()
         self._recheck_s = -math.inf
 
@@ -130,7 +132,8 @@ class Autopilot:
             elif name == "TIMESYNC":
                 self.trips.hear(message, received_s, self.telemetry.clock)
             elif name == "COMMAND_ACK":
-                self._note(*self.commanders.hear_answer(message, received_s), received_s)
+                asked_s = self.dialogue.asked_s(message.command)
+                self._note(*self.commanders.hear_answer(message, asked_s, received_s), received_s)
             elif name == "PARAM_VALUE":
                 self._hear_top_speed(message, received_s)
             else:
@@ -142,6 +145,8 @@ class Autopilot:
         """See `reception.Receiver`."""
         with self.dialogue.changed:
             self._note(*self.commanders.hear_foreign(message, received_s), received_s)
+            if message.get_type() == "HEARTBEAT" and read_heartbeat(message, received_s) is not None:
+                self.others.add(message.get_srcSystem())
 
     def on_refused(self, kind: str, count: int) -> None:
         """See `reception.Receiver`."""

@@ -18,6 +18,9 @@ _ORDERS = {
     int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), int(mavlink.MAV_CMD_DO_MOTOR_TEST),
 }  # fmt: skip
 SAY_AGAIN_S = 10.0
+ANSWER_S = 10.0
+"""An answer to a command of our own comes within this time."""
+_MOST_STATIONS = 64
 
 
 class Commanders:
@@ -48,7 +51,8 @@ class Commanders:
         source = (message.get_srcSystem(), message.get_srcComponent())
         name = message.get_type()
         if name == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
-            self.stations.add(source)
+            if len(self.stations) < _MOST_STATIONS:
+                self.stations.add(source)
             who = (
                 "another program with our own ids" if source == self._ours else f"another ground station {_who(source)}"
             )
@@ -59,10 +63,17 @@ class Commanders:
             return self._fault(source, now_s, f"sends {name}")
         return "", ""
 
-    def hear_answer(self, message: Any, now_s: float) -> tuple[str, str]:
-        """A COMMAND_ACK of the boat; see `hear_foreign`."""
+    def hear_answer(self, message: Any, asked_s: float, now_s: float) -> tuple[str, str]:
+        """A COMMAND_ACK of the boat; see `hear_foreign`.
+
+        Args:
+            message: the answer.
+            asked_s: when we gave that command last, s; -inf: never.
+            now_s: s.
+        """
         asked = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
-        if asked[0] == 0 or asked == self._ours or message.command not in _ORDERS:
+        ours = asked == self._ours and now_s - asked_s <= ANSWER_S
+        if asked[0] == 0 or ours or message.command not in _ORDERS:
             return "", ""
         return self._fault(asked, now_s, f"gave it command {message.command}")
 

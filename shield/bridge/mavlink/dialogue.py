@@ -72,12 +72,17 @@ class Dialogue:
         self._said: deque[tuple[float, str]] = deque(maxlen=50)
         self._results: dict[int, int] = {}
         self._tries: Counter[str] = Counter()
+        self._asked_s: dict[int, float] = {}
         self._unread: deque[str] = deque(maxlen=100)
 
     @property
     def abilities(self) -> Abilities:
         """What is known of the autopilot."""
         return Abilities(self.version, self.capabilities, self.parameters.get(_TOP))
+
+    def asked_s(self, command: int) -> float:
+        """When that command was given last, s; -inf: never."""
+        return self._asked_s.get(command, -math.inf)
 
     def hear(self, message: Any, now_s: float) -> None:
         """Take an answer in; the caller holds the lock."""
@@ -130,6 +135,7 @@ class Dialogue:
         with self.changed:
             self._results.pop(message.command, None)
         while not patience.is_over:
+            self._asked_s[message.command] = self._clock.now_s()
             self._send(message)
             if self.wait(lambda: self._is_answered(message.command), patience.part(ASK_AGAIN_S)):
                 return self._results[message.command]
@@ -145,7 +151,6 @@ class Dialogue:
                 unknown = [name for name in (needed, *others) if self._is_worth_asking(name, needed)]
                 if not unknown and self.version is not None:
                     return
-                self._tries.update(unknown)
             for name in unknown:
                 self.ask_parameter(name)
             if self.version is None:
@@ -157,6 +162,7 @@ class Dialogue:
 
     def ask_parameter(self, name: str) -> None:
         """Ask for one parameter."""
+        self._tries[name] += 1
         self._send(mavlink.MAVLink_param_request_read_message(*self._target, name.encode(), -1))
 
     def _knows(self, names: tuple[str, ...]) -> bool:
@@ -170,6 +176,8 @@ class Dialogue:
 
     def _hear_parameter(self, name: str, value: float) -> None:
         name = name.rstrip("\x00")
+        if not self._tries[name]:
+            return  # nobody asked: others' parameters must not fill memory
         if math.isfinite(value):
             self.parameters[name] = float(value)
         elif name in self.parameters:

@@ -30,6 +30,7 @@ HEARTBEAT_S = 1.0
 _POLL_S = 0.05
 _REOPEN_S = 1.0
 _BURST = 256
+_TOLD = 5
 
 OnBytes = Callable[[str, bytes, int], None]
 """Called with "in" or "out", a whole frame, and unix time in microseconds: for a tlog."""
@@ -166,8 +167,9 @@ class Endpoint:
                 self._drain()
                 self._tick()
             except Exception:  # whatever a receiver or the wire does, the other boats here must still be heard
-                LOG.exception("link %s: unexpected; the link goes on", self.address)
                 self.faults["unexpected"] += 1
+                if self.faults["unexpected"] <= _TOLD:
+                    LOG.exception("link %s: unexpected; the link goes on", self.address)
                 self._ending.wait(_POLL_S)
 
     def _wait(self) -> None:

@@ -206,6 +206,8 @@ class MavlinkLink:
         refused = ", ".join(f"{count} {kind}" for kind, count in sorted(boat.refused().items()))
         start = f"boat {self.boat}: no heartbeat of system id {boat.system_id} on {self.endpoint.address}"
         start += f" in {timeout_s:g} s"
+        if boat.others:
+            start += f"; heard system ids {', '.join(map(str, sorted(boat.others)))} there"
         if not refused:
             return f"{start}; check power, radio, address and SYSID_THISMAV"
         remedy = (

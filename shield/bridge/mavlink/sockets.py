@@ -15,6 +15,7 @@ Peer = tuple[str, int]
 
 _DATAGRAM = 65_535
 _CHUNK = 8_192
+_WAITING = 2_048
 _DIAL_S = 5.0
 
 
@@ -185,6 +186,7 @@ class TcpWire:
     def _take(self, made: socket.socket) -> None:
         made.setblocking(False)
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)  # old commands must not queue up for seconds
         self._socket, self._pending = made, b""
 
     def fileno(self) -> int:

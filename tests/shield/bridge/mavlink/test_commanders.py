@@ -1,5 +1,7 @@
 """Somebody else at the helm is noticed and named."""
 
+import math
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.mavlink.commanders import SAY_AGAIN_S, Commanders
@@ -70,10 +72,17 @@ def test_an_answer_to_somebody_else_gives_him_away():
         return mavlink.MAVLink_command_ack_message(command, 0, 0, 0, system, component)
 
     mode = mavlink.MAV_CMD_DO_SET_MODE
-    assert watch.hear_answer(answer(mode, *OURS), 1.0) == ("", "")
-    assert watch.hear_answer(answer(mode, 0, 0), 1.0) == ("", ""), "older firmware names nobody"
-    assert watch.hear_answer(answer(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 252, 190), 1.0) == ("", "")
-    assert watch.hear_answer(answer(mode, 252, 190), 1.0)[0] == "second_commander"
+    never = -math.inf
+    assert watch.hear_answer(answer(mode, *OURS), 0.5, 1.0) == ("", "")
+    assert watch.hear_answer(answer(mode, 0, 0), never, 1.0) == ("", ""), "older firmware names nobody"
+    assert watch.hear_answer(answer(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 252, 190), never, 1.0) == ("", "")
+    assert watch.hear_answer(answer(mode, 252, 190), 0.5, 1.0)[0] == "second_commander"
+
+
+def test_another_program_with_our_own_ids_is_given_away_by_answers_we_did_not_ask_for():
+    answer = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 0, *OURS)
+    assert watching().hear_answer(answer, -math.inf, 100.0)[0] == "second_commander"
+    assert watching().hear_answer(answer, 50.0, 100.0)[0] == "second_commander"
 
 
 def test_a_crowd_of_stations_does_not_fill_memory():

@@ -105,6 +105,23 @@ def test_a_silent_boat_is_told_from_one_that_is_refused():
         link.connect(0.6)
 
 
+def test_a_boat_with_another_id_is_named():
+    with linked(prepared=False) as (boat, link):
+        boat.mav.srcSystem = 42
+        with pytest.raises(LinkError, match=r"no heartbeat of system id 1 .*heard system ids 42 there; check .*SYSID"):
+            link.connect(2.0)
+
+
+def test_parameters_nobody_asked_for_are_left():
+    with linked() as (boat, link):
+        boat.parameters["WHATEVER"] = 1.0
+        boat.send_parameter("WHATEVER")
+        boat.parameters["WP_SPEED"] = 3.0
+        boat.send_parameter("WP_SPEED")
+        assert wait_for(lambda: link.health().parameters["WP_SPEED"] == 3.0)
+        assert "WHATEVER" not in link.health().parameters
+
+
 def test_signed_boats_are_steered():
     key = bytes(range(32))
     with linked(signing=Signing(key), boat_key=key) as (boat, link):
