@@ -132,7 +132,7 @@ class Autopilot:
             elif name == "TIMESYNC":
                 self.trips.hear(message, received_s, self.telemetry.clock)
             elif name == "COMMAND_ACK":
-                asked_s = self.dialogue.asked_s(message.command)
+                asked_s = self.dialogue.asked_s(message.command) if self.expects_guided else received_s
                 self._note(*self.commanders.hear_answer(message, asked_s, received_s), received_s)
             elif name == "PARAM_VALUE":
                 self._hear_top_speed(message, received_s)

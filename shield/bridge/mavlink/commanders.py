@@ -51,12 +51,7 @@ class Commanders:
         source = (message.get_srcSystem(), message.get_srcComponent())
         name = message.get_type()
         if name == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
-            if len(self.stations) < _MOST_STATIONS:
-                self.stations.add(source)
-            who = (
-                "another program with our own ids" if source == self._ours else f"another ground station {_who(source)}"
-            )
-            return "", self._say("station", source, now_s, f"{who} is on this link; see that it does not command")
+            return "", self._hear_station(source, now_s)
         if getattr(message, "target_system", -1) != self._system_id:
             return "", ""
         if name in _STEERS or (name in ("COMMAND_LONG", "COMMAND_INT") and message.command in _ORDERS):
@@ -76,6 +71,15 @@ class Commanders:
         if asked[0] == 0 or ours or message.command not in _ORDERS:
             return "", ""
         return self._fault(asked, now_s, f"gave it command {message.command}")
+
+    def _hear_station(self, source: tuple[int, int], now_s: float) -> str:
+        """Another station; one with our own ids is a process of ours for another boat until it commands this."""
+        if source == self._ours:
+            return ""
+        if len(self.stations) < _MOST_STATIONS:
+            self.stations.add(source)
+        text = f"another ground station {_who(source)} is on this link; see that it does not command"
+        return self._say("station", source, now_s, text)
 
     def _fault(self, source: tuple[int, int], now_s: float, what: str) -> tuple[str, str]:
         self.heard_s = now_s

@@ -61,8 +61,14 @@ def test_another_ground_station_is_named_once_in_a_while():
     )
     assert watch.hear_foreign(of(beat), 1.0) == ("", "")
     assert watch.hear_foreign(of(beat), SAY_AGAIN_S + 1.0)[1]
-    assert "our own ids" in watch.hear_foreign(of(beat, *OURS), 2.0)[1]
-    assert watch.stations == {(252, 190), OURS}
+    assert watch.stations == {(252, 190)}
+
+
+def test_another_process_of_ours_is_one_only_when_it_commands():
+    watch, beat = watching(), mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+    assert watch.hear_foreign(of(beat, *OURS), 2.0) == ("", "")
+    assert not watch.stations
+    assert watch.hear_foreign(of(command(mavlink.MAV_CMD_DO_SET_MODE), *OURS), 3.0)[0] == "second_commander"
 
 
 def test_an_answer_to_somebody_else_gives_him_away():

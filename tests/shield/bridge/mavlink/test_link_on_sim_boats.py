@@ -5,6 +5,7 @@ faster than real time, and no slower machine makes anything late.
 """
 
 import math
+import socket
 import threading
 import time
 
@@ -28,9 +29,9 @@ FRAME = FieldFrame(42.0, -71.0)
 class Lake:
     """One simulated boat and its link."""
 
-    def __init__(self, *, boot_s=0.0, key=None, signing=None, noise=1.0, prepared=True):
+    def __init__(self, *, address="", boot_s=0.0, key=None, signing=None, noise=1.0, prepared=True):
         self.clock = ManualClock(1000.0)
-        boat = SimBoat("blue_1", start=(40.0, 20.0, 90.0), system_id=7)
+        boat = SimBoat("blue_1", start=(40.0, 20.0, 90.0), system_id=7, address=address)
         settings = AutopilotSettings(boot_s=boot_s)
         self.fleet = SimFleet([boat], clock=self.clock, autopilot=settings, noise=noise, key=key, seed=3)
         self.endpoint = Endpoint(self.fleet.addresses["blue_1"], self.clock, signing=signing)
@@ -124,6 +125,16 @@ def test_it_steers_by_what_it_is_told_and_is_left_in_hold(lake):
     text = lake.link.close()
     assert text.startswith("blue_1: in HOLD, speed 0.")
     assert lake.true_speed() < 0.5
+
+
+@pytest.mark.parametrize("kind", ["udpin", "tcp", "tcpin"])
+def test_every_kind_of_wire_carries_it(kind):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "udpin" else socket.SOCK_STREAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with Lake(address=f"{kind}:127.0.0.1:{port}") as lake:
+        lake.under_way()
+        assert lake.link.read().age_s < 0.4
 
 
 def test_a_boat_that_boots_is_waited_for_and_one_that_boots_too_long_refuses_in_its_own_words():

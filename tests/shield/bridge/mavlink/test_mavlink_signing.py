@@ -95,11 +95,11 @@ def test_every_flipped_bit_of_a_signed_frame_is_noticed():
 
 
 def test_a_frame_is_believed_once_and_older_ones_never():
-    checks, frame, older = check(), signed(at=10), signed(at=5)
+    checks, frame, older = check(), signed(at=MINUTE), signed(at=MINUTE // 2)
     assert [checks.refuse(frame), checks.refuse(frame), checks.refuse(older)] == ["", "replayed", "replayed"]
-    assert checks.refuse(signed(at=11)) == ""
-    assert checks.refuse(signed(at=5, system=2)) == "", "each sender has its own time"
-    assert checks.refuse(signed(at=5, link_id=2)) == "", "and so has each link"
+    assert checks.refuse(signed(at=2 * MINUTE)) == ""
+    assert checks.refuse(signed(at=MINUTE + MINUTE // 2, system=2)) == "", "each sender has its own time"
+    assert checks.refuse(signed(at=MINUTE + MINUTE // 2, link_id=2)) == "", "and so has each link"
 
 
 def test_a_new_sender_more_than_a_minute_behind_is_refused():
