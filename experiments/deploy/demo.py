@@ -19,6 +19,9 @@ FOLDER = Path("steerclear_demo")
 
 END_S = 10.0
 
+LONGEST_S = 4.0 * 3600.0
+"""Left behind by a runner that was killed, the processes end after this, s."""
+
 
 def demo_file(folder: Path = FOLDER) -> Path:
     """The fleet file that comes with the package, written where it can be looked at; one that is there is kept.
@@ -52,10 +55,11 @@ class Demo:
     def __init__(
         self, fleet_file: Path, opponents: str = "medium", speed: float = 1.0, more: Sequence[str] = ()
     ) -> None:
-        boats = ["sim-boats", str(fleet_file), "--opponents", opponents, "--boot", "5", "--noise", "1", *more]
+        boats = ["sim-boats", str(fleet_file), "--opponents", opponents, "--boot", "5", "--noise", "1"]
+        boats += ["--duration", f"{LONGEST_S:g}", *more]
         self._commands = {
             "boats": [*boats, "--speed", f"{speed:g}"],
-            "referee": ["referee", str(fleet_file), "--speed", f"{speed:g}"],
+            "referee": ["referee", str(fleet_file), "--speed", f"{speed:g}", "--minutes", f"{LONGEST_S / 60.0:g}"],
         }
         self._folder = fleet_file.resolve().parent
         self._processes: dict[str, subprocess.Popen[bytes]] = {}

@@ -42,9 +42,13 @@ def undisturbed() -> Iterator[None]:
         gc.unfreeze()
 
 
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that end a run in order; the last comes when a terminal or its connection is closed."""
+
+
 @contextlib.contextmanager
 def ended_by_signals(operator: Operator) -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the run in order, boats stopped; a second Ctrl-C does not wait for that."""
+    """Ctrl-C, SIGTERM and SIGHUP end the run in order, boats stopped; a second one does not wait for that."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -54,7 +58,7 @@ def ended_by_signals(operator: Operator) -> Iterator[None]:
             raise KeyboardInterrupt
         operator.end(signal.Signals(number).name)
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, end) for number in ENDING}
     try:
         yield
     finally:

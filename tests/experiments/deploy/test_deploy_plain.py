@@ -1,6 +1,9 @@
 """Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
 
 import logging
+import os
+import signal
+import sys
 import time
 
 import numpy as np
@@ -8,8 +11,10 @@ import pytest
 from deploy_ticks import Stream
 from steerclear.experiments.deploy.demo import Demo, demo_file
 from steerclear.experiments.deploy.plain import PlainLines, logging_aside
+from steerclear.experiments.deploy.quiet import ended_by_signals, undisturbed
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
 from steerclear.shield.exceptions import BridgeError
 
@@ -84,3 +89,22 @@ def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path)
             demo.wait(60.0)
         processes = list(demo._processes.values())
     assert all(process.poll() is not None for process in processes)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
+    operator, before = Operator(), signal.getsignal(getattr(signal, name))
+    with ended_by_signals(operator):
+        os.kill(os.getpid(), getattr(signal, name))
+        assert operator.ended == name
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), getattr(signal, name))
+            time.sleep(5.0)
+    assert signal.getsignal(getattr(signal, name)) == before
+
+
+def test_what_makes_a_run_quiet_is_taken_back():
+    before = sys.getswitchinterval()
+    with undisturbed():
+        assert sys.getswitchinterval() < before
+    assert sys.getswitchinterval() == pytest.approx(before)
