@@ -1,7 +1,6 @@
 """Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
 
 import logging
-import os
 import signal
 import sys
 import time
@@ -95,11 +94,10 @@ def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path)
 def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
     operator, before = Operator(), signal.getsignal(getattr(signal, name))
     with ended_by_signals(operator):
-        os.kill(os.getpid(), getattr(signal, name))
+        signal.raise_signal(getattr(signal, name))
         assert operator.ended == name
         with pytest.raises(KeyboardInterrupt):
-            os.kill(os.getpid(), getattr(signal, name))
-            time.sleep(5.0)
+            signal.raise_signal(getattr(signal, name))
     assert signal.getsignal(getattr(signal, name)) == before
 
 
