@@ -98,7 +98,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         table=looked.table,
         table_margin_m=config.table_margin_m,
         look=np.where(with_table, looked.steps, 0),
-        feared=(looked.table >= 0).any(axis=0),
+        feared=np.asarray((looked.table >= 0).any(axis=0)),
     )
 
 
