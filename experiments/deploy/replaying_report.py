@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from steerclear.env.record import Record
 from steerclear.shield.bridge.blackbox import LogHeader, LogLine, LogReader
-from steerclear.shield.bridge.blackbox.origin import describe_machine, source_digest, versions
+from steerclear.shield.bridge.blackbox.origin import describe_machine, source_digest, table_digests, versions
 
 from ..breaches import PairDistances
 from ..judging import NOT_JUDGED, judge_game
@@ -116,6 +116,8 @@ def origin_of(header: LogHeader) -> list[str]:
     ]
     if header.sources != source_digest():
         found.append("the sources of the shield are others")
+    if dict(header.tables or {}) != table_digests(header.platforms):
+        found.append("the value tables of these boats are others")
     if header.machine != describe_machine():
         found.append(f"machine {header.machine} there, {describe_machine()} here")
     return found

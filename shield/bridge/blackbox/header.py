@@ -14,7 +14,7 @@ from ...platforms import Gains, Platform, get_platform
 from ...surroundings import OPEN_WATER, Surroundings
 from ..frame import FieldFrame
 from .numbers import plain, restored
-from .origin import describe_machine, source_digest, versions
+from .origin import describe_machine, source_digest, table_digests, versions
 
 LOG_VERSION = 1
 
@@ -57,6 +57,7 @@ class LogHeader:
         unix_ns: wall clock at that moment, ns since 1970; all times in the log are counted from it on the loop's clock.
         versions: of Python and the packages that decisions depend on.
         sources: digest of the sources of the shield.
+        tables: digests of the value tables for pairs of those platforms; None: those there are now.
         machine: processor architecture, system and C library, which sines and cosines come from.
         version: of the log's format.
     """
@@ -75,8 +76,13 @@ class LogHeader:
     unix_ns: int = field(default_factory=time.time_ns)
     versions: Mapping[str, str] = field(default_factory=versions)
     sources: str = field(default_factory=source_digest)
+    tables: Mapping[str, str] | None = None
     machine: str = field(default_factory=describe_machine)
     version: int = LOG_VERSION
+
+    def __post_init__(self) -> None:
+        if self.tables is None:
+            object.__setattr__(self, "tables", table_digests(self.platforms))
 
     def time_ns(self, clock_s: float) -> int:
         """Nanoseconds since 1970 of a time of the loop's clock, never before 1970."""
@@ -103,6 +109,7 @@ class LogHeader:
             "field_size_m": self.field_size_m,
             "notes": dict(self.notes),
             "versions": dict(self.versions),
+            "tables": dict(self.tables or {}),
         }
         return shown | {name: json.dumps(plain(value), allow_nan=False) for name, value in hidden.items()}
 
@@ -145,6 +152,7 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
         "clock_s": restored(message["clock_s"]),
         "unix_ns": int(message["unix_ns"]),
         "versions": json.loads(message["versions"]),
+        "tables": json.loads(message["tables"]),
         "sources": str(message["sources"]),
         "machine": str(message["machine"]),
     }

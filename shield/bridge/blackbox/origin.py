@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import platform as machine
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from ...tables.files import find_table
+from ...tables.settings import OtherMay
 
 PACKAGES = ("steerclear", "numpy", "numba", "llvmlite", "qpsolvers", "daqp", "osqp", "quadprog", "pymavlink", "mcap")
 """Distributions whose versions a log notes."""
@@ -32,6 +36,21 @@ def source_digest() -> str:
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
+
+
+def table_digests(platforms: Iterable[str]) -> dict[str, str]:
+    """Digests of the value table files there are for pairs of platforms, which the shield may look opponents up in.
+
+    Args:
+        platforms: names.
+    """
+    found, names = {}, sorted(platforms)
+    for own in names:
+        for other in names:
+            path = find_table(own, other, OtherMay.WORST_CASE)
+            if path is not None:
+                found[f"{own} with {other}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
 
 
 @cache

@@ -156,5 +156,6 @@ HEADER = named(
         field_size_m=TEXT,
         notes=TEXT,
         versions=TEXT,
+        tables=TEXT,
     ),
 )

@@ -9,9 +9,10 @@ from logged_runs import FIELD, Encounter, header_of, write_log
 from steerclear.experiments.deploy.replaying import exact, prove
 from steerclear.experiments.deploy.replaying_report import origin_of, replay_log
 from steerclear.shield import Commands, Fleet, ShieldConfig, Surroundings
-from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.blackbox import LogReader, platforms_of
 
 STEPS = 200
+BOTH = platforms_of(["heron", "surveyor"])
 
 
 class OddEncounter(Encounter):
@@ -35,6 +36,13 @@ class OddEncounter(Encounter):
         if number % 5 == 0:
             values[1, 1] = -0.0
         return Commands.relative_deg(values)
+
+
+class Surveyors(Encounter):
+    """Boats whose opponents are looked up in value tables."""
+
+    def fleet(self, number):
+        return dataclasses.replace(super().fleet(number), platforms=("surveyor",) * 4)
 
 
 def read(path):
@@ -73,13 +81,13 @@ def test_a_log_proves_itself(log):
         {},
         {"coordination": "per_boat", "delay_s": 0.3},
         {"certificate": "braking", "position_error_m": 0.3, "response_per_s": math.inf},
-        {"separation_m": 4.0, "edge_m": None, "solver": "quadprog"},
+        {"separation_m": 4.0, "edge_m": None, "solver": "quadprog", "certificate": "turning_circle"},
     ],
     ids=lambda settings: ",".join(settings) or "defaults",
 )
-@pytest.mark.parametrize("kind", [Encounter, OddEncounter])
+@pytest.mark.parametrize("kind", [Encounter, OddEncounter, Surveyors])
 def test_any_settings_and_inputs_come_back(tmp_path, settings, kind):
-    write_log(tmp_path / "run.mcap", 120, header=header_of(ShieldConfig(**settings)), kind=kind)
+    write_log(tmp_path / "run.mcap", 120, header=header_of(ShieldConfig(**settings), platforms=BOTH), kind=kind)
     proof = prove(*read(tmp_path / "run.mcap"))
     assert proof.same == proof.decisions == 120
 
@@ -228,11 +236,22 @@ def test_a_decision_that_is_refused_now_is_a_difference(log):
 def test_what_differs_from_the_logs_program_is_told(log):
     header, _ = log
     assert origin_of(header) == []
-    other = dataclasses.replace(header, versions={**header.versions, "numpy": "0.1"}, machine="riscv", sources="")
-    told = origin_of(other)
+    parts = {"machine": "riscv", "sources": "", "tables": {"heron with heron": "?"}}
+    told = origin_of(dataclasses.replace(header, versions={**header.versions, "numpy": "0.1"}, **parts))
     assert told[0].startswith("numpy 0.1 there, ")
     assert "sources of the shield" in told[1]
-    assert told[2].startswith("machine riscv there, ")
+    assert "value tables" in told[2]
+    assert told[3].startswith("machine riscv there, ")
+
+
+def test_the_header_names_the_value_tables_there_are(tmp_path, monkeypatch):
+    monkeypatch.setenv("STEERCLEAR_TABLES", str(tmp_path))
+    surveyors = platforms_of(["surveyor"])
+    shipped = header_of(platforms=surveyors).tables
+    assert set(shipped) == {"surveyor with surveyor"}
+    (tmp_path / "surveyor-surveyor-worst-case.npz").write_bytes(b"made on demand")
+    assert header_of(platforms=surveyors).tables != shipped
+    assert header_of(platforms=platforms_of(["di"])).tables == {}
 
 
 def test_reasons_and_actions_are_counted(tmp_path):
