@@ -76,7 +76,9 @@ def _flag_homes(config: GameConfig, size: Array) -> Array:
     homes = np.array([config.blue_flag_home_m, config.red_flag_home_m])
     for home in homes:
         if not ((home > 0.0) & (home < size)).all():
-            raise ConfigError(f"flag home {tuple(home.tolist())} lies outside the field {tuple(size.tolist())}; move it inside")
+            raise ConfigError(
+                f"flag home {tuple(home.tolist())} lies outside the field {tuple(size.tolist())}; move it inside"
+            )
     return homes
 
 

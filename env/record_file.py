@@ -25,16 +25,15 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import TraceError
+
+from .npz_file import read_arrays
+from .whole_file import whole_file
 
 Record = dict[str, np.ndarray]
 
@@ -83,19 +82,6 @@ ARRAYS = tuple(LAYOUT)
 """Names of the arrays beside ``meta``."""
 
 _MUST_BE_FINITE = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
-_UNREADABLE = (
-    OSError,
-    ValueError,
-    EOFError,
-    KeyError,
-    AttributeError,
-    TypeError,
-    NotImplementedError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What numpy raises on files that are cut, damaged, or hold something else."""
 
 _AGAIN = "Record the game again with GameRecorder and save() it."
 
@@ -213,18 +199,11 @@ def load(path: str | os.PathLike[str]) -> Record:
     Raises:
         TraceError: The file is missing, cut, not a record, or lacks an array.
     """
-    source = Path(path)
-    if not source.is_file():
-        raise TraceError(f"there is no record {source}. Check the path, or record a game first.")
-    try:
-        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            record = {name: archive[name] for name in archive.files}
-    except _UNREADABLE as error:
-        raise TraceError(f"{source} is cut or not a record ({error}). {_AGAIN}") from error
+    record = read_arrays(path, "record", _AGAIN)
     try:
         validate(record)
     except TraceError as error:
-        raise TraceError(f"{source}: {error}") from None
+        raise TraceError(f"{path}: {error}") from None
     return record
 
 

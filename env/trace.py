@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError, TraceError
 
 from .config import GameConfig
+from .npz_file import read_arrays
 from .pyquaticus_config import from_pyquaticus
 from .whole_file import whole_file
 
@@ -35,7 +34,6 @@ PER_BOAT = (
 PER_TEAM = ("flag_taken", "captures", "tags", "grabs")
 META_KEYS = ("config", "team_size", "agent_ids", "dt", "obs_keys", "global_state_keys", "agent_radius")
 
-_UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 _REMEDY = "Record or copy it again."
 
 
@@ -94,13 +92,7 @@ def load_trace(path: str | os.PathLike[str]) -> Trace:
         TraceError: the file is missing, cut short, not a trace, lacks an array or fits no game.
     """
     source = Path(path)
-    if not source.is_file():
-        raise TraceError(f"there is no trace {source}; check the path")
-    try:
-        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except _UNREADABLE as error:
-        raise TraceError(f"{source} is cut short or no npz file ({error}). {_REMEDY}") from error
+    arrays = read_arrays(source, "trace", _REMEDY)
     meta = _read_meta(source, arrays)
     try:
         config = from_pyquaticus(meta["config"], team_size=meta["team_size"], dt_s=meta["dt"])

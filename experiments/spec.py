@@ -55,6 +55,7 @@ class MatchSpec:
     judge: str = "shielded"
 
     def __post_init__(self) -> None:
+        check_seed(self.seed)
         check_side(self.side)
         check_judge(self.judge)
 
@@ -85,6 +86,16 @@ class MatchSpec:
             ConfigError: the preset or a setting is unknown or out of range.
         """
         return GameConfig.preset(self.preset, **self.rules)
+
+
+def check_seed(seed: int) -> None:
+    """Refuse seeds that no random numbers can be drawn from.
+
+    Raises:
+        ConfigError: a negative one.
+    """
+    if seed < 0:
+        raise ConfigError(f"--seed must be 0 or more; got {seed}")
 
 
 def check_side(side: str) -> str:

@@ -26,6 +26,7 @@ from ..encounters.scenes import Conditions
 from ..encounters.start import start_certificate_m
 from ..encounters.tally import Columns, tally
 from ..encounters.verdicts import judge_game, side_name
+from ..spec import check_seed
 from ..store import key_of
 from .opponents import Duel
 
@@ -70,8 +71,9 @@ class Search:
         check_guard(self.guard)
         if self.population < 8:
             raise ConfigError(f"--population must be at least 8; got {self.population}")
-        if self.generations < 1 or self.seed < 0:
-            raise ConfigError(f"--generations must be >= 1 and --seed >= 0; got {self.generations} and {self.seed}")
+        if self.generations < 1:
+            raise ConfigError(f"--generations must be at least 1; got {self.generations}")
+        check_seed(self.seed)
 
     def duel(self) -> Duel:
         """The own boats that are attacked."""

@@ -10,6 +10,7 @@ from typing import Any
 from steerclear.shield import ShieldConfig
 
 from ..provenance import machine, versions
+from ..spec import check_seed
 from .batch import BatchSize, batch_memory, steps_per_s
 from .decide import COUNTS, decide_times, scaling
 from .sampling import programs_of, questions_of_games
@@ -41,6 +42,9 @@ class BenchSettings:
     memory_games: int = 4096
     scenes: int = 200
     counts: tuple[int, ...] = COUNTS
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
 
     def small(self) -> BenchSettings:
         """Return a version of seconds instead of minutes; its figures are rough."""

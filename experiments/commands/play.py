@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
+from steerclear.shield.exceptions import ConfigError
 
 from ..match import MatchResult, Watcher, play_match
 from ..provenance import machine, versions
@@ -27,7 +29,10 @@ Side = Annotated[str, typer.Option(help="Colour of the own team: blue or red.")]
 Shield = Annotated[bool, typer.Option("--shield/--no-shield", help="Whether the own team is shielded.")]
 Window = Annotated[bool, typer.Option("--window/--headless", help="Show the game in a window.")]
 Keyboard = Annotated[
-    bool, typer.Option("--keyboard", help="Steer the first own boat with the arrow keys (a window opens).")
+    bool,
+    typer.Option(
+        "--keyboard", help="Steer the first own boat with the arrow keys, as --own keyboard does (a window opens)."
+    ),
 ]
 Save = Annotated[list[Path] | None, typer.Option(help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")]
 Speed = Annotated[float, typer.Option(help="Times faster than the game, in a window.")]
@@ -73,8 +78,10 @@ def play(
         fixed_start=fixed_start,
         penalty=check_penalty(penalty),
     )
+    if not 0.0 < speed < math.inf:
+        raise ConfigError(f"--speed must be a number above 0; got {speed:g}")
     started = time.perf_counter()
-    result = _play(spec, save or [], window or keyboard, speed)
+    result = _play(spec, save or [], window or "keyboard" in (spec.own, spec.opponent), speed)
     out().print(game_table(result.row, result.spec.radii_m))
     if result.row["first_failure"]:
         out().print(f"first policy failure: {result.row['first_failure']}", markup=False, soft_wrap=True)

@@ -18,18 +18,27 @@ from .console import command, out
 from .saving import check_endings, save_record
 
 Records = Annotated[list[Path], typer.Argument(help="Recorded games (.npz); several only for .html.")]
-To = Annotated[Path, typer.Option("--to", help="What to write: .html, .mp4, .gif, .png or .npz.")]
+To = Annotated[
+    Path | None,
+    typer.Option(
+        "--to",
+        metavar="FILE",
+        help="What to write: .html, .mp4, .gif, .png or .npz.",
+        show_default="a replay beside the record",
+    ),
+]
 At = Annotated[float | None, typer.Option(help="Moment a picture shows, s.", show_default="the closest approach")]
 Speed = Annotated[float, typer.Option(help="Times faster than the game, for films.")]
 
 
 @command
-def render(records: Records, to: To, at: At = None, speed: Speed = 4.0, json_file: o.JsonFile = None) -> None:
+def render(records: Records, to: To = None, at: At = None, speed: Speed = 4.0, json_file: o.JsonFile = None) -> None:
     """Turn recorded games into a replay to scrub in a browser, a film or a picture.
 
     Exit status: 0 done, 2 bad input, 130 interrupted.
     """
     started = time.perf_counter()
+    to = to or records[0].with_suffix(".html")
     check_endings([to])
     games = [load(path) for path in records]
     if len(games) > 1 and to.suffix.lower() != ".html":

@@ -36,7 +36,7 @@ def save_record(record: Record, path: Path, at_s: float | None = None, speedup: 
         speedup: times faster than the game, for films.
 
     Raises:
-        ConfigError: the name's ending is not known, or the place cannot be written to.
+        ConfigError: the name's ending is not known, the moment is not in the game, or the place cannot be written to.
     """
     check_endings([path])
     ending = path.suffix.lower()
@@ -57,8 +57,21 @@ def _film(record: Record, path: Path, speedup: float) -> Path:
 def _picture(record: Record, path: Path, at_s: float | None) -> Path:
     from steerclear.env.render import save_frame
 
-    step = closest_step(record) if at_s is None else round(at_s / dt_of(record))
+    step = closest_step(record) if at_s is None else step_at(record, at_s)
     return save_frame(record, step, path)
+
+
+def step_at(record: Record, at_s: float) -> int:
+    """Return the step of a moment.
+
+    Raises:
+        ConfigError: the game has no such moment.
+    """
+    dt_s = dt_of(record)
+    length_s = len(record["wanted"]) * dt_s
+    if not -0.5 * dt_s <= at_s <= length_s + 0.5 * dt_s:
+        raise ConfigError(f"--at is {at_s:g}; the game has 0 to {length_s:g} s")
+    return min(max(round(at_s / dt_s), 0), len(record["wanted"]))
 
 
 def dt_of(record: Record) -> float:

@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
 from ..pool import run_all
+from ..spec import check_seed
 from ..store import ResultStore, key_of
 from .families import draw, get_family
 from .guards import check_guard
@@ -52,8 +53,7 @@ class Settings:
     def __post_init__(self) -> None:
         if self.n < 1:
             raise ConfigError(f"--n must be at least 1; got {self.n}")
-        if self.seed < 0:
-            raise ConfigError(f"--seed must be 0 or more; got {self.seed}")
+        check_seed(self.seed)
         for name in self.families:
             get_family(name)
         for name in self.guards:

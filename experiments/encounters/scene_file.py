@@ -55,7 +55,8 @@ def read_scene(path: Path) -> tuple[Scenes, Conditions]:
     try:
         return scenes_of(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ConfigError(f"{path} is no scene: {type(error).__name__}: {error}") from None
+        why = f"{type(error).__name__}: {error}"
+        raise ConfigError(f"{path} is no scene ({why}); give a file that `steerclear attack` wrote") from None
 
 
 def scenes_of(content: Mapping[str, Any]) -> tuple[Scenes, Conditions]:

@@ -67,8 +67,16 @@ def test_a_cut_file_is_one_clear_error(game_record, tmp_path, share):
     path = save(game_record, tmp_path / "game.npz")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
-    with pytest.raises(TraceError, match=r"game\.npz is cut or not a record .*Record the game again"):
+    with pytest.raises(TraceError, match=r"game\.npz is cut or not a record\. Record the game again"):
         load(path)
+
+
+def test_a_file_of_something_else_is_not_advised_to_be_trusted(tmp_path):
+    path = tmp_path / "game.npz"
+    path.write_text("hello")
+    with pytest.raises(TraceError, match="not a record") as refused:
+        load(path)
+    assert "pickle" not in str(refused.value)
 
 
 def test_a_damaged_file_is_one_clear_error(game_record, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steerclear.env.record import load
+from steerclear.env.record import load, save
 from steerclear.experiments import campaign, cli, keys
 from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands.console import ExitCode
@@ -126,6 +126,31 @@ def test_play_saves_what_it_is_asked_to_and_render_goes_on_from_there():
     assert "only a replay" in run("render", "a.npz", "a.npz", "--to", "two.gif").stderr
 
 
+def test_a_record_becomes_a_replay_beside_it_when_nothing_else_is_asked(game_record):
+    save(game_record, "game.npz")
+    done = run("render", "game.npz")
+    assert done.exit_code == ExitCode.OK, done.output
+    assert done.stdout == "game.html\n"
+    assert "<title>" in Path("game.html").read_text()
+
+
+@pytest.mark.parametrize("at", ["nan", "inf", "-0.2", "1e9"])
+def test_a_picture_of_no_moment_of_the_game_is_refused(at, game_record):
+    save(game_record, "game.npz")
+    done = run("render", "game.npz", "--to", "a.png", "--at", at)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert done.stderr.startswith("error: ")
+    assert "the game has 0 to 6 s" in done.stderr
+    assert not os.path.exists("a.png")
+
+
+@pytest.mark.parametrize("arguments", [["--own", "keyboard"], ["--opponent", "keyboard"], ["--keyboard"]])
+def test_whoever_is_steered_by_hand_gets_a_window(arguments, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    done = run("play", *arguments, "--max-time", "0.5", "--speed", "1000")
+    assert done.exit_code == ExitCode.OK, done.output
+
+
 def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
     trace = min(TRACES, key=lambda path: path.stat().st_size)
     done = run("parity", trace, "--json", "p.json")
@@ -166,6 +191,9 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --penalty -1", "--penalty must be"),
         ("ablate --games 0", "--games must be at least 1"),
         ("ablate --jobs 0", "--jobs must be at least 1"),
+        ("ablate --seed -1", "--seed must be 0 or more; got -1"),
+        ("play --seed -1", "--seed must be 0 or more; got -1"),
+        ("bench --quick --seed -1", "--seed must be 0 or more; got -1"),
         ("ablate --set max_tme_s=3", "did you mean max_time_s"),
         ("ablate --set nothing", "KEY=VALUE"),
         ("ablate --shield-set seperation_m=3", "did you mean 'separation_m'"),
@@ -174,6 +202,8 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("evaluate medium --opponents esy", "did you mean easy"),
         ("play --side bleu", "did you mean blue"),
         ("play --save game.avi", ".mp4"),
+        ("play --speed 0", "--speed must be a number above 0; got 0"),
+        ("play --speed nan", "--speed must be a number above 0; got nan"),
         ("parity missing.npz", "missing.npz"),
         ("render missing.npz --to a.html", "missing.npz"),
         ("render missing.npz --to a.avi", ".html"),

@@ -106,7 +106,7 @@ def test_bad_input(arguments, words):
 
 
 def test_numbers_out_of_range_are_refused():
-    with pytest.raises(ConfigError, match="--generations must be >= 1"):
+    with pytest.raises(ConfigError, match="--generations must be at least 1"):
         Search(generations=0)
 
 
