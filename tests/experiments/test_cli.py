@@ -232,7 +232,7 @@ def test_ctrl_c_ends_a_real_run_with_status_130_and_keeps_its_games(tmp_path):
     with subprocess.Popen(
         [*command, "--max-time", "20", "--jobs", "2", "--out", "out"], stderr=subprocess.PIPE, text=True
     ) as process:
-        deadline = time.monotonic() + 240.0
+        deadline = time.monotonic() + 420.0
         lines = tmp_path / "out" / "games.jsonl"
         while time.monotonic() < deadline and not (lines.exists() and lines.read_text().count("\n") >= 2):
             time.sleep(0.1)
