@@ -102,16 +102,18 @@ def judge(fleet: FleetFile, roster: Roster, seen: Seen) -> Verdict:
 
 def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict: Verdict) -> None:
     limits, reading = fleet.limits, seen.readings[boat]
-    age = roster.navigation_age_s(boat)
+    age, known = roster.navigation_age_s(boat), roster.known_age_s(boat)
+    silent = link_age_s(reading)
     why = f" ({roster.faults[boat]})" if boat in roster.faults else ""
-    if age > limits.navigation.lost_after_s:
+    if known > limits.navigation.lost_after_s or silent > limits.navigation.lost_after_s:
         verdict.unknown.add(boat)
-        text = f"{boat}: position unknown, {words(age)}{why}; told to stop"
+        what = "position unknown" if known > limits.navigation.lost_after_s else "no longer reached"
+        text = f"{boat}: {what}, {words(age)}{why}; told to stop"
         verdict.due(Action(boat, "navigation", "stop", text), (boat,))
     elif age > limits.navigation.max_age_s:
-        text = f"{boat}: own navigation {words(age)}{why}"
+        feed = ", known from the feed" if known < age else ""
+        text = f"{boat}: own navigation {words(age)}{why}{feed}"
         verdict.due(Action(boat, "navigation", limits.navigation.then, text), (boat,))
-    silent = link_age_s(reading)
     if silent > limits.link.max_age_s:
         text = f"{boat}: link silent, {words(silent)}"
         verdict.due(Action(boat, "link", limits.link.then, text), (boat,))

@@ -63,6 +63,8 @@ class Roster:
         self._own_gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in self.commanded}
         self._gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in fleet.names}
         self._contacts: dict[str, Contact] = {}
+        self._telemetry_s: dict[str, float] = {}
+        self._fed_m: dict[str, float] = {}
         self._faults: dict[str, str] = {}
         self._told_s: dict[tuple[str, str], float] = {}
         self._now_s = -math.inf
@@ -82,6 +84,9 @@ class Roster:
                 self._take_reading(name, readings[name], estimator)
         for contact in contacts:
             self._take_contact(contact)
+        for name, estimator in self._estimators.items():
+            if self.navigation_age_s(name) > self.fleet.limits.navigation.max_age_s:
+                self._take_feed(name, estimator)
 
     def sent(self, tick_s: float, sent: Mapping[str, Sent]) -> None:
         """Note what left at the tick of that time."""
@@ -99,7 +104,11 @@ class Roster:
         return own
 
     def navigation_age_s(self, name: str) -> float:
-        """Age of what is known of an own boat by its own telemetry, s; inf: nothing yet."""
+        """Age of an own boat's telemetry, s; inf: nothing yet."""
+        return self._now_s - self._telemetry_s.get(name, -NEVER_S)
+
+    def known_age_s(self, name: str) -> float:
+        """Age of what is known of an own boat, by its telemetry or by the feed in its place, s; inf: nothing yet."""
         own = self._own_track(name)
         return NEVER_S if own is None else own.age_s
 
@@ -113,7 +122,7 @@ class Roster:
         estimate = None if estimator is None else estimator.estimate(self._now_s)
         if estimate is None:
             return None
-        error = self.fleet.shield_config.position_error_m
+        error = max(self.fleet.shield_config.position_error_m, self._fed_m.get(name, 0.0))
         stale = estimate.age_s > self.fleet.limits.navigation.max_age_s
         return Track(estimate.row, 0.0, estimate.age_s, error + estimate.spread_m * stale)
 
@@ -136,6 +145,16 @@ class Roster:
             self._note(name, text)
         else:
             estimator.correct(reading)
+            self._telemetry_s[name] = reading.read_s - reading.age_s
+            self._fed_m.pop(name, None)
+
+    def _take_feed(self, name: str, estimator: Estimator) -> None:
+        """Let the feed say where an own boat is when its own telemetry does not: what is left is used."""
+        contact = self._contacts.get(name)
+        if contact is None or self._now_s - contact.fixed_s > self.fleet.limits.contact.max_age_s:
+            return
+        estimator.correct(_reading_of(contact, self._now_s))
+        self._fed_m[name] = contact.error_m
 
     def _take_contact(self, contact: Contact) -> None:
         name = contact.boat
@@ -167,3 +186,17 @@ class Roster:
         if self._now_s - self._told_s.get(kind, -math.inf) >= TALK_EVERY_S:
             self._told_s[kind] = self._now_s
             LOG.warning("%s: fix refused: %s", name, text)
+
+
+def _reading_of(contact: Contact, now_s: float) -> BoatReading:
+    age = now_s - contact.fixed_s
+    return BoatReading(
+        contact.boat,
+        now_s,
+        position_m=contact.position_m,
+        position_age_s=age,
+        heading_rad=contact.heading_rad,
+        heading_age_s=age,
+        speed_mps=contact.speed_mps,
+        velocity_age_s=age,
+    )

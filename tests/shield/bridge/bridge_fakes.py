@@ -250,7 +250,8 @@ class World:
     def distance_m(self):
         """Smallest distance between an own boat and any other."""
         own = [link.row[:2] for link in self.links.values()]
-        rows = [*own, *(row[:2] for row in self.contacts.rows.values())]
+        others = (row[:2] for name, row in self.contacts.rows.items() if name not in self.links)
+        rows = [*own, *others]
         return min(
             (float(np.hypot(*(a - b))) for k, a in enumerate(own) for b in rows[k + 1 :]),
             default=math.inf,

@@ -22,12 +22,13 @@ limits:
 """
 
 
-def verdict_of(navigation_s=0.0, contact_s=0.0, where=(0.0, 0.0), faults=None, reading=None, **seen):
+def verdict_of(navigation_s=0.0, contact_s=0.0, known_s=None, where=(0.0, 0.0), faults=None, reading=None, **seen):
     fleet = fleet_of(blue=1, red=1, more=MORE)
     roster = SimpleNamespace(
         commanded=("blue_1",),
         faults=faults or {},
         navigation_age_s=lambda name: navigation_s,
+        known_age_s=lambda name: navigation_s if known_s is None else known_s,
         contact_age_s=lambda name: contact_s,
         track=lambda name: Track(fresh_state(*where, 0.0), 0.0, navigation_s, 0.0),
     )
@@ -49,6 +50,8 @@ def test_nothing_is_due_while_all_is_well():
         ({"navigation_s": 2.1}, "stop", "position unknown"),
         ({"navigation_s": math.inf}, "stop", "never heard"),
         ({"navigation_s": 0.6, "faults": {"blue_1": "jumped"}}, "slow", "(jumped)"),
+        ({"navigation_s": 9.0, "known_s": 0.3}, "slow", "known from the feed"),
+        ({"reading": {"heartbeat_age_s": 2.1}}, "stop", "no longer reached"),
         ({"contact_s": 1.1}, "slow", "contact red_1 old"),
         ({"contact_s": 5.1}, "stop", "contact red_1 lost"),
         ({"policy_age_s": {"blue_1": 0.6}}, "hold_course", "no usable command"),

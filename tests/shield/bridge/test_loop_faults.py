@@ -105,6 +105,27 @@ def test_telemetry_that_stops_stops_the_boat_by_its_link_and_the_other_keeps_cle
     assert max(grown) < 20.0
 
 
+def test_telemetry_that_stops_is_replaced_by_the_feed_where_it_knows_the_boat():
+    world = pair()
+    link = world.links["blue_1"]
+    world.contacts.rows["blue_1"] = link.row  # somebody else watches it
+    world.contacts.advance = lambda dt_s: None
+
+    def strike(world):
+        if world.clock.now_s() >= 1004.0 and link.silent_since_s is None:
+            link.silent_since_s = world.clock.now_s()
+            link.changed = {"heartbeat_age_s": 0.2}
+
+    world.run(8.0, strike)
+    assert ("navigation", "stop") in world.responses("blue_1")
+    assert any("known from the feed" in action.text for action in world.last.actions)
+    assert world.last.fleet.controlled.tolist() == [True, True]
+    assert link.stops == 0
+    assert np.hypot(*(world.last.fleet.state[0, :2] - link.row[:2])) < 0.3
+    world.run(15.0, strike)
+    assert world.closest_m >= 2.5
+
+
 def test_a_boat_that_hears_nothing_any_more_is_kept_clear_of():
     """Both directions of its link are lost: it goes on with its last command, then stops by its own time-out."""
     world = pair()
