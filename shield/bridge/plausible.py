@@ -18,6 +18,12 @@ SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
 JUMP_M = 3.0
 """Differences from where the boat must be that no receiver's noise explains, m."""
 
+MOVED_M, FROZEN_M = 0.05, 0.6
+"""A position that moved less than the first while the boat's speed says it ran the second is frozen, m."""
+
+UNDER_WAY_MPS = 0.2
+"""Slower boats may well stay where they are: noise of the speed is no way run."""
+
 BELIEVED_AFTER_S = 2.0
 """A new place told consistently for this long is believed, s."""
 
@@ -48,12 +54,15 @@ class Gate:
     def __init__(self, fastest_mps: float) -> None:
         self._fastest = SPEED_SHARE * fastest_mps + SPEED_MORE_MPS
         self._last: Fix | None = None
+        self._still: Fix | None = None
+        self._newest_s = -math.inf
+        self._run_m = 0.0
         self._doubted: Fix | None = None
         self._doubted_since_s = 0.0
 
     def refuse(self, fix: Fix) -> str:
         """Why this fix is not taken; empty: it is taken."""
-        text = self._impossible(fix)
+        text = self._impossible(fix) or self._frozen(fix)
         if text:
             return text
         if self._last is None or self._near(self._last, fix):
@@ -70,6 +79,16 @@ class Gate:
         if abs(fix.speed_mps) > self._fastest:
             return f"speed {fix.speed_mps:.1f} m/s is beyond the boat"
         return ""
+
+    def _frozen(self, fix: Fix) -> str:
+        """Whether the position stays although the boat is under way; its time stamps may be fresh all the same."""
+        still = self._still
+        if still is None or math.hypot(fix.x_m - still.x_m, fix.y_m - still.y_m) > MOVED_M:
+            self._still, self._run_m = fix, 0.0
+        elif fix.fixed_s > self._newest_s and abs(fix.speed_mps) > UNDER_WAY_MPS:
+            self._run_m += abs(fix.speed_mps) * min(fix.fixed_s - self._newest_s, 1.0)
+        self._newest_s = max(self._newest_s, fix.fixed_s)
+        return f"position frozen while it runs {abs(fix.speed_mps):.1f} m/s" if self._run_m > FROZEN_M else ""
 
     def _near(self, before: Fix, fix: Fix) -> bool:
         """Whether the boat can have come from there, whatever it did on the way."""

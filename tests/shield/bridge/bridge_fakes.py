@@ -266,3 +266,13 @@ def straight(heading_deg, speed=2.0):
     """A rule that commands every boat the same."""
     heading = math.radians(heading_deg) % (2 * math.pi)
     return lambda snapshot: np.tile([speed, heading], (len(snapshot.seen), 1))
+
+
+def pair(rule=None, shield=None, **settings):
+    """Two own boats head on, 40 m apart, both told to go on."""
+
+    def head_on(snapshot):
+        return np.array([[2.0, 0.0], [2.0, math.pi]])
+
+    starts = [(20.0, 0.0, 0.0, 2.0), (20.3, 40.0, 180.0, 2.0)]
+    return World(fleet_of(blue=2, red=0, **settings), starts, rule or head_on, shield=shield)

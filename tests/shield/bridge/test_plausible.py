@@ -59,3 +59,21 @@ def test_whatever_a_boat_can_do_between_two_fixes_passes(speed, heading, seconds
     way = speed * seconds
     fix = Fix(way * math.sin(heading) + noise, way * math.cos(heading), heading, speed, seconds)
     assert gate.refuse(fix) == ""
+
+
+def test_a_position_that_stays_while_the_boat_runs_is_frozen():
+    gate = Gate(2.0)
+    said = [gate.refuse(Fix(5.0, 5.0, 0.0, 2.0, 0.1 * k)) for k in range(20)]
+    assert said[:3] == ["", "", ""]
+    assert all("frozen" in text for text in said[4:])
+    assert gate.refuse(Fix(5.0, 8.0, 0.0, 2.0, 2.0)) == ""
+
+
+def test_a_boat_at_rest_is_not_frozen():
+    gate = Gate(2.0)
+    assert not any(gate.refuse(Fix(5.0, 5.0, 0.0, 0.05, 0.1 * k)) for k in range(600))
+
+
+def test_a_boat_that_creeps_is_not_frozen():
+    gate = Gate(2.0)
+    assert not any(gate.refuse(Fix(0.01 * k, 5.0, math.pi / 2, 0.1, 0.1 * k)) for k in range(600))

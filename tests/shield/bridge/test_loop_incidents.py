@@ -1,0 +1,136 @@
+"""Incidents of the whole loop: the operator, what breaks inside, clocks, disks, the geofence."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from bridge_fakes import World, fleet_of, pair, straight
+
+NORTH = 0.0
+
+
+def test_a_full_disk_is_answered_as_declared_until_it_is_not():
+    world = pair()
+    world.run(0.5)
+    world.sink.full = True
+    world.run(0.5)
+    world.sink.full = False
+    world.run(0.2)
+    assert ("log", "hold_station") in {(a.condition, a.response) for a in world.sink.ticks[-2].actions}
+    assert "free some" in next(a.text for a in world.sink.ticks[-2].actions if a.condition == "log")
+    assert ("log", "hold_station") not in world.responses()
+
+
+def test_stop_all_stops_all_through_the_shield_and_a_second_one_past_it():
+    world = pair()
+    world.run(1.0)
+    world.operator.stop_all("key")
+    world.run(2.0)
+    assert all(entry[2] == 0.0 for link in world.links.values() for entry in link.sent[-10:])
+    assert not any(link.stops for link in world.links.values())
+    assert ("stop_all", "stop") in world.responses("all")
+    world.operator.stop_all("key")
+    world.run(0.3)
+    assert all(link.stops == 3 for link in world.links.values())
+    world.operator.resume()
+    world.run(0.3)
+    assert world.links["blue_1"].sent[-1][2] > 0.0
+
+
+class Broken:
+    """A shield that raises."""
+
+    def __init__(self, error):
+        self.error = error
+        self.resets = 0
+
+    def reset(self):
+        self.resets += 1
+
+    def decide(self, *_):
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [ValueError("wrong"), ZeroDivisionError(), MemoryError("no memory")])
+def test_whatever_breaks_in_the_decision_all_are_told_to_stop_and_the_loop_goes_on(error):
+    fleet = fleet_of(blue=2, red=0)
+    shield = Broken(error)
+    world = World(fleet, [(0.0, 0.0, 0.0, 1.0), (30.0, 0.0, 0.0, 1.0)], straight(NORTH), shield=shield)
+    world.run(1.0)
+    assert len(world.sink.ticks) == 10
+    assert [link.stops for link in world.links.values()] == [10, 10]
+    assert shield.resets == 10
+    assert any(action.condition == "decision" and type(error).__name__ in action.text for action in world.last.actions)
+    assert world.last.decisions is None
+
+
+def test_a_link_that_breaks_the_turn_leaves_all_told_to_stop():
+    world = pair()
+    world.run(0.5)
+    world.links["blue_2"].read = lambda: 1 / 0
+    world.run(0.5)
+    assert world.links["blue_1"].stops == 5
+
+
+def test_a_sink_that_breaks_stops_nobody():
+    world = pair()
+    world.sink.take = lambda tick: 1 / 0
+    world.run(1.0)
+    assert len(world.links["blue_1"].sent) == 10
+
+
+def test_no_decision_no_command_before_the_first_fix():
+    world = pair()
+    for link in world.links.values():
+        link.changed = {"position_m": (math.nan, math.nan), "position_age_s": math.inf}
+    world.run(0.3)
+    assert world.last.fleet is None
+    assert [link.stops for link in world.links.values()] == [3, 3]
+    assert all(not link.sent for link in world.links.values())
+
+
+def test_a_boat_outside_the_geofence_is_steered_back():
+    world = World(fleet_of(blue=1, red=0), [(20.0, 62.0, 0.0, 0.0)], straight(NORTH))
+    world.run(1.0)
+    assert ("geofence", "return") in world.responses("blue_1")
+    world.run(40.0)
+    assert world.fleet.geofence.holds(*world.links["blue_1"].row[:2])
+
+
+def test_a_wall_clock_that_steps_by_an_hour_changes_nothing(monkeypatch):
+    plain = pair().run(6.0)
+    stepped = pair()
+    wall = time.time
+
+    def strike(world):
+        if world.clock.now_s() >= 1002.0:
+            monkeypatch.setattr(time, "time", lambda: wall() + 3600.0)
+        if world.clock.now_s() >= 1004.0:
+            monkeypatch.setattr(time, "time", lambda: wall() - 3600.0)
+
+    stepped.run(6.0, strike)
+    for before, after in zip(plain.sink.ticks, stepped.sink.ticks, strict=True):
+        np.testing.assert_array_equal(before.decisions.sent.values, after.decisions.sent.values)
+        assert before.actions == after.actions
+
+
+def test_boats_that_obey_later_than_declared_are_told_of():
+    def weaving(snapshot):
+        heading = 1.0 if (snapshot.number // 40) % 2 else 0.0
+        return np.array([[2.0, heading], [0.0, 0.0]])
+
+    world = World(fleet_of(blue=1, red=1), [(20.0, 0.0, 0.0, 2.0)], weaving, others=[("red_1", 90.0, 50.0, 0.0, 0.0)])
+    link, queue = world.links["blue_1"], [None] * 4
+
+    def late(dt_s, advance=link.advance):
+        now = link.command
+        queue.append(now)
+        link.command = queue.pop(0)
+        advance(dt_s)
+        link.command = now
+
+    link.advance = late
+    world.run(15.0)
+    assert ("delay", "none") in world.responses("blue_1")
+    assert any("0.4 s" in action.text for action in world.last.actions)
