@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -64,7 +65,7 @@ def deploy(
     orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
     file = load_fleet(orders.fleet_file)
     dashboard = d.on_terminal() and not plain
-    operator, console = Operator(), out()
+    operator, console, started = Operator(), out(), time.perf_counter()
 
     def sinks(file: FleetFile, operator: Operator, clock: Clock) -> Sequence[TickSink]:
         if dashboard:
@@ -83,7 +84,7 @@ def deploy(
     d.show_outcome(console, outcome)
     if json_file is not None:
         settings = {**asdict(orders), "fleet_file": str(orders.fleet_file)}
-        write_json(json_file, d.content_of("deploy", settings, outcome))
+        write_json(json_file, d.content_of("deploy", settings, outcome, started))
     if outcome.ended.startswith("SIG"):
         raise Interrupted("interrupted; boats were stopped as said above")
     finish(not outcome.refused)

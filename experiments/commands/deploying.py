@@ -12,6 +12,7 @@ from rich.console import Console
 from steerclear.shield.bridge.preflight.result import CheckResult
 
 from ..deploy.orders import Outcome
+from ..provenance import machine, versions
 
 Boat = Annotated[
     str | None,
@@ -49,11 +50,14 @@ def show_outcome(console: Console, outcome: Outcome) -> None:
         console.print(f"{outcome.log}", markup=False, soft_wrap=True)
 
 
-def content_of(command: str, settings: dict[str, Any], outcome: Outcome) -> dict[str, Any]:
-    """The outcome for a JSON file."""
+def content_of(command: str, settings: dict[str, Any], outcome: Outcome, started_s: float) -> dict[str, Any]:
+    """The outcome for a JSON file, of a command begun at that time of `time.perf_counter`."""
     return {
         "command": command,
         "settings": settings,
+        "versions": versions(),
+        "machine": machine(),
+        "wall_s": time.perf_counter() - started_s,
         "ended": outcome.ended,
         "refused": [result.name for result in outcome.refused],
         "checks": [vars(result) | {"figures": dict(result.figures)} for result in outcome.checks],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -38,7 +39,7 @@ def preflight(
     bad input, 130 interrupted.
     """
     orders = Orders(fleet, "", boat, None, tuple(accept or ()), 0, not no_tlog, speed, wait)
-    console = out()
+    console, started = out(), time.perf_counter()
     surface = Surface(
         lambda result: d.show_check(console, result),
         lambda file, operator, clock: (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),),
@@ -48,7 +49,7 @@ def preflight(
     d.show_outcome(console, outcome)
     if json_file is not None:
         settings = {**asdict(orders), "fleet_file": str(fleet)}
-        write_json(json_file, d.content_of("preflight", settings, outcome))
+        write_json(json_file, d.content_of("preflight", settings, outcome, started))
     if outcome.ended:
         raise Interrupted("interrupted; boats were stopped as said above")
     finish(not outcome.refused)

@@ -37,7 +37,7 @@ def preflight(
         with station, ended_by_signals(operator):
             station.connect(orders.connect_s)
             checks = checks_of(station, LONGEST_MINUTES)
-            if may_start(checks, orders.accept, surface, outcome, DRILLED) and drill and not operator.ended:
+            if may_start(checks, orders.accept, surface, outcome, (*DRILLED, "drill")) and drill and not operator.ended:
                 station.prepare()
                 _drill(station, orders, surface, operator, outcome)
     finally:

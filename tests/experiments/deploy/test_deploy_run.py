@@ -12,10 +12,13 @@ from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
 from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
 from steerclear.experiments.deploy.preflighting import preflight
 from steerclear.experiments.deploy.run import deploy
+from steerclear.experiments.deploy.tally import Tally
+from steerclear.experiments.keys import KEYS, undocumented
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.timing import Timing
 from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
 from typer.testing import CliRunner
 
@@ -165,6 +168,18 @@ def test_a_bad_file_is_one_line_and_exit_2(fleet_file, old, new, command):
     assert result.exit_code == 2, result.output
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
     assert stat.S_IMODE(key.stat().st_mode) == 0o644
+
+
+def test_every_key_of_the_json_is_documented(fleet_file, boats, tmp_path):
+    path = tmp_path / "out.json"
+    options = [*(f"--accept={name}" for name in (*BUSY, "drill", "known")), "--speed", f"{SPEED:g}", "--wait", "90"]
+    result = CliRunner().invoke(app, ["preflight", str(fleet_file), "--no-drill", "--json", str(path), *options])
+    assert result.exit_code == 0, result.output
+    content = json.loads(path.read_text())
+    assert {"disk", "geofence", "rates:blue_1"} <= {check["name"] for check in content["checks"]}
+    assert undocumented(content, KEYS["preflight"]) == []
+    figures = {**Timing().figures(), **Tally().figures(), "missed_turns": 0.0, "delay_blue_1_s": 0.1}
+    assert undocumented({"figures": figures}, KEYS["deploy"]) == []
 
 
 def test_no_file_and_no_demo_is_said():
