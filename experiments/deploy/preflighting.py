@@ -6,6 +6,7 @@ from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import not_passed, run_checks
 
+from .boxes import open_box
 from .checks import checks_of, drive_drill
 from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
 from .preflight_file import DRILLED, keep
@@ -39,7 +40,7 @@ def preflight(
             checks = checks_of(station, LONGEST_MINUTES)
             if may_start(checks, orders.accept, surface, outcome, (*DRILLED, "drill")) and drill and not operator.ended:
                 station.prepare()
-                _drill(station, orders, surface, operator, outcome)
+                _drill(station, text, orders, surface, operator, outcome)
     finally:
         outcome.left = station.left
     outcome.ended = operator.ended
@@ -47,8 +48,9 @@ def preflight(
     return outcome
 
 
-def _drill(station: Station, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome) -> None:
-    sinks = surface.sinks(station.fleet, operator, station.clock)
+def _drill(station: Station, text: str, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome) -> None:
+    box = open_box(station, text, "drill", outcome.checks)
+    sinks = [box, *surface.sinks(station.fleet, operator, station.clock)]
     try:
         with undisturbed():
             checks = drive_drill(station, operator, sinks)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 
-from steerclear.shield.bridge.blackbox import McapWriter, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
@@ -15,6 +14,7 @@ from steerclear.shield.bridge.publishing import PositionPublisher
 from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.bridge.timing import Timing
 
+from .boxes import open_box
 from .checks import checks_of, drilled_check
 from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
 from .policy_process import PolicyProcess
@@ -74,7 +74,8 @@ def _run(
 ) -> None:
     fleet, clock = station.fleet, station.clock
     with contextlib.ExitStack() as stack:
-        box = _black_box(station, orders, text, outcome)
+        box = open_box(station, text, orders.policy, outcome.checks)
+        outcome.log = box.path
         timing, tally = Timing(), Tally()
         sinks: list[TickSink] = [
             box,
@@ -105,17 +106,3 @@ def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:
         return []
     sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish)
     return [PositionPublisher(sender, fleet.frame, fleet.shield_config.position_error_m)]
-
-
-def _black_box(station: Station, orders: Orders, text: str, outcome: Outcome) -> McapWriter:
-    fleet = station.fleet
-    header = header_of_fleet(
-        fleet,
-        text,
-        policy=orders.policy,
-        commanded=station.links,
-        clock_s=station.clock.now_s(),
-        notes={f"accepted {result.name}": result.text for result in outcome.checks if not result.passed},
-    )
-    outcome.log = log_path(fleet.log_dir, ".mcap")
-    return McapWriter(outcome.log, header)

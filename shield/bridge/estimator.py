@@ -31,6 +31,9 @@ SURPRISE = np.array([1.5, 1.5, 25.0, 0.6])
 BOAT_TIMEOUT_S = 3.0
 """A boat that hears nothing goes on with its last command for this long, then stops."""
 
+SPENT_S = 1.0
+"""A command not repeated for this long says nothing any more: somebody else steers, and the boat goes straight on."""
+
 LONGEST_GAP_STEPS = 50
 """Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
 
@@ -148,7 +151,8 @@ class Estimator:
         """Speed, m/s, and heading, deg, of the command that works in the step after ``time_s``."""
         for sent_s, speed, heading in reversed(self._commands):
             if sent_s + self._delay_s <= time_s + 0.5 * self._dt_s:
-                return speed, float(np.degrees(heading))
+                spent = time_s - sent_s - self._delay_s > SPENT_S
+                return None if spent else (speed, float(np.degrees(heading)))
         return None
 
     def _unheard(self, time_s: float) -> tuple[float, float] | None:

@@ -182,3 +182,15 @@ def test_a_standstill_of_the_loop_is_made_up_in_bounds():
     estimator.advance(1e6)
     assert np.isfinite(estimator.estimate(1e6).row[:4]).all()
     assert estimator.estimate(1e6).row[L.Y] < 2.0 * 5.1
+
+
+def test_a_command_that_is_not_repeated_is_spent():
+    """Somebody else steers now: the boat is not run through our last command for ever."""
+    estimator = Estimator(get_platform("heron"), DT_S, 0.0)
+    estimator.correct(reading(fresh_state(0.0, 0.0, 0.0, 1.0), 0.0))
+    estimator.sent(0.0, math.radians(90.0), 2.0)
+    estimator.advance(5.0)
+    turned = estimator.estimate(5.0).row[L.HEADING]
+    estimator.advance(9.0)
+    assert estimator.estimate(9.0).row[L.HEADING] == turned
+    assert 5.0 < turned < 95.0
