@@ -33,7 +33,7 @@ def _show_log(console: Console, replay: Replay) -> None:
         + (f", own boats {', '.join(ours)}" if ours else "")
     )
     if not replay.complete:
-        console.print("The log was not closed (crash, power or kill); read up to its last whole second.")
+        console.print("The log was not closed (crash, power or kill); read up to what was on the disk.")
     for text in replay.damage:
         console.print(f"Damage: {text}.")
     for line in replay.lines[:MOST_ROWS]:

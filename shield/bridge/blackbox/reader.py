@@ -119,7 +119,7 @@ class LogReader:
                 yield self._topics.get(item.channel_id, ""), item
 
     def _tell(self, text: str) -> None:
-        LOG.warning("%s: %s", self.path, text)
+        LOG.info("%s: %s", self.path, text)
         self.damage.append(text)
 
 

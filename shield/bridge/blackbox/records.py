@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, Footer, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.writer import Writer
@@ -37,8 +37,10 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
                 yield from _parts(item, tell)
             elif isinstance(item, (Schema, Channel, Message, Footer)):
                 yield item
+    except EndOfFile:
+        return  # cut off: the footer that was not there tells
     except _DAMAGE as error:
-        tell(f"it ends in the middle of a record ({type(error).__name__})")
+        tell(f"from some point on it makes no sense ({type(error).__name__})")
 
 
 def _parts(chunk: Chunk, tell: Tell) -> list[Any]:
