@@ -38,8 +38,8 @@ WIND_DOWN_S = 20.0
 REST_MPS = 0.2
 """A boat slower than this lies still, m/s."""
 
-SECOND_COMMANDER = "second_commander"
-"""Key of `BoatReading.faults` under which a link counts commands of somebody else."""
+RIVALS = ("second_commander", "disobeys")
+"""Keys of `BoatReading.faults` that tell of somebody else's commands: heard, or seen by what the boat does."""
 
 
 class Loop:
@@ -174,7 +174,7 @@ class Loop:
         self, now_s: float, readings: Mapping[str, BoatReading], game: GameState | None, game_age_s: float
     ) -> Seen:
         for name, reading in readings.items():
-            if reading.faults.get(SECOND_COMMANDER):
+            if any(reading.faults.get(kind) for kind in RIVALS):
                 self._rivals_s[name] = now_s
         return Seen(
             readings=readings,

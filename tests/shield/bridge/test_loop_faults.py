@@ -274,9 +274,10 @@ def test_a_boat_in_another_mode_is_left_alone_and_kept_clear_of():
     assert world.closest_m >= 2.5
 
 
-def test_a_second_commander_is_answered_as_declared_and_told():
+@pytest.mark.parametrize("fault", ["second_commander", "disobeys"])
+def test_a_second_commander_is_answered_as_declared_and_told(fault):
     world = pair()
-    world.links["blue_1"].changed = {"faults": {"second_commander": 3}}
+    world.links["blue_1"].changed = {"faults": {fault: 3}}
     world.run(0.3)
     world.links["blue_1"].changed = {}
     world.run(1.0)
