@@ -17,7 +17,7 @@ from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.operator import Operator
 
-SECONDS = 7.0
+SECONDS = 5.0
 TEXT = """\
 version: 1
 field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, y_axis_deg: 20.0, size_m: [80, 40]}
@@ -29,8 +29,8 @@ log_dir: ./logs
 boats:
 """
 STARTS = {
-    "blue_1": (30.0, 20.0, 90.0),
-    "blue_2": (50.0, 20.0, -90.0),
+    "blue_1": (33.0, 20.0, 90.0),
+    "blue_2": (48.0, 20.0, -90.0),
     "red_1": (40.0, 35.0, 0.0),
     "red_2": (5.0, 5.0, 0.0),
 }
