@@ -78,9 +78,9 @@ class LinkSettings(Section):
 class BoatSettings(Section):
     """One boat.
 
-    ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``team``: side
-    of a boat outside the game, else nobody's. ``contact``:
-    how this boat is known to a process that does not command it: "feed" (UDP positions) or "telemetry" (its own link);
+    ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``team``:
+    side of a boat outside the game, else nobody's. ``contact``: how this boat is known to a process that does not
+    command it: "feed" (UDP positions) or "telemetry" (its own link);
     None: "feed" when the file has a feed, else "telemetry". ``commanded``: false for a boat with a link that somebody
     else steers. ``feed_listen``: HOST:PORT at which this boat's own process hears the feed (coordination per_boat).
     """

@@ -121,7 +121,8 @@ def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict:
         verdict.idle.add(boat)
         verdict.actions.append(Action(boat, "mode", "none", f"{boat} does not obey: {reading.why_not or reading.mode}"))
     if boat in seen.rivals and not seen.overridden("commander", boat):
-        verdict.due(Action(boat, "commander", limits.link.then, f"{boat}: somebody else commands it too, or its steering fails"), (boat,))
+        text = f"{boat}: somebody else commands it too, or its steering fails"
+        verdict.due(Action(boat, "commander", limits.link.then, text), (boat,))
     track = roster.track(boat)
     outside = track is not None and not fleet.geofence.holds(float(track.row[0]), float(track.row[1]))
     if outside and not seen.overridden("geofence", boat):
