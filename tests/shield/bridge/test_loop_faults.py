@@ -82,7 +82,7 @@ def test_telemetry_that_stops_stops_the_boat_by_its_link_and_the_other_keeps_cle
     world.run(4.7, strike)
     assert ("navigation", "stop") in world.responses("blue_1")
     assert world.links["blue_1"].stops == 0
-    world.run(1.6, strike)
+    world.run(4.6, strike)
     assert world.links["blue_1"].stops > 0, "after lost_after_s its state is unknown"
     fleet = world.last.fleet
     assert fleet.names == ("blue_1", "blue_2")
@@ -251,7 +251,7 @@ def test_a_link_that_comes_back_is_steered_again():
     link = world.links["blue_1"]
     world.run(2.0)
     link.silent_since_s, link.deaf = world.clock.now_s(), True
-    world.run(5.0)
+    world.run(6.0)
     assert not world.last.fleet.controlled[0]
     link.silent_since_s, link.deaf, link._silent = None, False, None
     world.run(4.0)
