@@ -118,8 +118,8 @@ class Feed(Section):
 class NavigationLimit(Section):
     """Own position, heading and speed: older than ``max_age_s``, the response; older than ``lost_after_s``, unknown.
 
-    In between it is steered on by its model, behind the shield, with a growing error. A boat whose own state is unknown is
-    told to stop by its link; the others keep clear of where it may be.
+    In between it is steered on by its model, behind the shield, with a growing error. A boat whose own state is unknown
+    is told to stop by its link; the others keep clear of where it may be.
     """
 
     max_age_s: Seconds = 0.5
