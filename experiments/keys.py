@@ -203,6 +203,7 @@ ATTACK = {**_PROVENANCE, **_ATTACK}
 
 SETS = {
     **_PROVENANCE,
+    "looked_up": "whether the shield reads this value table itself, so that what it misses is not judged",
     "pairs[].own_mps": "own speed, m/s",
     "pairs[].other_mps": "the opponent's speed, m/s",
     "pairs[].heading_deg": "heading of the opponent relative to the own one, deg; 180 is head-on",

@@ -14,6 +14,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.setup import boats_of
 from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES
 from steerclear.shield.tables.files import ValueTable, stack_tables
 from steerclear.shield.tables.lookup import table_value
@@ -74,6 +75,11 @@ def sets_config(radius_m: float, settings: Mapping[str, Any]) -> ShieldConfig:
         if name in settings:
             raise ConfigError(f"{name} cannot be set here: {remedy}")
     return ShieldConfig.of(separation_m=radius_m, buffer_m=0.0, **settings)
+
+
+def looks_up(values: ValueTable, config: ShieldConfig) -> bool:
+    """Whether the shield looks this opponent up in the value table itself: its set is then the table's, at a margin."""
+    return bool(boats_of(config, (values.card.own, values.card.other), (0, 1)).table[0, 1] >= 0)
 
 
 def places(values: ValueTable) -> list[tuple[float, float, float]]:

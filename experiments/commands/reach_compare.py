@@ -12,8 +12,8 @@ from steerclear.shield.tables.settings import problem_of
 
 from ..store import write_json
 from ..tables import bars_table, titled
-from ..unsafe_sets import compare_sets, places, sets_config
-from ..unsafe_sets_page import HEADS, content_of, rows_of
+from ..unsafe_sets import compare_sets, looks_up, places, sets_config
+from ..unsafe_sets_page import HEADS, LOOKED_UP, content_of, rows_of
 from . import options as o
 from .console import command, finish, out, progress
 
@@ -41,9 +41,11 @@ def compare(
     with progress("sets", len(places(values))) as notice:
         pairs = compare_sets(values, config, notice)
     settings = {"own": own, "other": other, "radius_m": radius, "shield": given}
-    content = content_of(settings, pairs, time.perf_counter() - started)
+    content = content_of(settings, pairs, looks_up(values, config), time.perf_counter() - started)
     out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(pairs)))
     out().print(bars_table(content["bars"]))
+    if content["looked_up"]:
+        out().print(LOOKED_UP, markup=False)
     if json_file is not None:
         write_json(json_file, content)
-    finish(all(bar["met"] for bar in content["bars"]))
+    finish(all(bar["met"] is not False for bar in content["bars"]))

@@ -80,6 +80,22 @@ def test_areas_of_the_same_size_in_other_places_are_seen(heron, monkeypatch):
     assert false.missed_m2 > 0.05 * false.reach_m2 > true.missed_m2
 
 
+def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_path, head_on):
+    file = tmp_path / "sets.json"
+    settings = ["--shield-set", "certificate=value_table", "--shield-set", "table_margin_m=0"]
+    assert compare("--json", str(file), *settings).exit_code == 0
+    content = json.loads(file.read_text())
+    assert content["looked_up"]
+    assert {bar["met"] for bar in content["bars"] if "misses" in bar["name"]} == {None}
+    write_pages([content], tmp_path)
+    assert "looks opponents up in this very table" in (tmp_path / "unsafe_sets.md").read_text()
+    run_through = compare("--json", str(file), "--shield-set", "certificate=turning_circle")
+    assert run_through.exit_code == 0
+    assert not json.loads(file.read_text())["looked_up"]
+    write_pages([json.loads(file.read_text())], tmp_path)
+    assert "this very table" not in (tmp_path / "unsafe_sets.md").read_text()
+
+
 def test_both_sets_are_of_the_radius_that_the_settings_keep(heron, head_on):
     plain = compare_sets(heron, ShieldConfig(separation_m=3.0, buffer_m=0.0))[0]
     for settings in ({"separation_m": 2.9, "buffer_m": 0.1}, {"separation_m": 2.8, "position_error_m": 0.1}):
@@ -161,6 +177,6 @@ def test_results_of_an_older_version_are_refused_with_the_remedy(tmp_path):
 
 
 def test_json_of_a_comparison_has_no_numpy_in_it(heron, head_on):
-    content = content_of(head()["settings"], compare_sets(heron, BARE), wall_s=1.0)
+    content = content_of(head()["settings"], compare_sets(heron, BARE), False, wall_s=1.0)
     assert json.loads(json.dumps(content))["pairs"][0]["missed_m2"] >= 0.0
     assert not any(isinstance(value, np.generic) for pair in content["pairs"] for value in pair.values())
