@@ -108,7 +108,7 @@ class BatchedShield:
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
         self._work = new_work(n, int(self._boats.hunt_samples.max()))
-        self._plan = new_plan(n, n * (WAYS * n + 5) + 2)
+        self._plan = new_plan(n, n * ((WAYS + 1) * n + 5) + 2)
         self._margin = np.full(n, config.position_error_m)
         self._late_m = config.track_error_mps * config.delay_s
         self._pending = np.full((games, steps_of_delay(config), n, 2), np.nan)

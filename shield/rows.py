@@ -146,7 +146,7 @@ def _pair_row(
 ) -> bool:
     """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
     clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR, FAR)
-    if hunts(i, j, ours, boats) and not work.breach[i, j]:
+    if hunts(i, j, ours, boats) and not work.breach[i, j] and not looked_up(i, j, i, ours, boats, work):
         work.spare2[:] = work.out
         clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR, tuning.margin_cap_m)
         if work.out[MARGIN] > work.spare2[MARGIN]:
@@ -245,14 +245,13 @@ def build_rows(
         for j in range(n):
             if j == i or not work.near[i, j] or (place[j] >= 0 and j < i):
                 continue
-            if r + WAYS + 5 * movers.shape[0] > C.shape[0]:
+            if r + WAYS + 1 + 5 * movers.shape[0] > C.shape[0]:
                 return -1
             if looked_up(i, j, i, ours, boats, work):
                 for way in range(WAYS):
                     if _table_row(i, j, way, m, boats, tuning, work, gain, z_now, C, d, r):
                         kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                         r += 1
-                continue
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1

@@ -188,7 +188,7 @@ def worst_clearance(
     clear[MARGIN] = FAR
     work.bound[slot] = -1
     for j in range(state.shape[0]):
-        if j == i or not work.near[i, j] or looked_up(i, j, slot, ours, boats, work):
+        if j == i or not work.near[i, j]:
             continue
         clear_of_boat(
             i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
