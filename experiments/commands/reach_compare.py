@@ -45,7 +45,7 @@ def compare(
     out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(pairs)))
     out().print(bars_table(content["bars"]))
     if content["looked_up"]:
-        out().print(LOOKED_UP, markup=False)
+        out().print(" ".join(LOOKED_UP.split()), markup=False)
     if json_file is not None:
         write_json(json_file, content)
     finish(all(bar["met"] is not False for bar in content["bars"]))

@@ -1,11 +1,13 @@
 """Vector environments: one team's boats in many games as a flat batch of learners, with the shield inside."""
 
+import sys
+
 import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield import ShieldConfig
+from steerclear.shield import ShieldConfig, wrappers
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch
@@ -150,9 +152,18 @@ def test_gymnasium_gets_spaces_steps_and_the_last_observations():
     env.close()
 
 
+def test_without_stable_baselines_the_remedy_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    monkeypatch.delitem(sys.modules, "steerclear.shield.wrappers.vector_sb3", raising=False)
+    with pytest.raises(ImportError, match=r"pip install '\.\[train\]'"):
+        _ = wrappers.MctfVecEnv
+    with pytest.raises(AttributeError, match="no attribute 'Nonsense'"):
+        _ = wrappers.Nonsense
+
+
 def test_stable_baselines_gets_what_it_asks_for():
     pytest.importorskip("stable_baselines3")
-    from steerclear.shield.wrappers.vector_sb3 import MctfVecEnv
+    from steerclear.shield.wrappers import MctfVecEnv
 
     env = MctfVecEnv(batch(actions="continuous", max_time_s=0.5))
     env.seed(3)
