@@ -1,7 +1,9 @@
 """Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
 
 import logging
+import os
 import signal
+import subprocess
 import sys
 import time
 
@@ -10,7 +12,7 @@ import pytest
 from deploy_ticks import Stream
 from steerclear.experiments.deploy.demo import Demo, demo_file
 from steerclear.experiments.deploy.plain import PlainLines, logging_aside
-from steerclear.experiments.deploy.quiet import ended_by_signals, undisturbed
+from steerclear.experiments.deploy.quiet import NICENESS, ended_by_signals, undisturbed
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
@@ -101,8 +103,12 @@ def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
     assert signal.getsignal(getattr(signal, name)) == before
 
 
-def test_what_makes_a_run_quiet_is_taken_back():
-    before = sys.getswitchinterval()
+def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
+    before, nice = sys.getswitchinterval(), os.getpriority(os.PRIO_PROCESS, 0)
     with undisturbed():
         assert sys.getswitchinterval() < before
+        assert os.getpriority(os.PRIO_PROCESS, 0) in (nice, NICENESS)
+        told = subprocess.run(["nice"], capture_output=True, check=True, text=True).stdout
+        assert int(told) >= min(0, nice)
     assert sys.getswitchinterval() == pytest.approx(before)
+    assert os.getpriority(os.PRIO_PROCESS, 0) == nice

@@ -71,8 +71,8 @@ def test_rate_delay_and_memory_of_three_against_three(fleet_file):
         MINUTES, late, turn, figures["missed_turns"], settled[-1], growth,
     )  # fmt: skip
     record = load(truth)
-    own = [i for i, team in enumerate(record.meta["team"]) if team == 0]
-    at = np.asarray(record.arrays["position"])
+    meta = json.loads(str(record["meta"]))
+    own, at = [i for i, team in enumerate(meta["team"]) if team == 0], record["position"]
     closest = min(np.hypot(*(at[:, i] - at[:, j]).T).min() for i in own for j in range(at.shape[1]) if j != i)
     logger.warning("closest approach of our boats: %.2f m", closest)
     assert late <= 10.0
