@@ -226,11 +226,19 @@ def test_version_and_help():
         assert "Exit status" in run(name, "--help").stdout
 
 
+def _heed_ctrl_c():
+    """Undo what a shell does to what it starts in the background: there Ctrl-C is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a POSIX signal")
 def test_ctrl_c_ends_a_real_run_with_status_130_and_keeps_its_games(tmp_path):
     command = [sys.executable, "-m", "steerclear.experiments.cli", "ablate", "--opponents", "hold", "--games", "400"]
     with subprocess.Popen(
-        [*command, "--max-time", "20", "--jobs", "2", "--out", "out"], stderr=subprocess.PIPE, text=True
+        [*command, "--max-time", "20", "--jobs", "2", "--out", "out"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=_heed_ctrl_c,
     ) as process:
         deadline = time.monotonic() + 420.0
         lines = tmp_path / "out" / "games.jsonl"
