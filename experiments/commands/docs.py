@@ -17,7 +17,7 @@ from .console import command, out
 Sources = Annotated[
     list[Path] | None, typer.Argument(help=f"Results folders or JSON files of {SOURCES}; value tables (.npz).")
 ]
-Folder = Annotated[Path, typer.Option("--out", help="Folder for the pages.")]
+Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the pages.")]
 
 
 @command

@@ -24,8 +24,8 @@ from . import options as o
 from .console import command, out, progress
 from .saving import check_endings, save_record
 
-Opponent = Annotated[str, typer.Option(help="Policy of the other team.")]
-Side = Annotated[str, typer.Option(help="Colour of the own team: blue or red.")]
+Opponent = Annotated[str, typer.Option(metavar="NAME", help="Policy of the other team.")]
+Side = Annotated[str, typer.Option(metavar="COLOUR", help="Colour of the own team: blue or red.")]
 Shield = Annotated[bool, typer.Option("--shield/--no-shield", help="Whether the own team is shielded.")]
 Window = Annotated[bool, typer.Option("--window/--headless", help="Show the game in a window.")]
 Keyboard = Annotated[
@@ -34,8 +34,10 @@ Keyboard = Annotated[
         "--keyboard", help="Steer the first own boat with the arrow keys, as --own keyboard does (a window opens)."
     ),
 ]
-Save = Annotated[list[Path] | None, typer.Option(help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")]
-Speed = Annotated[float, typer.Option(help="Times faster than the game, in a window.")]
+Save = Annotated[
+    list[Path] | None, typer.Option(metavar="FILE", help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")
+]
+Speed = Annotated[float, typer.Option(metavar="X", help="Times faster than the game, in a window.")]
 
 
 @command

@@ -27,8 +27,10 @@ To = Annotated[
         show_default="a replay beside the record",
     ),
 ]
-At = Annotated[float | None, typer.Option(help="Moment a picture shows, s.", show_default="the closest approach")]
-Speed = Annotated[float, typer.Option(help="Times faster than the game, for films.")]
+At = Annotated[
+    float | None, typer.Option(metavar="S", help="Moment a picture shows, s.", show_default="the closest approach")
+]
+Speed = Annotated[float, typer.Option(metavar="X", help="Times faster than the game, for films.")]
 
 
 @command

@@ -2,32 +2,20 @@
 
 import numpy as np
 import pytest
+from guard_scenes import ahead, scene
 from steerclear.experiments.encounters import Conditions, draw, measure, play
 from steerclear.experiments.encounters.guards import build_guard, check_guard, parse_guards
 from steerclear.experiments.reach_guard import ReachGuard
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.flow import BEST_EFFORT, ESCAPE, HELD, NOT_COVERED, PASSED, QP
-from steerclear.shield.platforms import Platform, fresh_state, step_boat
+from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tables.files import load_table, stack_tables
 from steerclear.shield.tables.lookup import table_value
 
 CONFIG = ShieldConfig(edge_m=None)
 USUAL = Conditions()
-
-
-def scene(*boats, speed=2.0):
-    """One game of boats given as (x, y, heading deg), under way."""
-    state = np.array([[fresh_state(x, y, heading, speed) for x, y, heading in boats]])
-    state[..., L.THRUST] = 100.0
-    return state
-
-
-def ahead(state, speed=2.0):
-    wanted = np.zeros((*state.shape[:2], 2))
-    wanted[..., 0] = speed
-    return wanted
 
 
 def guard_for(state, team=None, platform="heron", config=CONFIG):

@@ -2,29 +2,16 @@
 
 import numpy as np
 import pytest
+from guard_scenes import ahead, scene
 from steerclear.experiments.textbook import NAMES, TextbookGuard, make_guard
 from steerclear.experiments.textbook.parameters import PUBLISHED
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
-from steerclear.shield.platforms import fresh_state
 from steerclear.shield.platforms import layout as L
 from textbook_drill import openings
 
 CONFIG = ShieldConfig(edge_m=None)
 FILTERS = pytest.mark.parametrize("name", NAMES)
-
-
-def scene(*boats, speed=2.0):
-    """One game of boats given as (x, y, heading deg), under way."""
-    state = np.array([[fresh_state(x, y, heading, speed) for x, y, heading in boats]])
-    state[..., L.THRUST] = 100.0
-    return state
-
-
-def ahead(state, speed=2.0):
-    wanted = np.zeros((*state.shape[:2], 2))
-    wanted[..., 0] = speed
-    return wanted
 
 
 def guard_for(name, state, team=None, platform="heron", gains=None):
