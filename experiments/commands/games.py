@@ -23,6 +23,8 @@ from ..tables import bars_table, pairing_table, verdict_table
 from ..warming import warm_up
 from .console import Interrupted, err, out, progress
 
+KEYBOARD = "keyboard"
+
 
 def check_settings(settings: AblationSettings) -> None:
     """Find every bad name or number before the first game is played.
@@ -37,6 +39,8 @@ def check_settings(settings: AblationSettings) -> None:
     check_shield(settings.shield)
     settings.specs()[0].config()
     for name in dict.fromkeys([settings.own, *settings.opponents]):
+        if name == KEYBOARD:
+            raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
         policies.make(name)
 
 
@@ -128,7 +132,7 @@ def _write(
     quick: bool,
     replay: tuple[dict[str, Any], list[Any]] | None = None,
 ) -> dict[str, Any]:
-    results = results_of(command, settings, played, wall_s, quick)
+    results = results_of(command, settings, played, wall_s, quick) | {"files": {}}
     if played.rows:
         entry, records = replay or (None, [])
         if entry is not None:

@@ -91,6 +91,18 @@ def test_a_game_that_cannot_be_played_is_bad_input_and_the_rest_is_kept(monkeypa
     assert json.loads(Path("out/results.json").read_text())["games_played"] == 4
 
 
+def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
+    def broken(spec):
+        raise RuntimeError("sunk")
+
+    make = games_command.Campaign
+    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
+    done = run("ablate", "--opponents", "easy", *TINY, "--out", "out", "--json", "out.json")
+    assert done.exit_code == ExitCode.BAD_INPUT, done.output
+    assert "4 games could not be played" in done.stderr
+    assert json.loads(Path("out.json").read_text())["files"] == {}
+
+
 def test_bars_decide_the_exit_status_only_when_asked(monkeypatch):
     bar = {"name": "hits", "value": 1.0, "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": False}
     monkeypatch.setattr("steerclear.experiments.results.ablation_bars", lambda rows, separation_m: [bar])
@@ -198,6 +210,8 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --set nothing", "KEY=VALUE"),
         ("ablate --shield-set seperation_m=3", "did you mean 'separation_m'"),
         ("ablate --resume", "--out"),
+        ("ablate --own keyboard", "steerclear play --own keyboard"),
+        ("evaluate medium --opponents keyboard", "steerclear play --own keyboard"),
         ("evaluate", "policy"),
         ("evaluate medium --opponents esy", "did you mean easy"),
         ("play --side bleu", "did you mean blue"),
