@@ -19,6 +19,9 @@ from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import queue_commands, run_on_commands, steps_of_delay
 
+NOWHERE_M = -1e9
+"""Radius of a circle that does not count, m: everywhere is far outside of it."""
+
 
 @kernel
 def decide_games(
@@ -27,6 +30,7 @@ def decide_games(
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
+    lifted: BoolArray,
     plans: Array,
     tuning: Tuning,
     memory: Memory,
@@ -39,10 +43,18 @@ def decide_games(
     reason: IntArray,
     clearance_m: Array,
 ) -> None:
-    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis."""
+    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
+
+    ``lifted`` (B, k) says which of the last k circles of ``fixed`` do not count in a game.
+    """
     n = state.shape[1]
+    circles = fixed.circles.copy()
+    standing = Fixed(fixed.field, circles, fixed.segments, fixed.segment_m)
+    first = circles.shape[0] - lifted.shape[1]
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
+        for c in range(lifted.shape[1]):
+            circles[first + c, 2] = NOWHERE_M if lifted[b, c] else fixed.circles[first + c, 2]
         ahead[:] = state[b]
         run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
         for i in range(n):
@@ -58,7 +70,7 @@ def decide_games(
             memory.margin_m[b],
             memory.escaping[b],
         )
-        decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
+        decide_compiled(ahead, asked, margin_m, ours[b], boats, standing, plans, tuning, own, work, plan)
         for i in range(n):
             sent[b, i] = wanted[b, i]
             if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
@@ -105,10 +117,11 @@ class BatchedShield:
         n = len(platforms)
         self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
         self._fixed = surroundings.pack(config)
+        self._lifted = np.zeros((games, len(surroundings.keep_out)), np.bool_)
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
         self._work = new_work(n, int(self._boats.hunt_samples.max()))
-        self._plan = new_plan(n, n * ((WAYS + 1) * n + 5) + 2)
+        self._plan = new_plan(n, n * ((WAYS + 1) * n + 6) + 2)
         self._margin = np.full(n, config.position_error_m)
         self._late_m = config.track_error_mps * config.delay_s
         self._pending = np.full((games, steps_of_delay(config), n, 2), np.nan)
@@ -123,13 +136,14 @@ class BatchedShield:
         self._memory.escaping[which] = False
         self._pending[which] = np.nan
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+    def decide(self, state: Array, wanted: Array, ours: BoolArray, lifted: BoolArray | None = None) -> Array:
         """Safe commands.
 
         Args:
             state: (B, n, N_STATE) boat states.
             wanted: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
+            lifted: (B, k) which of the surroundings' k keep-out circles do not count; None: all count.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and safe ones, bit for bit as wanted. The array is
@@ -142,6 +156,7 @@ class BatchedShield:
             ("state", state, (*self.reason.shape, L.N_STATE)),
             ("wanted", wanted, self.sent.shape),
             ("ours", ours, self.reason.shape),
+            ("lifted", self._lifted if lifted is None else lifted, self._lifted.shape),
         ):
             if np.shape(array) != shape:
                 raise FleetError(f"{name} has shape {np.shape(array)}; expected {shape}")
@@ -153,6 +168,7 @@ class BatchedShield:
             ours,
             self._boats,
             self._fixed,
+            self._lifted if lifted is None else lifted,
             self._plans,
             self._tuning,
             self._memory,
@@ -170,6 +186,9 @@ class BatchedShield:
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
 
+        A keep-out circle in the surroundings is taken as that of the team's own flag, and counts while the flag is
+        home.
+
         Args:
             team: the team to shield.
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
@@ -178,6 +197,7 @@ class BatchedShield:
         def command_filter(core: Any, commands: Array) -> Array:
             ours = np.broadcast_to(core.team == team, core.driven.shape)
             ours = ours.copy() if shield_autopilot else ours & ~core.driven
-            return self.decide(core.state, commands, ours)
+            taken = np.repeat(core.flag_taken[:, team : team + 1], self._lifted.shape[1], axis=1)
+            return self.decide(core.state, commands, ours, taken)
 
         return command_filter

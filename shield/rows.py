@@ -21,7 +21,7 @@ import math
 from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .certificates.hunters import clear_of_hunter, hunts
 from .certificates.manoeuvre import clear_of_boat
-from .certificates.surroundings import clear_of_surroundings
+from .certificates.surroundings import clear_of_edge, clear_of_obstacles
 from .certificates.values import WAYS, looked_up, table_slope
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
@@ -237,7 +237,7 @@ def build_rows(
     ``kind[r]`` is the class of a row, ``label[r]`` = (boat, neighbour), neighbour -1 for fixed things and limits.
     """
     n = state.shape[0]
-    if 5 * movers.shape[0] > C.shape[0]:  # one row of fixed things and four of limits for each
+    if 6 * movers.shape[0] > C.shape[0]:  # two rows of fixed things and four of limits for each
         return -1
     r = 0
     for m in range(movers.shape[0]):
@@ -245,7 +245,7 @@ def build_rows(
         for j in range(n):
             if j == i or not work.near[i, j] or (place[j] >= 0 and j < i):
                 continue
-            if r + WAYS + 1 + 5 * movers.shape[0] > C.shape[0]:
+            if r + WAYS + 1 + 6 * movers.shape[0] > C.shape[0]:
                 return -1
             if looked_up(i, j, i, ours, boats, work):
                 for way in range(WAYS):
@@ -255,24 +255,19 @@ def build_rows(
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
-        clear_of_surroundings(
-            work.path[i],
-            boats.static_samples[i],
-            boats.samples[i],
-            fixed.field,
-            fixed.circles,
-            fixed.segments,
-            fixed.segment_m,
-            work.out,
-        )
-        if work.out[MARGIN] < FAR:
-            C[r, :] = 0.0
-            k = work.out[SAMPLE]
-            _add_effect(C, r, i, 1.0, k, work.out[NORMAL_X], work.out[NORMAL_Y], work.path[i], 2 * m, gain, work)
-            lack = AIM_M - work.out[MARGIN]
-            if not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now):
-                kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, -1
-                r += 1
+        for kind_of in (PAIR_ROW, FIXED_ROW):
+            if kind_of == FIXED_ROW:
+                clear_of_edge(work.path[i], boats.static_samples[i], fixed.field, work.out)
+            else:
+                clear_of_obstacles(work.path[i], boats.samples[i], boats.fastest_mps[i]*boats.sample_s, fixed.circles, fixed.segments, fixed.segment_m, work.out)
+            if work.out[MARGIN] < FAR:
+                C[r, :] = 0.0
+                k = work.out[SAMPLE]
+                _add_effect(C, r, i, 1.0, k, work.out[NORMAL_X], work.out[NORMAL_Y], work.path[i], 2 * m, gain, work)
+                lack = AIM_M - work.out[MARGIN]
+                if not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now):
+                    kind[r], label[r, 0], label[r, 1] = kind_of, i, -1
+                    r += 1
     end = _box_rows(movers, tuning, C, d, r)
     kind[r:end] = BOX_ROW
     label[r:end, :] = -1

@@ -130,7 +130,7 @@ class Shield:
             self._boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
             n = len(fleet)
             seats = 1 if self.config.coordination == "team" else n
-            rows = min(n * ((WAYS + 1) * n + 5) + 2, MOST_ROWS)
+            rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
             samples = int(self._boats.hunt_samples.max(initial=1))
             self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
             self._key, self._pending = key, np.full((steps_of_delay(self.config), n, 2), np.nan)

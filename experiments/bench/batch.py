@@ -10,8 +10,9 @@ import numpy as np
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf, CommandFilter
 from steerclear.policies import make_batch
-from steerclear.shield import ShieldConfig, Surroundings
+from steerclear.shield import ShieldConfig
 from steerclear.shield.batch import BatchedShield
+from steerclear.shield.wrappers.mctf import surroundings_of
 
 from .timing import memory_mib
 
@@ -29,9 +30,8 @@ class BatchSize:
 
 
 def batched_shield(core: BatchedMctf, config: ShieldConfig) -> BatchedShield:
-    """Build the shield for a batch of games: boats and field edge."""
-    width, height = core.field.size
-    around = Surroundings(field=(0.0, 0.0, float(width), float(height)))
+    """Build the blue team's shield for a batch of games."""
+    around = surroundings_of(core, 0)
     return BatchedShield(config, core.n_games, core.config.platforms, tuple(core.team.tolist()), around)
 
 

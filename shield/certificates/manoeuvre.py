@@ -20,7 +20,7 @@ from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing, worst_hunter
 from .paths import trace_path
-from .surroundings import clear_of_surroundings
+from .surroundings import clear_of_edge, clear_of_obstacles
 from .values import looked_up, run_opponents, set_place
 
 PAIR_SAFE = 1e3
@@ -31,6 +31,9 @@ FIXED_LOST = 500.0
 
 STRAIGHT_SAFE = 100.0
 """Merit from which it keeps clear of team-mates and of opponents that hold their course, but not of pursuers."""
+
+OBSTACLE_BASE = 50.0
+"""Merit of a manoeuvre that keeps clear of them but just touches an obstacle; the (negative) margin is added."""
 
 STRAIGHT_BASE = 300.0
 """Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
@@ -201,6 +204,20 @@ def worst_clearance(
 
 
 @kernel
+def obstacles_of(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work) -> None:
+    """Clearance of boat i on the path in ``slot`` from obstacles, into ``work.fixed[slot]``."""
+    clear_of_obstacles(
+        work.path[slot],
+        boats.samples[i],
+        boats.fastest_mps[i] * boats.sample_s,
+        fixed.circles,
+        fixed.segments,
+        fixed.segment_m,
+        work.fixed[slot],
+    )
+
+
+@kernel
 def rate_path(
     i: int,
     slot: int,
@@ -226,6 +243,9 @@ def rate_path(
     work.fixed[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
+    obstacles_of(i, slot, boats, fixed, work)
+    if work.fixed[slot, MARGIN] < 0.0:
+        return OBSTACLE_BASE + max(-OBSTACLE_BASE, work.fixed[slot, MARGIN])
     floor = -FAR
     if best >= FIXED_LOST:
         floor = target
@@ -235,16 +255,9 @@ def rate_path(
         worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if clear[MARGIN] < target:
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
-    clear_of_surroundings(
-        work.path[slot],
-        boats.static_samples[i],
-        boats.samples[i],
-        fixed.field,
-        fixed.circles,
-        fixed.segments,
-        fixed.segment_m,
-        work.fixed[slot],
-    )
+    clear_of_edge(work.path[slot], boats.static_samples[i], fixed.field, work.out)
+    if work.out[MARGIN] < work.fixed[slot, MARGIN]:
+        work.fixed[slot] = work.out
     spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
     return PAIR_SAFE + max(FIXED_LOST - PAIR_SAFE, min(work.fixed[slot, MARGIN], 0.0)) + spare
 

@@ -24,54 +24,74 @@ def _edges(x: float, y: float, k: int, field: Array, out: Array) -> None:
 
 
 @kernel
-def _away_from(x: float, y: float, px: float, py: float, radius: float, k: int, out: Array) -> None:
-    dx, dy = x - px, y - py
-    distance = math.sqrt(dx * dx + dy * dy)
-    if distance > 1e-9:
-        _lower(out, distance - radius, k, dx / distance, dy / distance)
-    else:
-        _lower(out, -radius, k, 1.0, 0.0)
-
-
-@kernel
-def clear_of_surroundings(
-    path: Array,
-    near_samples: int,
-    samples: int,
-    field: Array,
-    circles: Array,
-    segments: Array,
-    hull_m: float,
-    out: Array,
-) -> None:
-    """Least clearance, m, of a path from field edge, circles and wall segments.
-
-    The edge is looked at only until a half turn could be over, since every straight run ends beyond it; the others over
-    the whole path.
+def clear_of_edge(path: Array, samples: int, field: Array, out: Array) -> None:
+    """Least clearance, m, of a path from the field edge.
 
     Args:
         path: positions, m, shape (>= samples + 1, 2).
-        near_samples: last sample at which the edge counts.
-        samples: last sample.
+        samples: last sample that counts: until a half turn could be over, since every straight run ends beyond it.
         field: (xmin, ymin, xmax, ymax), m.
+        out: clearance row.
+    """
+    out[MARGIN] = FAR
+    for k in range(samples + 1):
+        _edges(path[k, 0], path[k, 1], k, field, out)
+
+
+@kernel
+def _to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
+    """Distance, m, from a circle (negative inside) and the unit vector away from it."""
+    dx, dy = x - circle[0], y - circle[1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance <= 1e-9:
+        return -circle[2], 1.0, 0.0
+    return distance - circle[2], dx / distance, dy / distance
+
+
+@kernel
+def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[float, float, float]:
+    """Distance, m, from what is within ``hull_m`` of a wall segment, and the unit vector away from it."""
+    dx, dy = segment[2] - segment[0], segment[3] - segment[1]
+    length = dx * dx + dy * dy
+    part = 0.0
+    if length > 0.0:
+        part = min(1.0, max(0.0, ((x - segment[0]) * dx + (y - segment[1]) * dy) / length))
+    rx, ry = x - segment[0] - part * dx, y - segment[1] - part * dy
+    distance = math.sqrt(rx * rx + ry * ry)
+    if distance <= 1e-9:
+        return -hull_m, 1.0, 0.0
+    return distance - hull_m, rx / distance, ry / distance
+
+
+@kernel
+def clear_of_obstacles(
+    path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
+) -> None:
+    """Least clearance, m, of a path from circles and wall segments.
+
+    A boat that is already too near to one only has to come no nearer: its clearance there counts from where it is.
+    Samples that cannot lower the clearance are skipped: in m samples it shrinks by at most m * ``way_m``.
+
+    Args:
+        path: positions, m, shape (>= samples + 1, 2).
+        samples: last sample.
+        way_m: most the boat moves from sample to sample, m.
         circles: shape (c, 3): centre x, y and radius, m.
         segments: shape (s, 4): ends x0, y0, x1, y1, m.
         hull_m: distance the boat's centre keeps from segments, m.
         out: clearance row.
     """
     out[MARGIN] = FAR
-    for k in range(near_samples + 1):
-        _edges(path[k, 0], path[k, 1], k, field, out)
-    if circles.shape[0] + segments.shape[0] == 0:
-        return
-    for k in range(samples + 1):
-        x, y = path[k, 0], path[k, 1]
-        for c in range(circles.shape[0]):
-            _away_from(x, y, circles[c, 0], circles[c, 1], circles[c, 2], k, out)
-        for s in range(segments.shape[0]):
-            dx, dy = segments[s, 2] - segments[s, 0], segments[s, 3] - segments[s, 1]
-            length = dx * dx + dy * dy
-            part = 0.0
-            if length > 0.0:
-                part = min(1.0, max(0.0, ((x - segments[s, 0]) * dx + (y - segments[s, 1]) * dy) / length))
-            _away_from(x, y, segments[s, 0] + part * dx, segments[s, 1] + part * dy, hull_m, k, out)
+    for o in range(circles.shape[0] + segments.shape[0]):
+        k, excused = 0, 0.0
+        while k <= samples:
+            x, y = path[k, 0], path[k, 1]
+            if o < circles.shape[0]:
+                margin, nx, ny = _to_circle(x, y, circles[o])
+            else:
+                margin, nx, ny = _to_segment(x, y, segments[o - circles.shape[0]], hull_m)
+            if k == 0:
+                excused = min(0.0, margin)
+            margin -= excused
+            _lower(out, margin, k, nx, ny)
+            k += max(1, int((margin - out[MARGIN]) / way_m))

@@ -40,8 +40,12 @@ class MctfReader:
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge and obstacles; the own flag's circle while the flag is home."""
-        home = keep_out and not bool(self.env.core.flag_taken[0, team])
-        return _surroundings(self.env.config, self.env.core.field.size, tuple(self.env.core.flag_home[team]), home)
+        return surroundings_of(self.env.core, team, keep_out and not bool(self.env.core.flag_taken[0, team]))
+
+
+def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings:
+    """Fixed things of a `BatchedMctf`: field edge, obstacles, and with ``keep_out`` the circle of the team's own flag."""
+    return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), keep_out)
 
 
 @lru_cache(maxsize=64)
