@@ -23,7 +23,7 @@ SIM_BOATS = {
     "breaches[].unsteered_s[]": "for how long nobody had steered each of the two boats, s; 0: somebody did",
     "breaches[].faults[]": "faults of simulated boats that acted on one of the two then or in the 5 s before",
     "breaches[].after_run": "whether commanders had steered boats and none did any more, then or later",
-    "clean": "whether there was neither a breach of team-mates nor an avoidable one before the end of the run; false when not recorded",
+    "clean": "whether the run had neither a breach of team-mates nor an avoidable one; false when not recorded",
     "files[]": "what was written",
 }
 """Beside these: ``breaches`` of the team the file names, as other commands give them, when recorded."""

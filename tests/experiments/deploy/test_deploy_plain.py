@@ -10,14 +10,11 @@ import time
 import numpy as np
 import pytest
 from deploy_ticks import Stream
-from steerclear.experiments.deploy.demo import Demo, demo_file
 from steerclear.experiments.deploy.plain import PlainLines, logging_aside
 from steerclear.experiments.deploy.quiet import NICENESS, ended_by_signals, undisturbed
 from steerclear.experiments.deploy.tally import Tally
-from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
-from steerclear.shield.exceptions import BridgeError
 
 
 @pytest.fixture
@@ -70,26 +67,6 @@ def test_a_run_is_counted(ticks):
     assert figures["closest_m"] <= np.hypot(*(at[0] - at[1])) + 1e-9
     assert 0.0 <= figures["changed_share"] <= 1.0
     assert Tally().figures()["ticks"] == 0.0
-
-
-def test_the_demonstrations_file_is_written_once_and_kept(tmp_path):
-    path = demo_file(tmp_path / "demo")
-    assert load_fleet(path).team == "blue"
-    path.write_text("changed")
-    assert demo_file(tmp_path / "demo").read_text() == "changed"
-    (tmp_path / "file").write_text("")
-    with pytest.raises(BridgeError, match="cannot write"):
-        demo_file(tmp_path / "file")
-
-
-def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path):
-    path = tmp_path / "FLEET.yaml"
-    path.write_text("version: 2")
-    with Demo(path, "medium") as demo:
-        with pytest.raises(BridgeError, match=r"ended: .*version"):
-            demo.wait(60.0)
-        processes = list(demo._processes.values())
-    assert all(process.poll() is not None for process in processes)
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
