@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from steerclear.shield.jit import Array
+
 from .hull import STEP_S
 
 RECENT_S = 5.0
@@ -40,6 +43,11 @@ class Marks:
         self._rows.append(tuple(self._kept.setdefault(mark, mark) for mark in marks))
         if any(mark.commanded for mark in marks):
             self._last_commanded = len(self._rows)
+
+    def commanded(self, n_boats: int) -> Array:
+        """(T, n) bool: whether each boat obeyed a commander."""
+        rows = [[mark.commanded for mark in row] for row in self._rows]
+        return np.array(rows, dtype=np.bool_).reshape(-1, n_boats)
 
     def of(self, step: int, boats: Sequence[int]) -> dict[str, Any]:
         """Entries of a breach at a step (1 the first that was moved) between boats, see `boats_keys.SIM_BOATS`."""

@@ -113,10 +113,13 @@ class TruthRecord:
         return [int(count) for count in self._game.core.tags[0]]
 
     def record(self) -> Record:
-        """Everything so far, see `steerclear.env.record`; with a further array ``state`` (T+1, n, N_STATE)."""
+        """Everything so far, see `steerclear.env.record`; with further arrays.
+
+        These are ``state`` (T+1, n, N_STATE), and ``commanded`` (T, n) bool: whether each boat obeyed a commander.
+        """
         record = self._recorder.finish()
         record["breaches"] = find_breaches(record["position"], self._separation_m)
-        return {**record, "state": self._log.states}
+        return {**record, "state": self._log.states, "commanded": self._marks.commanded(record["position"].shape[1])}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
         """What the oracle says of the breaches that a team's boats were in, see `experiments.keys.BREACH`.

@@ -47,8 +47,10 @@ def test_breaches_of_a_simulated_game_carry_them():
     fleet = SimFleet(boats, autopilot=READY, record=True, waits=False)
     fleet.fault("b0", "freeze", duration_s=1.0)
     fleet.advance(1.0)
-    breaches = fleet.judge(0)
+    breaches, commanded = fleet.judge(0), fleet.truth_record()["commanded"]
     fleet.close()
     assert breaches
+    assert commanded.shape[1] == 4
+    assert not commanded.any()
     assert all(breach["unsteered_s"] == [0.0, 0.0] and not breach["after_run"] for breach in breaches)
     assert any(breach["faults"] == ["freeze"] for breach in breaches)
