@@ -73,7 +73,7 @@ def play(part: Part, folder: Path) -> dict:
     load_before = os.getloadavg()[0]
     with Demo(fleet_file, part.opponents, more=more) as water:
         water.wait(START_S)
-        names = [boat.name for boat in fleet.commanded(None)] if part.per_boat else [""]
+        names = [boat.name for boat in fleet.boats if boat.link is not None] if part.per_boat else [""]
         runners = [runner(part, fleet_file, name) for name in names]
         end = time.monotonic() + START_S + 60.0 * part.minutes + LATE_S
         for process in runners:
