@@ -22,6 +22,7 @@ from .overruns import Overruns
 from .parts import GameState, Parts, contact_of
 from .policy_watch import PolicyWatch
 from .recording import Recorder
+from .retaking import Retaking
 from .roster import Roster
 from .tick import Action, Tick
 from .wanted import Snapshot, WantedSource
@@ -65,6 +66,7 @@ class Loop:
         self._mates = _mates(fleet, parts.links)
         self._number = 0
         self._recorder = Recorder(parts.sinks)
+        self._retaking = Retaking(parts.links)
         self._rivals_s: dict[str, float] = {}
         self._broke_s = -math.inf
         self.near: tuple[str, ...] = ()
@@ -94,6 +96,7 @@ class Loop:
             self._tell_near()
         finally:
             self._helm.stop_all(tuple(self.parts.links))
+            self._retaking.close()
         return self._ending
 
     def _keep_on(self, due_s: float, goes_on: Callable[[float], bool]) -> float:
@@ -131,6 +134,7 @@ class Loop:
         """
         began = self.clock.now_s()
         self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
+        self._retaking.look(self.operator.take_requests(), readings, began)
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
         answer, policy_age, fault = _latest(self.parts.policy)
@@ -154,7 +158,13 @@ class Loop:
             shield_reset=steered.shield_reset,
             sent=steered.sent,
             policy_age_s=policy_age,
-            actions=(*self.operator.actions(began), *verdict.actions, *steered.actions, *self.delays.actions()),
+            actions=(
+                *self.operator.actions(began),
+                *self._retaking.actions(began),
+                *verdict.actions,
+                *steered.actions,
+                *self.delays.actions(),
+            ),
             game={} if game is None else game.as_dict(),
         )
         self._number += 1
