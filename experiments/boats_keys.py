@@ -20,7 +20,10 @@ SIM_BOATS = {
     "closest[].time_s": "when, simulated s",
     "captures[]": "flags captured by blue and red, when recorded",
     "tags[]": "tags made by blue and red, when recorded",
-    "clean": "whether there was neither a breach of team-mates nor an avoidable one; false when not recorded",
+    "breaches[].unsteered_s[]": "for how long nobody had steered each of the two boats, s; 0: somebody did",
+    "breaches[].faults[]": "faults of simulated boats that acted on one of the two then or in the 5 s before",
+    "breaches[].after_run": "whether commanders had steered boats and none did any more, then or later",
+    "clean": "whether the run had neither a breach of team-mates nor an avoidable one; false when not recorded",
     "files[]": "what was written",
 }
 """Beside these: ``breaches`` of the team the file names, as other commands give them, when recorded."""

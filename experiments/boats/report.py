@@ -73,14 +73,15 @@ def approaches_table(content: dict[str, Any]) -> Group:
 
 def verdicts_table(content: dict[str, Any]) -> Group:
     """Breaches of the own team by kind and verdict."""
-    counted = Counter((breach["kind"], breach["verdict"]) for breach in content["breaches"])
-    rows = [[kind, verdict, str(number)] for (kind, verdict), number in sorted(counted.items())]
-    return titled("Breaches of the own team", ["with", "verdict", "number"], rows or [["none", "", "0"]])
+    when = {False: "during the run", True: "after it"}
+    counted = Counter((when[breach["after_run"]], breach["kind"], breach["verdict"]) for breach in content["breaches"])
+    rows = [[*what, str(number)] for what, number in sorted(counted.items())]
+    return titled("Breaches of the own team", ["", "with", "verdict", "number"], rows or [["none", "", "", "0"]])
 
 
 def _counts(breach: dict[str, Any]) -> bool:
-    """Whether a shield should have prevented it."""
-    return breach["kind"] == "teammate" or breach["verdict"] == "avoidable"
+    """Whether a shield should have prevented it; once the run is over there is none."""
+    return not breach["after_run"] and (breach["kind"] == "teammate" or breach["verdict"] == "avoidable")
 
 
 def _boat(fleet: SimFleet, name: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
 from .game import Game
+from .marks import Mark, Marks
 from .orders import Bear, Order, Steer, Turn
 
 
@@ -79,6 +80,7 @@ class TruthRecord:
         self._separation_m = separation_m
         self._recorder = GameRecorder()
         self._log = StateLog()
+        self._marks = Marks()
         players = game.players
         names = {side: _policy_of(players, game.core.team, side) for side in (0, 1)}
         self._recorder.start(
@@ -93,11 +95,12 @@ class TruthRecord:
         )
         self._log.start(game.core)
 
-    def step(self, orders: Sequence[Order], headings_deg: Array) -> None:
-        """Boats have moved by a step under these orders from these headings."""
+    def step(self, orders: Sequence[Order], headings_deg: Array, marks: Sequence[Mark]) -> None:
+        """Boats have moved by a step under these orders from these headings; what held them is marked."""
         told = np.array([_told(order, heading) for order, heading in zip(orders, headings_deg, strict=True)])
         self._recorder.step(self._game.core.view(), told, told)
         self._log.step(self._game.core)
+        self._marks.add(marks)
 
     @property
     def captures(self) -> list[int]:
@@ -110,14 +113,25 @@ class TruthRecord:
         return [int(count) for count in self._game.core.tags[0]]
 
     def record(self) -> Record:
-        """Everything so far, see `steerclear.env.record`; with a further array ``state`` (T+1, n, N_STATE)."""
+        """Everything so far, see `steerclear.env.record`; with further arrays.
+
+        These are ``state`` (T+1, n, N_STATE), and ``commanded`` (T, n) bool: whether each boat obeyed a commander.
+        """
         record = self._recorder.finish()
         record["breaches"] = find_breaches(record["position"], self._separation_m)
-        return {**record, "state": self._log.states}
+        return {**record, "state": self._log.states, "commanded": self._marks.commanded(record["position"].shape[1])}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """What the oracle says of the breaches that a team's boats were in, see `experiments.keys.BREACH`."""
-        return judge_game(self._log, self._game.core.params, self.record(), team)
+        """What the oracle says of the breaches that a team's boats were in, see `experiments.keys.BREACH`.
+
+        With what held the boats then, see `marks.Marks.of`.
+        """
+        ids = list(self._game.core.config.agent_ids)
+        found = judge_game(self._log, self._game.core.params, self.record(), team)
+        return [
+            {**breach, **self._marks.of(breach["step"], [ids.index(boat) for boat in breach["boats"]])}
+            for breach in found
+        ]
 
 
 def record_of(truth: TruthRecord | None) -> TruthRecord:

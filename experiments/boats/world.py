@@ -12,6 +12,7 @@ from .boat import Boat
 from .game import Game
 from .hub import PositionHub
 from .hull import STEP_S
+from .marks import Mark
 from .orders import Keep, Order
 from .truth import ClosestApproaches, TruthRecord, positions
 from .weather import Weather
@@ -96,7 +97,8 @@ class World:
         if self._game is not None and self.is_playing:
             self._game.follow([boat.hull.state for boat in self._players])
         if self.truth is not None:
-            self.truth.step([boat.order for boat in self._players], headings_deg)
+            marks = [Mark(_is_steered(boat), boat.faults.active, boat.is_commanded) for boat in self._players]
+            self.truth.step([boat.order for boat in self._players], headings_deg, marks)
         if self._hub is not None:
             self._hub.send(self._boats, time_s)
 
@@ -114,6 +116,11 @@ class World:
     def _restart_game(self) -> None:
         if self._game is not None:
             self._game.start([boat.hull.state for boat in self._players])
+
+
+def _is_steered(boat: Boat) -> bool:
+    """Whether a commander or a policy steers it now."""
+    return boat.is_commanded or bool(boat.spec.policy)
 
 
 def _otherwise(boat: Boat) -> Order | None:

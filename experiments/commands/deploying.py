@@ -28,6 +28,9 @@ Speed = Annotated[
     float, typer.Option(metavar="X", help="Times faster than real time, as sim-boats was started; never real boats.")
 ]
 Wait = Annotated[float, typer.Option(metavar="S", help="How long boats are waited for.")]
+WithParent = Annotated[
+    bool, typer.Option("--with-parent", help="End when standard input is closed: for programs that start this one.")
+]
 NoTlog = Annotated[bool, typer.Option("--no-tlog", help="Do not keep raw MAVLink packets beside the black box.")]
 
 

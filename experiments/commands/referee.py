@@ -16,9 +16,11 @@ from steerclear.shield.bridge.feed import GameState
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import ConfigError
 
+from ..deploy.lifeline import end_with_parent
 from ..deploy.referee import RATE_HZ, Referee
 from ..provenance import machine, versions
 from ..store import write_json
+from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, out
 
@@ -45,6 +47,7 @@ def referee(
     rate: Rate = RATE_HZ,
     speed: Speed = 1.0,
     minutes: Minutes = None,
+    with_parent: d.WithParent = False,
     json_file: o.JsonFile = None,
 ) -> None:
     """Watch boats, apply the game's rules without moving any, and tell all runners how the game stands.
@@ -52,6 +55,8 @@ def referee(
     The game begins when every boat has been heard of. Exit status: 0 the game or the time is over, 2 bad input, 130
     interrupted.
     """
+    if with_parent:
+        end_with_parent()
     _check(rate, minutes)
     file = load_fleet(fleet)
     started = time.perf_counter()

@@ -18,7 +18,9 @@ from ..boats import AutopilotSettings, RadioSettings, SimFleet, Water
 from ..boats.demo import demo_fleet
 from ..boats.incidents import Plan, parse_incident
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
+from ..deploy.lifeline import end_with_parent
 from ..store import write_json
+from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 
@@ -75,6 +77,7 @@ def sim_boats(
     record: RecordFile = None,
     allow_remote: Remote = False,
     check: Check = False,
+    with_parent: d.WithParent = False,
     json_file: o.JsonFile = None,
 ) -> None:
     """Simulate the boats of a FLEET.yaml: MAVLink autopilots at its links, scripted opponents, the position feed.
@@ -82,6 +85,8 @@ def sim_boats(
     Runs until Ctrl-C or for --duration. Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input, 130
     interrupted before --duration was over.
     """
+    if with_parent:
+        end_with_parent()
     settings = {
         "fleet": None if fleet is None else str(fleet),
         **{"speed": speed, "wind": wind, "current": current, "noise": noise, "loss": loss, "delay": delay},

@@ -1,4 +1,4 @@
-"""What the operator's keys do: STOP ALL, resume, end, and the menu of overrides."""
+"""What the operator's keys do: STOP ALL, resume, end, taking boats back, and the menu of overrides."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ class Controls:
     ) -> None:
         self._operator, self._clock, self._time_s = operator, clock, time_s
         self._names = fleet.names
+        self._ours = tuple(boat.name for boat in fleet.ours if boat.link is not None and boat.commanded)
         self._lock = threading.Lock()
         self._stopped_s = float("-inf")
         self._open = ""
@@ -58,6 +59,8 @@ class Controls:
                 return []
             titles = {
                 "resume": "Take STOP ALL back? y: boats move again",
+                "take": "Take which boat back? Its pilot must have let go of it. It is logged. ESC leaves",
+                "take_sure": f"{self._subject}: GUIDED and arming are asked for, and it obeys the policy. y: yes",
                 "condition": "Switch off which response, for a time? It is logged. ESC leaves",
                 "subject": f"{self._condition}: for which boat?",
                 "duration": f"{self._condition} of {self._subject or 'all'}: for how long? It disables "
@@ -79,6 +82,8 @@ class Controls:
             self._open = "resume"
         elif key in ("o", "O"):
             self._open, self._said = "condition", ""
+        elif key in ("t", "T"):
+            self._open = "take"
 
     def _choose(self, key: str) -> None:
         if self._open == "resume":
@@ -86,12 +91,19 @@ class Controls:
             if key in ("y", "Y"):
                 self._operator.resume(BY)
             return
+        if self._open == "take_sure":
+            self._open = ""
+            if key in ("y", "Y"):
+                self._operator.take_back(self._subject, BY)
+            return
         options = self._options()
         if key not in DIGITS[: len(options)]:
             self._open = ""
             return
         chosen = options[DIGITS.index(key)]
-        if self._open == "condition":
+        if self._open == "take":
+            self._subject, self._open = chosen, "take_sure"
+        elif self._open == "condition":
             self._condition, self._open = chosen, "subject"
         elif self._open == "subject":
             self._subject, self._open = "" if chosen == "all" else chosen, "duration"
@@ -106,6 +118,8 @@ class Controls:
             self._open, self._said = "condition", str(error)
 
     def _options(self) -> Sequence[str]:
+        if self._open == "take":
+            return self._ours[: len(DIGITS)]
         if self._open == "condition":
             return tuple(DISABLES)
         if self._open == "subject":
@@ -113,7 +127,7 @@ class Controls:
         return tuple(f"{seconds:g}" for seconds in DURATIONS_S)
 
     def _entries(self) -> list[str]:
-        if self._open == "resume":
+        if self._open in ("resume", "take_sure"):
             return []
         options = self._options()
         if self._open == "condition":

@@ -26,7 +26,7 @@ WIDE = 150
 MOST_ACTIONS = 6
 SILENT_S = 1.0
 """A loop without a tick for so long is shown as standing still."""
-KEYS = "SPACE or s STOP ALL   r resume   o overrides   q end"
+KEYS = "SPACE or s STOP ALL   r resume   o overrides   t take back   q end"
 WHY = {
     Reason.PASSED: ("passed", "green"),
     Reason.QP: ("QP", "cyan"),

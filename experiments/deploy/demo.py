@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import socket
 import subprocess
 import sys
 import time
@@ -12,35 +14,64 @@ from types import TracebackType
 from typing import IO, Self
 
 from steerclear.experiments.boats.demo import demo_text
+from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.exceptions import BridgeError
 
 FOLDER = Path("steerclear_demo")
-"""Where the demonstration keeps its fleet file and logs, in the present folder."""
+"""Demonstrations keep their fleet files and logs in folders of their own in here, in the present folder."""
+
+PORTS = (14550, 14700, 14701)
+"""Ports of the file that comes with the package: links, feed, referee."""
 
 END_S = 10.0
 
-LONGEST_S = 4.0 * 3600.0
-"""Left behind by a runner that was killed, the processes end after this, s."""
-
 
 def demo_file(folder: Path = FOLDER) -> Path:
-    """The fleet file that comes with the package, written where it can be looked at; one that is there is kept.
+    """The fleet file that comes with the package, on free ports, in a new folder where it can be looked at.
+
+    Args:
+        folder: in which the new one is made, named after the time, UTC.
 
     Raises:
         BridgeError: it cannot be written.
     """
-    path = folder / "FLEET.yaml"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not path.exists():
-            path.write_text(demo_text(), encoding="utf-8")
+        text = demo_text()
+        for port, free in zip(PORTS, free_ports(len(PORTS)), strict=True):
+            text = text.replace(f"127.0.0.1:{port}", f"127.0.0.1:{free}")
+        path = _new_folder(folder) / "FLEET.yaml"
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise BridgeError(f"cannot write {path} ({error.strerror}); run it in a folder of your own") from None
+        raise BridgeError(f"cannot write to {folder} ({error.strerror}); run it in a folder of your own") from None
     return path
+
+
+def free_ports(count: int) -> list[int]:
+    """UDP ports of this machine that nobody has now, all different.
+
+    Raises:
+        OSError: there is none.
+    """
+    with contextlib.ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)]
+        for entry in sockets:
+            entry.bind(("127.0.0.1", 0))
+        return [int(entry.getsockname()[1]) for entry in sockets]
+
+
+def _new_folder(folder: Path) -> Path:
+    stamp = f"{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}_{os.getpid()}"
+    for name in (stamp, *(f"{stamp}_{number}" for number in range(2, 1000))):
+        with contextlib.suppress(FileExistsError):
+            (folder / name).mkdir(parents=True)
+            return folder / name
+    raise BridgeError(f"{folder} is full of demonstrations; run it in another folder")
 
 
 class Demo:
     """Simulated boats of a fleet file, opponents and a referee. A context manager.
+
+    The processes end with this one, also when it is killed; what they say is kept beside the fleet file.
 
     Args:
         fleet_file: the file; its links must be on this machine.
@@ -56,14 +87,11 @@ class Demo:
         self, fleet_file: Path, opponents: str = "medium", speed: float = 1.0, more: Sequence[str] = ()
     ) -> None:
         boats = ["sim-boats", str(fleet_file), "--opponents", opponents, "--boot", "5", "--noise", "1"]
-        boats += ["--duration", f"{LONGEST_S:g}", *more]
-        self._commands = {
-            "boats": [*boats, "--speed", f"{speed:g}"],
-            "referee": ["referee", str(fleet_file), "--speed", f"{speed:g}", "--minutes", f"{LONGEST_S / 60.0:g}"],
-        }
+        alike = ["--speed", f"{speed:g}", "--with-parent"]
+        self._commands = {"boats": [*boats, *more, *alike], "referee": ["referee", str(fleet_file), *alike]}
         self._folder = fleet_file.resolve().parent
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._files: list[IO[bytes]] = []
+        self._files: dict[str, IO[bytes]] = {}
 
     def fault(self) -> str:
         """Which process ended and what it said last; empty: all run."""
@@ -88,31 +116,36 @@ class Demo:
             time.sleep(0.1)
 
     def _said(self, name: str) -> str:
-        return (self._folder / f"{name}.txt").read_text(encoding="utf-8", errors="replace").strip()
+        return Path(self._files[name].name).read_text(encoding="utf-8", errors="replace").strip()
 
-    def close(self) -> None:
-        """End the processes; may be called again."""
+    def close(self, patience_s: float = END_S) -> None:
+        """End the processes, those that do not end in time at once; may be called again.
+
+        Args:
+            patience_s: how long each may take to end in order, s.
+        """
         for process in self._processes.values():
             with contextlib.suppress(OSError):
                 process.terminate()
         for process in self._processes.values():
             try:
-                process.wait(END_S)
+                process.wait(patience_s)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-        for file in self._files:
+            if process.stdin is not None:
+                process.stdin.close()
+        for file in self._files.values():
             file.close()
-        self._processes, self._files = {}, []
+        self._processes, self._files = {}, {}
 
     def __enter__(self) -> Self:
         try:
             for name, arguments in self._commands.items():
-                file = (self._folder / f"{name}.txt").open("wb")
-                self._files.append(file)
+                file = self._files[name] = log_path(self._folder, ".txt", name=name).open("wb")
                 command = [sys.executable, "-m", "steerclear.experiments.cli", *arguments]
                 self._processes[name] = subprocess.Popen(
-                    command, stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT, start_new_session=True
+                    command, stdin=subprocess.PIPE, stdout=file, stderr=subprocess.STDOUT, start_new_session=True
                 )
         except OSError as error:
             self.close()

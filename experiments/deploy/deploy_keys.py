@@ -9,7 +9,7 @@ DEPLOY = {
     "checks[].passed": "whether it passed",
     "checks[].text": "what was found, and the remedy",
     "checks[].figures.*": "what was measured; the unit ends the name",
-    "left[]": "what each boat was left doing",
+    "left[]": "what each boat was left doing, and boats on the way to one of them then",
     "log": "path of the black box, or of the kept preflight; null: none",
     "figures.ticks": "turns of the loop",
     "figures.decided": "of those, with a decision",

@@ -62,7 +62,8 @@ class Outcome:
         ended: why it ended.
         refused: checks that forbade the start; nothing moved.
         checks: results of all checks.
-        left: what each boat was left doing.
+        left: what each boat was left doing, and who was on the way to it.
+        near: boats on their way to one of ours at the end of the run.
         log: path of the black box; None when it never began.
         figures: of the loop and its decisions.
     """
@@ -71,6 +72,7 @@ class Outcome:
     refused: list[CheckResult] = field(default_factory=list)
     checks: list[CheckResult] = field(default_factory=list)
     left: tuple[str, ...] = ()
+    near: tuple[str, ...] = ()
     log: Path | None = None
     figures: dict[str, float] = field(default_factory=dict)
 

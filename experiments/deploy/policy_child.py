@@ -1,6 +1,7 @@
-"""The policy's own process: ``python -m steerclear.experiments.deploy.policy_child READ_FD WRITE_FD``.
+"""The policy's own process: ``python -m steerclear.experiments.deploy.policy_child READ_FD WRITE_FD FOLDER``.
 
-Reads pickled `Orders`, then snapshots; answers JSON. It ends when the runner does, also while the policy is busy.
+Reads pickled `Orders`, then snapshots; answers JSON. It ends when the runner does, also while the policy is busy, and
+takes FOLDER, in which its temporary files are, with it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import json
 import math
 import os
 import pickle
+import shutil
 import sys
 import threading
 from typing import Any
@@ -23,8 +25,8 @@ FAILED = 3
 class Slot:
     """Holds the latest snapshot, filled by a thread, so that a slow policy skips those it was too late for."""
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+    def __init__(self, descriptor: int, folder: str) -> None:
+        self._descriptor, self._folder = descriptor, folder
         self._ready = threading.Condition()
         self._message: bytes | None = None
         threading.Thread(target=self._fill, name="snapshots", daemon=True).start()
@@ -42,13 +44,14 @@ class Slot:
             with contextlib.suppress(OSError):
                 message = read_message(self._descriptor)
             if message is None:
+                shutil.rmtree(self._folder, ignore_errors=True)
                 os._exit(0)  # the runner is gone; the policy may be in the middle of anything
             with self._ready:
                 self._message = message
                 self._ready.notify()
 
 
-def main(read_fd: int, write_fd: int) -> int:
+def main(read_fd: int, write_fd: int, folder: str) -> int:
     """Load the policy the first message names and answer snapshots until the runner is gone."""
     _give_way()
     orders = read_message(read_fd)
@@ -64,7 +67,7 @@ def main(read_fd: int, write_fd: int) -> int:
         _answer(write_fd, {"failed": str(error)})
         return FAILED
     _answer(write_fd, {"ready": True})
-    slot = Slot(read_fd)
+    slot = Slot(read_fd, folder)
     while True:
         snapshot = pickle.loads(slot.take())
         try:
@@ -93,4 +96,4 @@ def _line(error: BaseException) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2])))
+    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]))

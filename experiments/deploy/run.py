@@ -59,7 +59,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
                     station.prepare()
                     _run(station, policy, orders, text, surface, operator, outcome)
         finally:
-            outcome.left = station.left
+            outcome.left = (*station.left, *(f"at the end {text}: take it over by hand" for text in outcome.near))
     return outcome
 
 
@@ -97,6 +97,7 @@ def _run(
         loop = Loop(fleet, parts, operator, clock)
         with undisturbed():
             outcome.ended = loop.run(None if orders.minutes is None else 60.0 * orders.minutes)
+        outcome.near = loop.near
         outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
         outcome.figures |= {f"delay_{name}_s": delay for name, delay in loop.delays.measured_s().items()}
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 
 from .frames import GONE, Broken, FrameReader, FrameWriter
@@ -14,12 +17,16 @@ from .frames import GONE, Broken, FrameReader, FrameWriter
 MODULE = "steerclear.experiments.deploy.policy_child"
 TAIL_BYTES = 4096
 """How much of what the policy prints is kept."""
+FOLDER = "steerclear-policy-"
+"""First part of the name of a process's folder for temporary files."""
+GONE_S = 10.0
 SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Worker:
     """A started process, in a session of its own: keys for the runner do not reach it, and its children end with it.
 
+    Its temporary files, such as an unpacked submission, have a folder of their own that goes with it.
     What the policy prints is read a little at each turn, so that one that floods only slows itself.
 
     Args:
@@ -30,13 +37,15 @@ class Worker:
     """
 
     def __init__(self, orders: bytes) -> None:
+        self._folder = tempfile.mkdtemp(prefix=FOLDER)
         ours_r, theirs_w = os.pipe()
         theirs_r, ours_w = os.pipe()
         self._reader, self._writer = FrameReader(ours_r), FrameWriter(ours_w)
         self._tail = b""
         self._ended = False
-        command = [sys.executable, "-P", "-m", MODULE, str(theirs_r), str(theirs_w)]
+        self._cleaner: threading.Thread | None = None
         try:
+            command = [sys.executable, "-P", "-m", MODULE, str(theirs_r), str(theirs_w), self._folder]
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -44,9 +53,10 @@ class Worker:
                 stderr=subprocess.STDOUT,
                 pass_fds=(theirs_r, theirs_w),
                 start_new_session=True,
-                env={**dict.fromkeys(SINGLE_THREAD, "1"), **os.environ},
+                env={**dict.fromkeys(SINGLE_THREAD, "1"), **os.environ, "TMPDIR": self._folder},
             )
         except OSError:
+            shutil.rmtree(self._folder, ignore_errors=True)
             self._reader.close()
             self._writer.close()
             raise
@@ -120,6 +130,13 @@ class Worker:
         self._writer.close()
         if self._process.stdout is not None:
             self._process.stdout.close()
+        self._cleaner = threading.Thread(target=self._clean, name="policy's folder", daemon=True)
+        self._cleaner.start()
+
+    def _clean(self) -> None:
+        """Remove its folder once it is gone; that may take long, and the loop must not."""
+        self.wait(GONE_S)
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     @property
     def is_gone(self) -> bool:
@@ -127,9 +144,11 @@ class Worker:
         return self._process.poll() is not None
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until it has."""
+        """Wait until it has, and its files are gone."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=timeout_s)
+        if self._cleaner is not None and self._cleaner is not threading.current_thread():
+            self._cleaner.join(timeout_s)
 
     def _read_output(self) -> None:
         if self._process.stdout is None or self._process.stdout.closed:

@@ -7,9 +7,9 @@ import re
 import shutil
 import stat
 import tempfile
-import weakref
 import zipfile
 import zlib
+from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 
 from steerclear.shield.exceptions import PolicyError
@@ -25,7 +25,9 @@ _CHUNK = 1 << 20
 
 
 class Stage:
-    """A temporary folder with the submission's files at its top; removed by `close` or when collected.
+    """A temporary folder with the submission's files at its top; removed by `close`, when collected, or at the end.
+
+    The end may be that of a pool's process, which never runs the interpreter's own; forked processes leave it alone.
 
     A folder's files are linked, not copied, so that what the submission writes beside itself stays out of the folder.
 
@@ -44,7 +46,7 @@ class Stage:
         if not self.source.exists():
             raise PolicyError(f"there is no submission at {self.source}; give a folder or a zip with {ENTRY_FILE}")
         top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
-        self._clean = weakref.finalize(self, shutil.rmtree, top, ignore_errors=True)
+        self._clean = Finalize(self, shutil.rmtree, (top,), {"ignore_errors": True}, exitpriority=0)
         try:
             self.folder = self._fill(top, max_bytes)
         except BaseException:

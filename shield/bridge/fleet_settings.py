@@ -176,6 +176,17 @@ class Limits(Section):
     log: LogLimit = LogLimit()
 
 
+class End(Section):
+    """The end of a run: boats are told to stop, behind the shield, before their links stop them and put them in HOLD.
+
+    They are handed over once they lie still and no other boat would come within the separation radius of one of them
+    within ``clear_s``, and after ``longest_s`` in any case.
+    """
+
+    clear_s: Seconds = 10.0
+    longest_s: Seconds = 40.0
+
+
 class FleetSettings(Section):
     """The whole file, section by section; `fleet_file.FleetFile` adds what follows from it."""
 
@@ -195,4 +206,5 @@ class FleetSettings(Section):
     signing: Signing | None = None
     feed: Feed | None = None
     limits: Limits = Limits()
+    end: End = End()
     log_dir: Path = Field(Path("logs"), description="give the folder of the logs")

@@ -99,6 +99,8 @@ class Link(Protocol):
     def prepare(self, timeout_s: float) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
 
+        Also one that somebody took from us, which is left alone until then, whatever mode it comes back to.
+
         Raises:
             LinkRefused: the autopilot says no; its own words are in the text.
             LinkError: no answer in time.

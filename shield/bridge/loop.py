@@ -13,6 +13,7 @@ from .clock import Clock
 from .contact import Contact
 from .fleet_file import FleetFile
 from .freshness import RIVAL_S, Seen, Verdict, judge
+from .handover import at_rest, nearing
 from .helm import Helm, Steered
 from .latency import Delays
 from .link import BoatReading, Link
@@ -21,6 +22,7 @@ from .overruns import Overruns
 from .parts import GameState, Parts, contact_of
 from .policy_watch import PolicyWatch
 from .recording import Recorder
+from .retaking import Retaking
 from .roster import Roster
 from .tick import Action, Tick
 from .wanted import Snapshot, WantedSource
@@ -31,12 +33,6 @@ LOG = logging.getLogger(__name__)
 
 TALK_EVERY_S = 5.0
 """The same failure is logged again after this long, s."""
-
-WIND_DOWN_S = 20.0
-"""Boats are given this long to come to rest at the end, s."""
-
-REST_MPS = 0.2
-"""A boat slower than this lies still, m/s."""
 
 RIVALS = ("second_commander", "disobeys")
 """Keys of `BoatReading.faults` that tell of somebody else's commands: heard, or seen by what the boat does."""
@@ -70,16 +66,19 @@ class Loop:
         self._mates = _mates(fleet, parts.links)
         self._number = 0
         self._recorder = Recorder(parts.sinks)
+        self._retaking = Retaking(parts.links)
         self._rivals_s: dict[str, float] = {}
         self._broke_s = -math.inf
+        self.near: tuple[str, ...] = ()
+        """Boats that came near one of ours when these were handed over at the end."""
         self._ending = ""
         self._readings: dict[str, BoatReading] = {}
 
     def run(self, seconds: float | None = None) -> str:
         """Turn at the file's rate until the operator ends it or the time is over, then bring boats to rest.
 
-        At the end boats are told to stop and go on behind the shield until they lie still: a boat that only stops may
-        drift into another.
+        At the end boats are told to stop and go on behind the shield until they lie still and nobody is on the way to
+        one of them: a boat that only stops may drift into another, and one that nobody steers is defended by nobody.
 
         Args:
             seconds: how long, s on the loop's clock; None: until ended.
@@ -92,10 +91,12 @@ class Loop:
         try:
             due = self._keep_on(began, lambda due: not self.operator.ended and due < last)
             self._ending = self.operator.ended or f"ran for {self.clock.now_s() - began:.0f} s"
-            still = due + WIND_DOWN_S
-            self._keep_on(due, lambda now: now < still and not self._at_rest())
+            latest = due + self.fleet.end.longest_s
+            self._keep_on(due, lambda now: now < latest and not self._is_clear())
+            self._tell_near()
         finally:
             self._helm.stop_all(tuple(self.parts.links))
+            self._retaking.close()
         return self._ending
 
     def _keep_on(self, due_s: float, goes_on: Callable[[float], bool]) -> float:
@@ -106,9 +107,14 @@ class Loop:
             due_s = self.overruns.next_due(due_s, self.clock.now_s())
         return due_s
 
-    def _at_rest(self) -> bool:
-        """Whether every own boat that is known and obeys lies still."""
-        return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in self._readings.values())
+    def _is_clear(self) -> bool:
+        """Whether boats can be handed over: they lie still, and nobody is on the way to one of them."""
+        return at_rest(self._readings) and not nearing(self.fleet, self.roster)
+
+    def _tell_near(self) -> None:
+        self.near = tuple(nearing(self.fleet, self.roster))
+        for text in self.near:
+            LOG.warning("handed over although %s: take it over by hand", text)
 
     def _turn_or_stop(self, due_s: float) -> None:
         """A turn that breaks where none should leaves boats told to stop, and the next one is tried."""
@@ -128,6 +134,7 @@ class Loop:
         """
         began = self.clock.now_s()
         self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
+        self._retaking.look(self.operator.take_requests(), readings, began)
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
         answer, policy_age, fault = _latest(self.parts.policy)
@@ -151,7 +158,13 @@ class Loop:
             shield_reset=steered.shield_reset,
             sent=steered.sent,
             policy_age_s=policy_age,
-            actions=(*self.operator.actions(began), *verdict.actions, *steered.actions, *self.delays.actions()),
+            actions=(
+                *self.operator.actions(began),
+                *self._retaking.actions(began),
+                *verdict.actions,
+                *steered.actions,
+                *self.delays.actions(),
+            ),
             game={} if game is None else game.as_dict(),
         )
         self._number += 1

@@ -55,6 +55,7 @@ class Operator:
         self._stopped = ""
         self._hard = False
         self._ended = ""
+        self._taken: tuple[tuple[str, str], ...] = ()
 
     @property
     def stopped(self) -> str:
@@ -87,6 +88,18 @@ class Operator:
         with self._lock:
             self._stopped, self._hard = "", False
         LOG.warning("STOP ALL taken back by %s", by)
+
+    def take_back(self, boat: str, by: str = "operator") -> None:
+        """Ask for a boat that somebody took from us: mode and arming are asked for, once."""
+        with self._lock:
+            self._taken = (*self._taken, (boat, by))
+        LOG.warning("%s: to be taken back, asked for by %s", boat, by)
+
+    def take_requests(self) -> tuple[tuple[str, str], ...]:
+        """Boats to be taken back and who asked, since the last call."""
+        with self._lock:
+            taken, self._taken = self._taken, ()
+        return taken
 
     def end(self, by: str = "operator") -> None:
         """End the run: boats are left stopped."""

@@ -1,3 +1,4 @@
+import multiprocessing
 import stat
 import zipfile
 from pathlib import Path
@@ -139,3 +140,36 @@ def test_broken_zips_are_one_clear_error(tmp_path):
 def test_what_is_not_there_is_reported(tmp_path):
     with pytest.raises(PolicyError, match="no submission at"):
         Stage(tmp_path / "nothing.zip")
+
+
+def hold_a_stage(source, told):
+    """In another process: make a stage, keep it to the end."""
+    global HELD
+    HELD = Stage(source)
+    told.put(str(HELD.folder))
+
+
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_a_stage_held_to_the_end_of_a_pools_process_is_removed(tmp_path, method):
+    """Such processes end by os._exit: nothing of the interpreter's own end is run."""
+    context = multiprocessing.get_context(method)
+    told = context.SimpleQueue()
+    process = context.Process(target=hold_a_stage, args=(pack(tmp_path / "a.zip", **{"solution.py": SOLUTION}), told))
+    process.start()
+    folder = Path(told.get())
+    process.join(60.0)
+    assert process.exitcode == 0
+    assert not folder.exists()
+
+
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+def test_a_forked_process_does_not_take_its_parents_stage_away(tmp_path):
+    stage = Stage(pack(tmp_path / "a.zip", **{"solution.py": SOLUTION}))
+    process = multiprocessing.get_context("fork").Process(target=stage.close)
+    process.start()
+    process.join(60.0)
+    assert stage.folder.exists()
+    stage.close()
+    assert not stage.folder.exists()

@@ -17,21 +17,34 @@ from . import foxglove as fg
 from .disk import Disk, explain
 from .header import LogHeader
 from .mcap_file import McapFile
+from .parts import part_header, part_path
 from .spool import Spool
 
 _Line = tuple[int, str, str]
 
 
-class _Store:
-    """What the spool's thread does with ticks and lines, and with the count of those dropped."""
+PART_S = 1200.0
+"""Length of a part of a log, s: its index is kept in memory until it is complete, 90 kB a minute."""
 
-    def __init__(self, file: McapFile) -> None:
-        self._file = file
+
+class _Store:
+    """What the spool's thread does with ticks and lines, and with the count of those dropped; part after part.
+
+    Args:
+        begin: makes the file of a part, by its number from 1 on.
+        part_s: length of a part, s of the ticks.
+    """
+
+    def __init__(self, begin: Callable[[int], McapFile], part_s: float) -> None:
+        self._begin, self._part_s = begin, part_s
+        self._file, self._number = begin(1), 1
+        self._began_s: float | None = None
         self._told = 0
         self.dropped: Callable[[], int] = lambda: 0
 
     def keep(self, item: Tick | _Line) -> None:
         if isinstance(item, Tick):
+            self._turn_over(item.began_s)
             self._file.add_tick(item)
         else:
             self._file.add_line(*item)
@@ -47,6 +60,16 @@ class _Store:
     def abandon(self) -> None:
         self._file.abandon()
 
+    def _turn_over(self, now_s: float) -> None:
+        """Begin the next part when it is time."""
+        if self._began_s is None:
+            self._began_s = now_s
+        if now_s - self._began_s < self._part_s:
+            return
+        self.finish()
+        self._number += 1
+        self._file, self._began_s = self._begin(self._number), now_s
+
     def _tell_dropped(self) -> None:
         dropped = self.dropped()
         if dropped > self._told:
@@ -56,7 +79,9 @@ class _Store:
 
 
 class McapWriter:
-    """Keeps ticks in an MCAP file, at most ``flush_s`` and the disk's own delay behind.
+    """Keeps ticks in MCAP files, at most ``flush_s`` and the disk's own delay behind.
+
+    A long log is a series of files, see `parts`: each can be read by itself, and `LogReader` reads on to the next.
 
     The header is on the disk when this returns. A log proves the shield's decisions from the first tick that was
     decided by a fresh shield or after `Shield.reset` (``Tick.shield_reset``), so begin it with the first decision.
@@ -67,7 +92,8 @@ class McapWriter:
         flush_s: longest time between flushes to the disk, s.
         capacity: ticks that may wait for the disk; more are dropped and counted.
         give_up_s: when the disk has taken nothing for so long, s, `take` raises.
-        open_disk: makes the file.
+        part_s: length of each file, s.
+        open_disk: makes a file.
 
     Raises:
         BridgeError: the file cannot be made, or not even the header fits on the disk.
@@ -81,19 +107,25 @@ class McapWriter:
         flush_s: float = 0.5,
         capacity: int = 300,
         give_up_s: float = 10.0,
+        part_s: float = PART_S,
         open_disk: Callable[[Path], Disk] = Disk,
     ) -> None:
         self.path, self.header = path, header
-        disk = open_disk(path)
-        try:
-            store = _Store(McapFile(disk, header))
-        except OSError as error:
-            disk.close()
-            raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
+        self._open_disk = open_disk
+        store = _Store(self._begin, part_s)
         self._spool: Spool[Tick | _Line] = Spool(
             path.name, store, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s
         )
         store.dropped = lambda: self._spool.dropped
+
+    def _begin(self, number: int) -> McapFile:
+        path = part_path(self.path, number)
+        disk = self._open_disk(path)
+        try:
+            return McapFile(disk, part_header(self.header, number))
+        except OSError as error:
+            disk.close()
+            raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
 
     def take(self, tick: Tick) -> None:
         """Keep a tick; never waits. Its arrays may be changed afterwards, its mappings may not.

@@ -17,6 +17,7 @@ from ..tick import Tick
 from .decode import tick_from_json
 from .header import LogHeader
 from .mcap_file import HEADER_TOPIC, LOG_TOPIC, TICK_TOPIC
+from .parts import follows, later_parts
 from .records import read_records
 
 LOG = logging.getLogger(__name__)
@@ -40,16 +41,17 @@ class LogLine:
 
 
 class LogReader:
-    """Reads a log once, from its beginning. A context manager.
+    """Reads a log once, from its beginning, and on through the later files of a long one. A context manager.
 
     Args:
-        path: of the log, ``.mcap``.
+        path: of the log, ``.mcap``, or of a later part, to begin there.
 
     Raises:
         LogError: no such file, no log, of another version, or cut off before its header.
 
     Attributes:
         header: what the shield was built with.
+        files: those read so far.
         complete: whether the log was closed properly; known once `entries` is used up.
         damage: what could not be read, in words; likewise.
     """
@@ -57,6 +59,7 @@ class LogReader:
     def __init__(self, path: Path) -> None:
         self.path, self.complete = path, False
         self.damage: list[str] = []
+        self.files = [path]
         self._topics: dict[int, str] = {}
         try:
             self._file: IO[bytes] = path.open("rb")
@@ -110,7 +113,33 @@ class LogReader:
         raise LogError(f"{self.path} holds no header of a steerclear log{why}; give a log that deploy wrote (.mcap)")
 
     def _read(self) -> Iterator[tuple[str, Message]]:
-        """Messages with their topics; ends where the log can no longer be read."""
+        """Messages with their topics, file after file; ends where the log can no longer be read."""
+        yield from self._read_file()
+        for number, path in later_parts(self.path):
+            cut_off = not self.complete
+            self.complete = False
+            if cut_off:
+                self._tell(f"{self.files[-1].name} was cut off")
+            try:
+                later = path.open("rb")
+            except OSError as error:
+                self._tell(f"part {number}, {path.name}, cannot be read ({error.strerror}); what follows is left out")
+                return
+            self._file.close()
+            self._file, self._topics = later, {}
+            messages = self._read_file()
+            if not any(topic == HEADER_TOPIC and self._belongs(message) for topic, message in messages):
+                self._tell(f"{path.name} is of another log, or cut off before its header; it is left out")
+                self.complete = False
+                return
+            self.files.append(path)
+            yield from messages
+            self.complete &= not cut_off
+
+    def _belongs(self, message: Message) -> bool:
+        return follows(self.header, LogHeader.from_message(_object(message)))
+
+    def _read_file(self) -> Iterator[tuple[str, Message]]:
         for item in read_records(self._file, self._tell):
             self.complete = isinstance(item, Footer)
             if isinstance(item, Channel):

@@ -116,6 +116,8 @@ class Spool(Generic[Item]):
             self._store.finish()
         except OSError as error:
             self._fail(f"the log {self.name} cannot be written: {explain(error)}. What was written before can be read")
+        except BridgeError as error:
+            self._fail(f"{error}. What was written before can be read")
         except Exception as error:  # whatever it is, the loop must learn that nothing is written any more
             LOG.debug("writing %s", self.name, exc_info=True)
             self._fail(f"the log {self.name} cannot be written ({type(error).__name__}: {error}); report this")

@@ -45,6 +45,7 @@ class Autopilot:
         route: how heading and speed are commanded; None until prepared, or when that is known no more.
         others: system ids of other vehicles heard on the wire.
         expects_guided: whether leaving GUIDED or being disarmed is somebody else's doing.
+        released: what took it from us, such as a mode; empty: it is ours. Only `preparation.prepare` takes it back.
 
     Raises:
         LinkError: the rate or the system id is none.
@@ -68,6 +69,7 @@ class Autopilot:
         self.heartbeat: Heartbeat | None = None
         self.route: Route | None = None
         self.expects_guided = False
+        self.released = ""
         self.others: set[int] = set()
         self._faults: Counter[str] = Counter()
         self._recheck_s = -math.inf
@@ -95,6 +97,8 @@ class Autopilot:
             return f"it is in {beat.mode}; commands are obeyed in GUIDED only"
         if not beat.armed:
             return "it is disarmed"
+        if self.released:
+            return f"it was taken from us ({self.released}) and given back; take it back by key or start again"
         return "" if self.route is not None else "not prepared"
 
     def send(self, message: Any) -> bool:
@@ -195,10 +199,15 @@ class Autopilot:
         if before is None or not self.expects_guided:
             return
         if before.mode == GUIDED and beat.mode != GUIDED:
-            text = f"somebody or a failsafe switched it to {beat.mode}; it obeys no more until it is in GUIDED again"
+            self.released = beat.mode
+            text = (
+                f"somebody or a failsafe switched it to {beat.mode}; it is left alone until the operator takes it back"
+            )
             self._note("mode_changed", f"{self.boat}: {text}", received_s)
         if before.armed and not beat.armed:
-            self._note("disarmed", f"{self.boat}: somebody or a failsafe disarmed it; arm it again", received_s)
+            self.released = "disarmed"
+            text = "somebody or a failsafe disarmed it; it is left alone until the operator takes it back"
+            self._note("disarmed", f"{self.boat}: {text}", received_s)
 
     def _hear_top_speed(self, message: Any, now_s: float) -> None:
         """A changed WP_SPEED changes what a share of it means, at once."""

@@ -47,7 +47,7 @@ def prepare(boat: Autopilot, route: str, patience: Patience) -> None:
     boat.route = choose_route(boat.boat, route, boat.dialogue.abilities)
     _reach(boat, mode_request(*boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
     _reach(boat, arm_request(*boat.target), lambda: boat.is_armed, "arming", patience)
-    boat.expects_guided = True
+    boat.expects_guided, boat.released = True, ""
     if not boat.dialogue.wait(lambda: not boat.why_not(boat.clock.now_s()), patience):
         raise LinkError(f"boat {boat.boat}: {boat.why_not(boat.clock.now_s())}; put that right, then start again")
 
@@ -87,7 +87,7 @@ def leave(boat: Autopilot, stop: Callable[[], object]) -> str:
         boat: to leave.
         stop: sends a stop.
     """
-    name, ours = boat.boat, boat.expects_guided
+    name, ours = boat.boat, boat.expects_guided and not boat.released
     boat.expects_guided = False
     if boat.heartbeat is None:
         return f"{name}: never heard; nothing was sent, see where it is"

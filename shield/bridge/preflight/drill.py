@@ -29,6 +29,8 @@ TURN_RAD = math.radians(60.0)
 TOP_SHARE = 0.6
 FASTEST_MPS = 1.5
 NEAR_M = 5.0
+SAME_MPS, SAME_RAD = 0.05, math.radians(1.0)
+"""Commands that differ by less are the same."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,15 @@ class DrillSample:
         time_s: of the turn.
         reading: of the boat.
         heading_rad, speed_mps: as sent; NaN when nothing was.
+        changed: whether something else than the drill's own command was decided: the shield gave way, a declared
+            response was due, or nothing could be decided.
     """
 
     time_s: float
     reading: BoatReading
     heading_rad: float
     speed_mps: float
+    changed: bool = False
 
 
 class Drill:
@@ -89,10 +94,23 @@ class Drill:
         reading, sent = tick.readings.get(boat), tick.sent.get(boat)
         if reading is not None:
             told = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
-            self.samples[boat].append(DrillSample(tick.began_s, reading, *told))
+            self.samples[boat].append(DrillSample(tick.began_s, reading, *told, self._is_changed(boat, tick, told)))
 
     def close(self) -> None:
         """Nothing is held."""
+
+    def _is_changed(self, boat: str, tick: Tick, told: tuple[float, float]) -> bool:
+        """Whether the tick's command is not the drill's; what the link made of it, such as a cap, does not count."""
+        if self._commands is None:
+            return True
+        speed, heading = self._commands.values[self._fleet.names.index(boat)]
+        if tick.decisions is not None and tick.fleet is not None and boat in tick.fleet.names:
+            i = tick.fleet.names.index(boat)
+            decided = tick.decisions.sent.absolute(i, tick.fleet.heading_rad[i])
+        else:
+            decided = told[1], told[0]
+        turned = abs((decided[1] - heading + math.pi) % (2.0 * math.pi) - math.pi)
+        return not (abs(decided[0] - speed) <= SAME_MPS and turned <= SAME_RAD)
 
     def _turn_of(self, time_s: float) -> tuple[str, float]:
         """Whose turn it is and for how long already, s; no name before and after."""

@@ -25,6 +25,10 @@ SPEED_MPS = 0.35
 LONGEST_DELAY_STEPS = 8
 LONGEST_DELAY_S = 0.6
 TURNED_DEG = 15.0
+LONG_ENOUGH_S = 3.0
+"""Only where a heading was told for so long it is judged whether the boat turned away from it."""
+MOST_CHANGED = 0.4
+"""Of a drill with a greater share of commands changed too little is left to judge."""
 
 
 def drill_checks(drill: Drill, platforms: dict[str, Platform], dt_s: float) -> list[Check]:
@@ -86,6 +90,14 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
     if len(told) < 5.0 / dt_s or not np.isfinite(measured).all():
         text = "commands or telemetry were missing during the drill; see the other checks, then run again"
         return CheckResult(name, False, text)
+    changed = float(np.mean([s.changed for s in told]))
+    stretches = _stretches(told, dt_s)
+    if changed > MOST_CHANGED or not stretches:
+        text = (
+            f"the drill was disturbed: {100.0 * changed:.0f} % of its commands were changed by the shield or a "
+            "declared response, too little is left to judge; clear the water, then run again"
+        )
+        return CheckResult(name, False, text, {"changed_share": changed})
     fits = [_fit(told, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
     fit = min(fits, key=lambda f: f.cost)
     delay_s = _delay_s([f.heading_deg**2 for f in fits], dt_s)
@@ -95,11 +107,16 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
         "speed_rms_mps": fit.speed_mps,
         "turn_rate_dps": fit.measured_dps,
         "turn_rate_foretold_dps": fit.foretold_dps,
+        "changed_share": changed,
     }
-    fault = _fault(fit, delay_s, measured, told, platform)
+    away = any(_turned_away(measured[part], told[part]) for part in stretches)
+    fault = _fault(fit, delay_s, measured, away, platform)
+    disturbed = f"; {100.0 * changed:.0f} % of its commands changed by the shield" if changed else ""
+    if fault and changed:
+        fault += f"{disturbed}: repeat it on clear water before you believe it"
     text = fault or (
         f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
-        f"effect after {delay_s:.2f} s"
+        f"effect after {delay_s:.2f} s{disturbed}"
     )
     return CheckResult(name, not fault, text, figures)
 
@@ -148,10 +165,10 @@ def _fastest_dps(headings_deg: Array, dt_s: float) -> float:
     return float(np.abs(_half_turn(headings_deg[apart:] - headings_deg[:-apart])).max()) / (apart * dt_s)
 
 
-def _fault(fit: _Fit, delay_s: float, measured: Array, told: Sequence[DrillSample], platform: Platform) -> str:
+def _fault(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Platform) -> str:
     if float(np.median(measured[:, 1])) < -0.2:
         return "it goes astern when told to go ahead; check the motors' direction"
-    if _turned_away(measured, told):
+    if away:
         return "it turns away from the heading it is told; check the steering's direction"
     if not fit.heading_deg <= HEADING_DEG:
         faster = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
@@ -169,11 +186,23 @@ def _fault(fit: _Fit, delay_s: float, measured: Array, told: Sequence[DrillSampl
     return ""
 
 
+def _stretches(told: Sequence[DrillSample], dt_s: float) -> list[slice]:
+    """Where the drill's own command to go one way was sent for long enough without a break."""
+    found, begin = [], 0
+    for i in range(len(told) + 1):
+        on = i < len(told) and not told[i].changed and told[i].speed_mps > 0.0
+        if on and (i == begin or _apart(told[i], told[begin]) <= TURNED_DEG):
+            continue
+        if (i - begin) * dt_s >= LONG_ENOUGH_S:
+            found.append(slice(begin, i))
+        begin = i if on else i + 1
+    return found
+
+
 def _turned_away(measured: Array, told: Sequence[DrillSample]) -> bool:
-    """Whether it ended farther from the heading told than it was when that was first told."""
-    turn = next((i for i in range(1, len(told)) if _apart(told[i], told[i - 1]) > TURNED_DEG), 0)
+    """Whether in a stretch it ended farther from the heading told than it began."""
     wanted = math.degrees(told[-1].heading_rad)
-    first, last = (abs(_half_turn(measured[i, 0] - wanted)) for i in (turn, -1))
+    first, last = (abs(_half_turn(measured[i, 0] - wanted)) for i in (0, -1))
     return bool(last > first + TURNED_DEG)
 
 

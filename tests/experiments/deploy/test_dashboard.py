@@ -223,6 +223,22 @@ def test_resuming_asks_first(controls):
     assert not operator.stopped
 
 
+def test_a_boat_is_taken_back_by_key_after_a_question(controls, caplog):
+    made, operator, press = controls
+    press("t")
+    assert "Its pilot must have let go" in made.menu()[0]
+    assert "red" not in made.menu()[1], "ours alone"
+    press("2")
+    assert "y: yes" in made.menu()[0]
+    press("n")
+    assert operator.take_requests() == ()
+    press("t2y")
+    ((boat, by),) = operator.take_requests()
+    assert (boat.startswith("blue"), by) == (True, "keyboard")
+    assert operator.take_requests() == ()
+    assert f"{boat}: to be taken back, asked for by keyboard" in caplog.text
+
+
 def test_q_ends_the_run(controls):
     _, operator, press = controls
     press("q")

@@ -5,19 +5,17 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
 import pytest
 from deploy_ticks import Stream
-from steerclear.experiments.deploy.demo import Demo, demo_file
 from steerclear.experiments.deploy.plain import PlainLines, logging_aside
-from steerclear.experiments.deploy.quiet import NICENESS, ended_by_signals, undisturbed
+from steerclear.experiments.deploy.quiet import LOOP_FIRST, NICENESS, OTHERS_FIRST, ended_by_signals, undisturbed
 from steerclear.experiments.deploy.tally import Tally
-from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
-from steerclear.shield.exceptions import BridgeError
 
 
 @pytest.fixture
@@ -72,26 +70,6 @@ def test_a_run_is_counted(ticks):
     assert Tally().figures()["ticks"] == 0.0
 
 
-def test_the_demonstrations_file_is_written_once_and_kept(tmp_path):
-    path = demo_file(tmp_path / "demo")
-    assert load_fleet(path).team == "blue"
-    path.write_text("changed")
-    assert demo_file(tmp_path / "demo").read_text() == "changed"
-    (tmp_path / "file").write_text("")
-    with pytest.raises(BridgeError, match="cannot write"):
-        demo_file(tmp_path / "file")
-
-
-def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path):
-    path = tmp_path / "FLEET.yaml"
-    path.write_text("version: 2")
-    with Demo(path, "medium") as demo:
-        with pytest.raises(BridgeError, match=r"ended: .*version"):
-            demo.wait(60.0)
-        processes = list(demo._processes.values())
-    assert all(process.poll() is not None for process in processes)
-
-
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
     operator, before = Operator(), signal.getsignal(getattr(signal, name))
@@ -103,12 +81,58 @@ def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
     assert signal.getsignal(getattr(signal, name)) == before
 
 
+def scheduled():
+    """Policy and priority of this thread, what it hands on left out."""
+    return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
+
+
+def may_go_first():
+    """Whether this system lets a program go before others."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
+    return True
+
+
 def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
-    before, nice = sys.getswitchinterval(), os.getpriority(os.PRIO_PROCESS, 0)
+    before, nice, plain = sys.getswitchinterval(), os.getpriority(os.PRIO_PROCESS, 0), scheduled()
+    question = "import os; print(os.nice(0), os.sched_getscheduler(0))"
     with undisturbed():
         assert sys.getswitchinterval() < before
         assert os.getpriority(os.PRIO_PROCESS, 0) in (nice, NICENESS)
-        told = subprocess.run(["nice"], capture_output=True, check=True, text=True).stdout
-        assert int(told) >= min(0, nice)
+        told = subprocess.run([sys.executable, "-c", question], capture_output=True, check=True, text=True).stdout
+        niceness, policy = map(int, told.split())
+        assert niceness >= min(0, nice)
+        assert policy & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
     assert sys.getswitchinterval() == pytest.approx(before)
     assert os.getpriority(os.PRIO_PROCESS, 0) == nice
+    assert scheduled() == plain
+
+
+@pytest.mark.skipif(not may_go_first(), reason="this system gives no program real-time priority")
+def test_the_loop_goes_before_all_other_programs_and_the_runners_threads_after_it():
+    seen, ends = [], threading.Event()
+
+    def look():
+        ends.wait(20.0)
+        seen.append(scheduled())
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    with undisturbed():
+        assert scheduled() == (os.SCHED_RR, LOOP_FIRST)
+        ends.set()
+        thread.join(20.0)
+    assert seen == [(os.SCHED_RR, OTHERS_FIRST)]
+
+
+def test_a_system_that_allows_nothing_is_no_fault(monkeypatch):
+    def refuse(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with undisturbed():
+        assert scheduled()[0] == os.SCHED_OTHER

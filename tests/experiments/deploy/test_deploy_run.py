@@ -144,30 +144,64 @@ def test_a_policy_that_does_not_load_is_said_before_anything_is_opened(fleet_fil
         deploy(orders_of(fleet_file, "no_such_policy"))
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("geofence:", "geofense:"),
-        ("    platform: heron\n", ""),
-        ("team: blue", "team: blue\nsigning: {key_file: my.key}"),
-        ("team: blue", "team: blue\npreset: chess"),
-        ("team: blue", "team: red"),
-        ("team: blue", "team: blue\ncoordination: per_boat"),
-        ("system_id: 1", "system_id: 0"),
-    ],
-)
+SECOND = """  - {name: blue_2, agent: agent_1, platform: heron, link: {kind: mavlink, address: "ADDRESS", system_id: 1}}
+  - {name: red_1, agent: agent_2, platform: heron, contact: feed}
+  - {name: red_2, agent: agent_3"""
+BAD = {
+    "unknown key": ("team: blue", "team: blue\ngeofense: {xmin_m: 0}", "did you mean 'geofence'"),
+    "two boats with one id": ("  - {name: red_1, agent: agent_1", SECOND, "have one system_id, 1"),
+    "missing platform": ("    platform: heron\n", "", "platform is missing"),
+    "no geofence": ("geofence: {xmin_m: -10, ymin_m: -10, xmax_m: 90, ymax_m: 50}\n", "", "geofence is missing"),
+    "key file readable by all": ("team: blue", "team: blue\nsigning: {key_file: my.key}", "chmod 600"),
+    "unknown rules": ("team: blue", "team: blue\npreset: chess", "chess"),
+    "nothing to command": ("team: blue", "team: red", "no boat of team red has a link"),
+    "no boat named": ("team: blue", "team: blue\ncoordination: per_boat", "--boat"),
+    "system id of nobody": ("system_id: 1", "system_id: 0", "1 to 255"),
+    "a feed that is no address": ("listen: ", "listen: x", "HOST:PORT"),
+}
+
+
+def one_line_and_exit_2(command, path, *more):
+    """What a command says, which is one line; it leaves with status 2."""
+    result = CliRunner().invoke(app, [command, str(path), *more])
+    assert result.exit_code == 2, result.output
+    (line,) = result.stderr.strip().splitlines()
+    return line
+
+
+@pytest.mark.parametrize("name", BAD)
 @pytest.mark.parametrize("command", ["deploy", "preflight"])
-def test_a_bad_file_is_one_line_and_exit_2(fleet_file, old, new, command):
+def test_a_bad_file_is_one_line_and_exit_2(fleet_file, name, command):
+    old, new, said = BAD[name]
     text = fleet_file.read_text()
     assert old in text
-    fleet_file.write_text(text.replace(old, new, 1))
+    address = load_fleet(fleet_file).boats[0].link.address
+    fleet_file.write_text(text.replace(old, new.replace("ADDRESS", address), 1))
     key = fleet_file.parent / "my.key"
     key.write_text("ab" * 32)
     os.chmod(key, 0o644)
-    result = CliRunner().invoke(app, [command, str(fleet_file)])
-    assert result.exit_code == 2, result.output
-    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert said in one_line_and_exit_2(command, fleet_file)
     assert stat.S_IMODE(key.stat().st_mode) == 0o644
+    assert not [*fleet_file.parent.rglob("*.mcap"), *fleet_file.parent.rglob("*.tlog")], "nothing was begun"
+
+
+@pytest.mark.parametrize("command", ["deploy", "preflight"])
+@pytest.mark.parametrize("kind", ["link", "feed"])
+def test_a_port_that_is_taken_is_one_line_and_exit_2(fleet_file, kind, command):
+    with taken(fleet_file, kind):
+        line = one_line_and_exit_2(command, fleet_file, "--wait", "0.5", "--no-tlog")
+    assert "in use" in line
+
+
+@pytest.mark.parametrize("name", ["unknown key", "key file readable by all", "no geofence"])
+def test_with_a_bad_file_nothing_is_sent_to_any_boat(fleet_file, boats, name):
+    old, new, _ = BAD[name]
+    (fleet_file.parent / "my.key").write_text("ab" * 32)
+    os.chmod(fleet_file.parent / "my.key", 0o644)
+    fleet_file.write_text(fleet_file.read_text().replace(old, new, 1))
+    one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
+    counts = boats.boats["blue_1"].autopilot.counts
+    assert counts["taken"] == counts["ignored"] == counts["refused"] == 0
 
 
 def test_every_key_of_the_json_is_documented(fleet_file, boats, tmp_path):

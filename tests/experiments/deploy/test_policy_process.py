@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 import time
 
@@ -231,13 +232,28 @@ def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path, fleet_of):
             process.offer(Snapshot(0, 0.0, np.zeros((2, 4))))
             time.sleep(0.05)
     """
-    runner = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)])
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    runner = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)], env={**os.environ, "TMPDIR": str(folder)}
+    )
     try:
         wait_until(lambda: note.exists() and note.read_text())
     finally:
         runner.send_signal(signal.SIGKILL)
         runner.wait()
     wait_until(lambda: not is_running(int(note.read_text())))
+    assert list(folder.iterdir()) == []
+
+
+def test_what_a_submission_leaves_in_temporary_files_goes_with_its_process(run, write_entry, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    process = run(write_entry("return 4", start="import tempfile; self.kept = tempfile.mkdtemp()"))
+    (folder,) = (tmp_path / "temporary").iterdir()
+    assert len(list(folder.iterdir())) >= 2, "its stage, and what it made itself"
+    process.close()
+    assert list((tmp_path / "temporary").iterdir()) == []
 
 
 def fleet_text():

@@ -247,10 +247,31 @@ def test_a_taken_over_boat_is_a_fault_once_with_a_text():
         assert wait_for(seen)
         assert faults["mode_changed"] == 1
         assert any("switched it to HOLD" in text for text in texts)
-        boat.mode = 15
-        assert wait_for(lambda: link.read().ready), "handed back, it obeys again"
         boat.armed = False
-        assert wait_for(lambda: "disarmed" in link.read().why_not)
+        assert wait_for(lambda: "it is in HOLD" in link.read().why_not)
+
+
+@pytest.mark.parametrize("taken", ["mode", "disarmed"])
+def test_a_boat_given_back_is_ours_again_only_when_it_is_prepared_again(taken):
+    with linked() as (boat, link):
+        link.read()
+        boat.mode, boat.armed = (0, True) if taken == "mode" else (15, False)
+        assert wait_for(lambda: not link.read().ready)
+        boat.mode, boat.armed = 15, True
+        assert wait_for(lambda: "given back" in link.read().why_not)
+        assert not wait_for(lambda: link.read().ready, 1.5), "never by itself"
+        link.prepare(20.0)
+        assert link.read().ready
+
+
+def test_a_boat_given_back_and_not_taken_is_left_alone_at_the_end():
+    with linked() as (boat, link):
+        boat.mode = 0
+        assert wait_for(lambda: not link.read().ready)
+        boat.mode = 15
+        assert wait_for(lambda: "given back" in link.read().why_not)
+        assert "left alone, armed in GUIDED" in link.close()
+        assert boat.mode == 15
 
 
 def test_a_changed_top_speed_is_used_at_once():

@@ -62,14 +62,15 @@ class Water:
             self.trails[i].append((row[L.X], row[L.Y]))
 
 
-def driven(boats=("blue_1",), **water):
-    """A drill that has been driven, and the water it was driven on."""
+def driven(boats=("blue_1",), bend=None, **water):
+    """A drill that has been driven, and the water it was driven on; ``bend(s into it, values)`` stands for a shield."""
     drill, water = Drill(FLEET, boats), Water(**water)
     for k in range(round(drill.seconds / DT_S) + 5):
         now = 50.0 + DT_S * k
         readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}
         drill.offer(Snapshot(k, now, water.seen()))
         values = drill.latest().commands.values
+        values = values if bend is None else bend(DT_S * k, values.copy())
         sent = {
             name: Sent(name, now, values[i][1], values[i][0], "fake", True) for i, name in enumerate(FLEET.names[:2])
         }
@@ -141,6 +142,51 @@ def test_steering_the_wrong_way_round_is_found():
     result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
     assert not result.passed
     assert "turns away from the heading it is told" in result.text
+
+
+def given_way(begin_s, end_s, turn_deg=160.0):
+    """Somebody comes near for a while: the shield turns the first boat away."""
+
+    def bend(into_s, values):
+        if begin_s <= into_s < end_s:
+            values[0] = 1.2, (values[0][1] + math.radians(turn_deg)) % (2 * math.pi)
+        return values
+
+    return bend
+
+
+@pytest.mark.parametrize("when_s", [(4.0, 6.0), (12.0, 14.9), (13.5, 19.9), (18.0, 20.0)])
+@pytest.mark.parametrize("turn_deg", [160.0, -160.0])
+def test_a_boat_that_gave_way_to_another_is_not_taken_to_steer_the_wrong_way_round(when_s, turn_deg):
+    drill, _ = driven(bend=given_way(*when_s, turn_deg), noise=0.01)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert result.passed, result.text
+    share = (when_s[1] - when_s[0]) / EACH_S
+    assert result.figures["changed_share"] == pytest.approx(share, abs=0.02)
+    assert "% of its commands changed by the shield" in result.text
+
+
+def test_steering_the_wrong_way_round_is_found_between_disturbances_and_so_said():
+    drill, _ = driven(bend=given_way(5.0, 7.0), reverse=True)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert not result.passed
+    assert "turns away from the heading it is told" in result.text
+    assert "repeat it on clear water before you believe it" in result.text
+
+
+@pytest.mark.parametrize("when_s", [(0.0, 20.0), (3.0, 13.0)])
+def test_a_drill_that_others_disturbed_must_be_repeated(when_s):
+    drill, _ = driven(bend=given_way(*when_s))
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert not result.passed
+    assert "the drill was disturbed" in result.text
+    assert "clear the water, then run again" in result.text
+
+
+def test_a_link_that_caps_the_speed_is_no_disturbance():
+    drill, _ = driven()
+    samples = [replace(s, speed_mps=min(s.speed_mps, 1.0)) for s in drill.samples["blue_1"]]
+    assert not any(sample.changed for sample in samples)
 
 
 def test_a_compass_that_is_off_is_found():
