@@ -45,11 +45,11 @@ def decide_games(
 ) -> None:
     """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
 
-    ``lifted`` (B, k) says which of the last k circles of ``fixed`` do not count in a game.
+    ``lifted`` (B, k) says which of the last k obstacle circles of ``fixed`` do not count in a game.
     """
     n = state.shape[1]
     circles = fixed.circles.copy()
-    standing = Fixed(fixed.field, circles, fixed.segments, fixed.segment_m)
+    standing = Fixed(fixed.field, fixed.keep_out, circles, fixed.segments, fixed.segment_m)
     first = circles.shape[0] - lifted.shape[1]
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
@@ -117,7 +117,7 @@ class BatchedShield:
         n = len(platforms)
         self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
         self._fixed = surroundings.pack(config)
-        self._lifted = np.zeros((games, len(surroundings.keep_out)), np.bool_)
+        self._lifted = np.zeros((games, len(surroundings.stops)), np.bool_)
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
         self._work = new_work(n, int(self._boats.hunt_samples.max()))
@@ -143,7 +143,7 @@ class BatchedShield:
             state: (B, n, N_STATE) boat states.
             wanted: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
-            lifted: (B, k) which of the surroundings' k keep-out circles do not count; None: all count.
+            lifted: (B, k) which of the surroundings' k ``stops`` do not count; None: all count.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and safe ones, bit for bit as wanted. The array is
@@ -186,7 +186,7 @@ class BatchedShield:
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
 
-        A keep-out circle in the surroundings is taken as that of the team's own flag, and counts while the flag is
+        A circle in the surroundings' ``stops`` is taken as that of the team's own flag, and counts while the flag is
         home.
 
         Args:

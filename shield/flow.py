@@ -365,9 +365,9 @@ def ladder(
         work.target[i] = 0.0
         hold(i, plan.held, work)
         look = max(look, boats.look[i])
-    run_opponents(look, ours, state, boats, tuning, work)
+    run_opponents(look, ours, state, boats, tuning, work, work.ways)
     good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
-    run_opponents(1, ours, state, boats, tuning, work)
+    run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for m in range(count):
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)

@@ -20,8 +20,7 @@ import math
 
 from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .certificates.hunters import clear_of_hunter, hunts
-from .certificates.manoeuvre import clear_of_boat
-from .certificates.surroundings import clear_of_edge, clear_of_obstacles
+from .certificates.manoeuvre import clear_of_boat, clear_of_obstacles_by, clear_of_rules_by
 from .certificates.values import WAYS, looked_up, table_slope
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
@@ -36,7 +35,10 @@ SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 
 PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
-"""Classes of rows, in the order in which they give way last: boats, fixed things, and limits (never)."""
+"""Classes of rows: boats and obstacles give way last, what is kept by rule before them, limits never."""
+
+NOBODY = -1
+"""Neighbour of a row that is not about a boat."""
 
 
 @kernel
@@ -189,6 +191,20 @@ def _table_row(
 
 
 @kernel
+def _fixed_row(
+    i: int, m: int, tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int
+) -> bool:
+    """Row of boat i (mover m) about the clearance from fixed things in ``work.out``."""
+    if work.out[MARGIN] >= FAR:
+        return False
+    lack = AIM_M - work.out[MARGIN]
+    C[r, :] = 0.0
+    at, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
+    _add_effect(C, r, i, 1.0, at, nx, ny, work.path[i], 2 * m, gain, work)
+    return not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now)
+
+
+@kernel
 def _out_of_reach(C: Array, r: int, lack: float, tuning: Tuning) -> bool:
     """Whether no inputs within their limits could violate row r: the margin exceeds all they can take from it."""
     root = math.sqrt(tuning.speed_weight)
@@ -255,19 +271,14 @@ def build_rows(
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
-        for kind_of in (PAIR_ROW, FIXED_ROW):
-            if kind_of == FIXED_ROW:
-                clear_of_edge(work.path[i], boats.static_samples[i], fixed.field, work.out)
-            else:
-                clear_of_obstacles(work.path[i], boats.samples[i], boats.fastest_mps[i]*boats.sample_s, fixed.circles, fixed.segments, fixed.segment_m, work.out)
-            if work.out[MARGIN] < FAR:
-                C[r, :] = 0.0
-                k = work.out[SAMPLE]
-                _add_effect(C, r, i, 1.0, k, work.out[NORMAL_X], work.out[NORMAL_Y], work.path[i], 2 * m, gain, work)
-                lack = AIM_M - work.out[MARGIN]
-                if not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now):
-                    kind[r], label[r, 0], label[r, 1] = kind_of, i, -1
-                    r += 1
+        clear_of_obstacles_by(i, i, boats, fixed, work, work.out)
+        if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
+            kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, NOBODY
+            r += 1
+        clear_of_rules_by(i, i, boats, fixed, work, work.out)
+        if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
+            kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, NOBODY
+            r += 1
     end = _box_rows(movers, tuning, C, d, r)
     kind[r:end] = BOX_ROW
     label[r:end, :] = -1

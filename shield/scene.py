@@ -40,6 +40,7 @@ class Boats(NamedTuple):
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
         table_margin_m: added to the radius where a table is looked into, m.
         look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
+        joint_look: the same for boats that several opponents come near to.
         feared: whether some boat's table is about this boat, (n,).
     """
 
@@ -63,6 +64,7 @@ class Boats(NamedTuple):
     table: IntArray
     table_margin_m: float
     look: IntArray
+    joint_look: int
     feared: BoolArray
 
 
@@ -71,12 +73,14 @@ class Fixed(NamedTuple):
 
     Attributes:
         field: (xmin, ymin, xmax, ymax), m; infinite where there is no edge.
-        circles: (c, 3): centre x, y and radius, m.
+        keep_out: (k, 3) circles kept by rule: centre x, y and radius, m.
+        circles: (c, 3) the same of obstacles.
         segments: (s, 4): ends x0, y0, x1, y1, m.
         segment_m: distance to keep from segments, m.
     """
 
     field: Array
+    keep_out: Array
     circles: Array
     segments: Array
     segment_m: float
@@ -146,6 +150,9 @@ class Work(NamedTuple):
         ways: (n, 3, 5) places opponents may be at when tables are looked into, see `certificates.values`.
         place: (n + 1, 5) place at which the boat itself is looked up.
         sealed: (n + 1,) whether a table alone made the plan fail.
+        beset: (n,) boats that several opponents can come near to, see `certificates.values`.
+        later: (n + 1, 5) place at which such a boat is looked up.
+        ways_later: (n, 3, 5) places opponents may be at by then.
         nobody: (n,) False.
     """
 
@@ -169,6 +176,9 @@ class Work(NamedTuple):
     ways: Array
     place: Array
     sealed: BoolArray
+    beset: BoolArray
+    later: Array
+    ways_later: Array
     nobody: BoolArray
 
 
@@ -201,5 +211,8 @@ def new_work(boats: int, samples: int) -> Work:
         ways=np.zeros((boats, 3, 5)),
         place=np.zeros((boats + 1, 5)),
         sealed=np.zeros(boats + 1, np.bool_),
+        beset=np.zeros(boats, np.bool_),
+        later=np.zeros((boats + 1, 5)),
+        ways_later=np.zeros((boats, 3, 5)),
         nobody=np.zeros(boats, np.bool_),
     )

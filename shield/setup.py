@@ -28,6 +28,9 @@ _LOG = logging.getLogger(__name__)
 FADE = 4.0
 """A negative margin against a hunter at the end of the time it is followed counts exp(-FADE) of one now."""
 
+JOINT_LOOK_S = 2.0
+"""Time after which a boat that several opponents come near to is looked up against all of them, s."""
+
 STATIC_REACTION_S = 0.5
 """Time beyond a half turn over which fixed things are looked at, s."""
 
@@ -98,6 +101,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         table=looked.table,
         table_margin_m=config.table_margin_m,
         look=np.where(with_table, looked.steps, 0),
+        joint_look=max(1, looked.steps, round(JOINT_LOOK_S / config.dt_s)),
         feared=np.asarray((looked.table >= 0).any(axis=0)),
     )
 

@@ -1,4 +1,8 @@
-"""`Surroundings`: field edge, obstacles and keep-out circles the boats stay clear of, softer than boats."""
+"""`Surroundings`: field edge, obstacles and keep-out circles the boats stay clear of.
+
+They all give way to keeping clear of boats. Obstacles stop a boat, and one that is stopped cannot get away: they come
+before what hunting opponents may do. Edge and keep-out circles are rules, and come after it.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,9 @@ class Surroundings:
         field: (xmin, ymin, xmax, ymax) to stay inside, or None.
         circles: (x, y, radius) of round obstacles.
         polygons: corner lists of polygonal obstacles.
-        keep_out: (x, y, radius) the boat's centre stays out of, such as the own flag's circle.
+        keep_out: (x, y, radius) the boat's centre stays out of, by rule.
+        stops: (x, y, radius) at which the boat's centre is stopped, such as the own flag's circle in the games: an
+            obstacle without a hull.
 
     Raises:
         ConfigError: a value is not finite, a radius negative, a polygon has fewer than three corners, or the field
@@ -34,16 +40,17 @@ class Surroundings:
     circles: Sequence[tuple[float, float, float]] = ()
     polygons: Sequence[Sequence[Point]] = ()
     keep_out: Sequence[tuple[float, float, float]] = ()
+    stops: Sequence[tuple[float, float, float]] = ()
 
     def __post_init__(self) -> None:
         if self.field is not None:
             object.__setattr__(self, "field", _numbers("field", self.field, "(xmin, ymin, xmax, ymax)"))
-        for name in ("circles", "keep_out"):
+        for name in ("circles", "keep_out", "stops"):
             rows = tuple(_numbers(name, row, "(x, y, radius)") for row in getattr(self, name))
             object.__setattr__(self, name, rows)
         corners = tuple(tuple(_numbers("polygons", corner, "(x, y)") for corner in line) for line in self.polygons)
         object.__setattr__(self, "polygons", corners)
-        if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out)):
+        if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out, *self.stops)):
             raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
         if any(len(polygon) < 3 for polygon in self.polygons):
             raise ConfigError("a polygon has fewer than three corners")
@@ -55,10 +62,11 @@ class Surroundings:
         edge = np.array([-np.inf, -np.inf, np.inf, np.inf])
         if self.field is not None and config.edge_m is not None:
             edge = np.array(self.field) + config.edge_m * np.array([1.0, 1.0, -1.0, -1.0])
-        circles = [(x, y, r + config.hull_m) for x, y, r in self.circles] + list(self.keep_out)
+        circles = [(x, y, r + config.hull_m) for x, y, r in self.circles] + list(self.stops)
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return Fixed(
             field=edge.astype(np.float64),
+            keep_out=np.array(self.keep_out, dtype=np.float64).reshape(-1, 3),
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
             segment_m=config.hull_m,

@@ -11,8 +11,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf, CommandFilter
 from steerclear.policies import make_batch
 from steerclear.shield import ShieldConfig
-from steerclear.shield.batch import BatchedShield
-from steerclear.shield.wrappers.mctf import surroundings_of
+from steerclear.shield.wrappers import games_shield
 
 from .timing import memory_mib
 
@@ -27,12 +26,6 @@ class BatchSize:
     games: int = 512
     steps: int = 100
     repeats: int = 5
-
-
-def batched_shield(core: BatchedMctf, config: ShieldConfig) -> BatchedShield:
-    """Build the blue team's shield for a batch of games."""
-    around = surroundings_of(core, 0)
-    return BatchedShield(config, core.n_games, core.config.platforms, tuple(core.team.tolist()), around)
 
 
 def steps_per_s(
@@ -54,7 +47,7 @@ def steps_per_s(
     teams = [make_batch(policy), make_batch(policy)]
     for number, team in enumerate(teams):
         team.reset(core, number, seed + number)
-    command_filter = None if shield is None else batched_shield(core, shield).filter_for(0)
+    command_filter = None if shield is None else games_shield(core, shield).filter_for(0)
     _time_steps(core, teams, SPREAD_STEPS, command_filter)  # compiles, too
     rates = [
         size.games * size.steps / _time_steps(core, teams, size.steps, command_filter) for _ in range(size.repeats)
@@ -78,10 +71,10 @@ def _time_steps(core: BatchedMctf, teams: list[Any], steps: int, command_filter:
 def batch_memory(preset: str, games: int, shield: ShieldConfig) -> dict[str, Any]:
     """Memory of that many games with observations and rewards, and of one team's shield for them, MiB."""
     small = BatchedMctf(preset, 1, 0)  # compiles: that memory belongs to no game
-    batched_shield(small, shield)
+    games_shield(small, shield)
     core = BatchedMctf(preset, games, 0)
     return {
         "games": games,
         "games_mib": memory_mib(lambda: BatchedMctf(preset, games, 0)),
-        "shield_mib": memory_mib(lambda: batched_shield(core, shield)),
+        "shield_mib": memory_mib(lambda: games_shield(core, shield)),
     }

@@ -9,7 +9,7 @@ import numpy as np
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
-from .manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, lay_path, rate_path
+from .manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, lay_path, most_merit, rate_path, run_out, set_out
 from .paths import angle_to_go
 
 COMMANDED = -1.0
@@ -31,6 +31,7 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
     work.path[i] = work.path[slot]
     work.place[i] = work.place[slot]
     work.sealed[i] = work.sealed[slot]
+    work.later[i] = work.later[slot]
     work.clear[i] = work.clear[slot]
     work.fixed[i] = work.fixed[slot]
     work.bound[i] = work.bound[slot]
@@ -111,11 +112,15 @@ def choose_plan(
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
+    compared = boats.look[i] > 0 and (done == 0 or work.beset[i])  # else the tables say the same of all manoeuvres
     for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
-        lay_path(i, trial, side, togo, speed, done, state, boats, tuning, work)
+        set_out(i, trial, side, togo, speed, done, state, boats, tuning, work)
+        if compared and most_merit(i, trial, ours, boats, work) <= best:
+            continue
+        run_out(i, trial, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
         kept_merit = merit + preference(i, p, side, togo, merit, boats, tuning, memory)
         if kept_merit > best:

@@ -9,7 +9,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN
 from .pursuer import clear_of_pursuer
-from .values import looked_up, table_margin
+from .values import looked_up, worst_by_table
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
@@ -105,7 +105,8 @@ def worst_hunter(
 ) -> None:
     """Lower the clearance in ``slot`` to that from hunting opponents where it is worse.
 
-    ``work.sealed[slot]`` says whether a table had the last word: then no other manoeuvre changes it.
+    ``work.sealed[slot]`` says whether a table had the last word on where the boat is one step on: then no other
+    manoeuvre changes it.
     """
     clear = work.clear[slot]
     for j in range(state.shape[0]):
@@ -114,12 +115,12 @@ def worst_hunter(
         if work.breach[i, j]:
             continue
         if looked_up(i, j, slot, ours, boats, work):
-            margin = table_margin(i, j, slot, boats, work)
+            margin = worst_by_table(i, j, slot, boats, work)
             if margin < clear[MARGIN]:
                 clear[MARGIN] = margin
                 work.bound[slot] = j
                 if margin < floor_m:
-                    work.sealed[slot] = True
+                    work.sealed[slot] = not work.beset[i]
                     return
             continue
         # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before

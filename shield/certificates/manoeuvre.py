@@ -20,8 +20,8 @@ from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing, worst_hunter
 from .paths import trace_path
-from .surroundings import clear_of_edge, clear_of_obstacles
-from .values import looked_up, run_opponents, set_place
+from .surroundings import clear_of_obstacles, clear_of_rules
+from .values import find_beset, looked_up, run_opponents, set_place, worst_by_tables
 
 PAIR_SAFE = 1e3
 """Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
@@ -58,7 +58,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
     n = state.shape[0]
-    run_opponents(1, ours, state, boats, tuning, work)
+    run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for i in range(n):
         work.hunted[i] = False
         heading = math.radians(state[i, L.HEADING])
@@ -89,6 +89,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
                 work.breach[j, i] = now < least
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
+    find_beset(ours, state, boats, tuning, work)
 
 
 @kernel
@@ -204,17 +205,18 @@ def worst_clearance(
 
 
 @kernel
-def obstacles_of(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work) -> None:
-    """Clearance of boat i on the path in ``slot`` from obstacles, into ``work.fixed[slot]``."""
-    clear_of_obstacles(
-        work.path[slot],
-        boats.samples[i],
-        boats.fastest_mps[i] * boats.sample_s,
-        fixed.circles,
-        fixed.segments,
-        fixed.segment_m,
-        work.fixed[slot],
-    )
+def clear_of_obstacles_by(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
+    """Clearance row of boat i on the path in ``slot`` from obstacles."""
+    way_m = boats.fastest_mps[i] * boats.sample_s
+    clear_of_obstacles(work.path[slot], boats.samples[i], way_m, fixed.circles, fixed.segments, fixed.segment_m, out)
+
+
+@kernel
+def clear_of_rules_by(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
+    """Clearance row of boat i on the path in ``slot`` from what is kept by rule."""
+    way_m = boats.fastest_mps[i] * boats.sample_s
+    near = boats.static_samples[i]
+    clear_of_rules(work.path[slot], near, boats.samples[i], fixed.field, fixed.keep_out, way_m, out)
 
 
 @kernel
@@ -232,8 +234,8 @@ def rate_path(
     """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
     What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
-    first, of hunting opponents second, of fixed things third, room to spare last. Below `STRAIGHT_SAFE` the merit is
-    the margin itself, m.
+    first, of obstacles second, of hunting opponents third; then what is kept by rule, and last room to spare. Of a
+    manoeuvre that fails at the first the merit is the margin itself, m.
     """
     target = work.target[i]
     clear = work.clear[slot]
@@ -243,7 +245,7 @@ def rate_path(
     work.fixed[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
-    obstacles_of(i, slot, boats, fixed, work)
+    clear_of_obstacles_by(i, slot, boats, fixed, work, work.fixed[slot])
     if work.fixed[slot, MARGIN] < 0.0:
         return OBSTACLE_BASE + max(-OBSTACLE_BASE, work.fixed[slot, MARGIN])
     floor = -FAR
@@ -255,7 +257,7 @@ def rate_path(
         worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if clear[MARGIN] < target:
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
-    clear_of_edge(work.path[slot], boats.static_samples[i], fixed.field, work.out)
+    clear_of_rules_by(i, slot, boats, fixed, work, work.out)
     if work.out[MARGIN] < work.fixed[slot, MARGIN]:
         work.fixed[slot] = work.out
     spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
@@ -276,6 +278,41 @@ def _runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
 
 
 @kernel
+def set_out(
+    i: int,
+    slot: int,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    done: int,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+) -> None:
+    """Write a manoeuvre of boat i into ``slot`` and where its opponents are looked up for it."""
+    work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
+    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+
+
+@kernel
+def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
+    """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
+    margin = worst_by_tables(i, slot, ours, boats, work)
+    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if margin < work.target[i] else 2.0 * PAIR_SAFE
+
+
+@kernel
+def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
+    samples = boats.hunt_samples[i] if _runs_hunters(i, slot, boats, work) else boats.samples[i]
+    side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
+    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    path = work.path[slot]
+    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
+
+
+@kernel
 def lay_path(
     i: int,
     slot: int,
@@ -289,9 +326,5 @@ def lay_path(
     work: Work,
 ) -> None:
     """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
-    work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
-    path = work.path[slot]
-    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
-    samples = boats.hunt_samples[i] if _runs_hunters(i, slot, boats, work) else boats.samples[i]
-    work.row[:] = work.next_state[i] if done == 1 else state[i]
-    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
+    set_out(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+    run_out(i, slot, done, state, boats, tuning, work)

@@ -1,4 +1,8 @@
-"""Things that do not move: field edge, obstacles, keep-out circles."""
+"""Things that do not move: obstacles, which stop a boat, and field edge and keep-out circles, which are rules.
+
+Samples of a path that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times
+the way the boat goes from sample to sample.
+"""
 
 from __future__ import annotations
 
@@ -21,21 +25,6 @@ def _edges(x: float, y: float, k: int, field: Array, out: Array) -> None:
     _lower(out, y - field[1], k, 0.0, 1.0)
     _lower(out, field[2] - x, k, -1.0, 0.0)
     _lower(out, field[3] - y, k, 0.0, -1.0)
-
-
-@kernel
-def clear_of_edge(path: Array, samples: int, field: Array, out: Array) -> None:
-    """Least clearance, m, of a path from the field edge.
-
-    Args:
-        path: positions, m, shape (>= samples + 1, 2).
-        samples: last sample that counts: until a half turn could be over, since every straight run ends beyond it.
-        field: (xmin, ymin, xmax, ymax), m.
-        out: clearance row.
-    """
-    out[MARGIN] = FAR
-    for k in range(samples + 1):
-        _edges(path[k, 0], path[k, 1], k, field, out)
 
 
 @kernel
@@ -64,13 +53,40 @@ def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[floa
 
 
 @kernel
+def clear_of_rules(
+    path: Array, near_samples: int, samples: int, field: Array, keep_out: Array, way_m: float, out: Array
+) -> None:
+    """Least clearance, m, of a path from the field edge and from circles kept by rule.
+
+    The edge is looked at only until a half turn could be over, since every straight run ends beyond it.
+
+    Args:
+        path: positions, m, shape (>= samples + 1, 2).
+        near_samples: last sample at which the edge counts.
+        samples: last sample.
+        field: (xmin, ymin, xmax, ymax), m.
+        keep_out: shape (k, 3): centre x, y and radius, m.
+        way_m: most the boat moves from sample to sample, m.
+        out: clearance row.
+    """
+    out[MARGIN] = FAR
+    for k in range(near_samples + 1):
+        _edges(path[k, 0], path[k, 1], k, field, out)
+    for c in range(keep_out.shape[0]):
+        k = 0
+        while k <= samples:
+            margin, nx, ny = _to_circle(path[k, 0], path[k, 1], keep_out[c])
+            _lower(out, margin, k, nx, ny)
+            k += max(1, int((margin - out[MARGIN]) / way_m))
+
+
+@kernel
 def clear_of_obstacles(
     path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
 
     A boat that is already too near to one only has to come no nearer: its clearance there counts from where it is.
-    Samples that cannot lower the clearance are skipped: in m samples it shrinks by at most m * ``way_m``.
 
     Args:
         path: positions, m, shape (>= samples + 1, 2).

@@ -44,8 +44,10 @@ def _note_place(params: Array, row: Array, place: Array) -> None:
 
 
 @kernel
-def run_opponents(steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
-    """Write where the opponents that tables are looked up for may be after some steps: ``work.ways`` (n, WAYS, 5)."""
+def run_opponents(
+    steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work, ways: Array
+) -> None:
+    """Write where the opponents that tables are looked up for may be after some steps: ``ways`` (n, WAYS, 5)."""
     for j in range(state.shape[0]):
         if ours[j] or not boats.feared[j]:
             continue
@@ -57,7 +59,31 @@ def run_opponents(steps: int, ours: BoolArray, state: Array, boats: Boats, tunin
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(steps):
                 actuate(params, work.row, speed, turn, tuning.dt_s)
-            _note_place(params, work.row, work.ways[j, way])
+            _note_place(params, work.row, ways[j, way])
+
+
+@kernel
+def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Mark the boats of ours that more than one opponent can come near to, as far as the tables tell.
+
+    Each table knows of one opponent only: two may each leave a way out, and not the same. Such a boat is looked up
+    some time into its manoeuvre, against all of them at that place: then one manoeuvre has to do for all.
+    """
+    n = state.shape[0]
+    some = False
+    for i in range(n):
+        work.beset[i] = False
+        if not ours[i] or boats.look[i] == 0:
+            continue
+        _note_place(boats.params[i], state[i], work.place[i])
+        count = 0
+        for j in range(n):
+            if j != i and work.near[i, j] and looked_up(i, j, i, ours, boats, work):
+                count += 1 if table_margin(i, j, work.place[i], work.ways[j], boats, work) < FAR else 0
+        work.beset[i] = count > 1
+        some = some or count > 1
+    if some:
+        run_opponents(boats.joint_look + 1, ours, state, boats, tuning, work, work.ways_later)
 
 
 @kernel
@@ -76,17 +102,21 @@ def set_place(
     """Write where boat i is looked up for the manoeuvre in ``slot``.
 
     That is its predicted state (done = 1), the same for every manoeuvre, or where it is ``boats.look`` steps into the
-    manoeuvre (done = 0): within one step manoeuvres hardly differ.
+    manoeuvre (done = 0): within one step manoeuvres hardly differ. Where it is ``boats.joint_look`` steps after that
+    of one step from now is written, too, when the boat is beset.
     """
     if boats.look[i] == 0:
         return
-    if done == 1:
-        _note_place(boats.params[i], work.next_state[i], work.place[slot])
-        return
-    work.row[:] = state[i]
-    for _ in range(boats.look[i]):
+    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    first = 0 if done == 1 else boats.look[i]
+    for _ in range(first):
         togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
     _note_place(boats.params[i], work.row, work.place[slot])
+    if not work.beset[i]:
+        return
+    for _ in range(boats.joint_look + 1 - done - first):
+        togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
+    _note_place(boats.params[i], work.row, work.later[slot])
 
 
 @kernel
@@ -99,12 +129,12 @@ def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Wo
 
 
 @kernel
-def table_margin(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
-    """Margin of boat i at the place in ``slot`` against the worst opponent j can do, m; `FAR` beyond the table."""
-    table, own = boats.table[i, j], work.place[slot]
+def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: Work) -> float:
+    """Margin of boat i at a place against opponent j at the worst of several, m; `FAR` beyond the table."""
+    table = boats.table[i, j]
     least = FAR
-    for way in range(WAYS):
-        other = work.ways[j, way]
+    for way in range(others.shape[0]):
+        other = others[way]
         value = table_value(
             boats.tables,
             table,
@@ -119,6 +149,24 @@ def table_margin(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
     if least >= boats.tables.axes[table, CAP] - 1e-9:
         return FAR
     return least - work.radius[i, j] - boats.table_margin_m
+
+
+@kernel
+def worst_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """Margin of boat i on the manoeuvre in ``slot`` against the worst opponent j can do, m."""
+    if work.beset[i]:
+        return table_margin(i, j, work.later[slot], work.ways_later[j], boats, work)
+    return table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+
+
+@kernel
+def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
+    """The least of the margins of boat i on the manoeuvre in ``slot`` against opponents that are looked up, m."""
+    least = FAR
+    for j in range(ours.shape[0]):
+        if j != i and work.near[i, j] and looked_up(i, j, slot, ours, boats, work):
+            least = min(least, worst_by_table(i, j, slot, boats, work))
+    return least
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .games_shield import games_shield
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
 from .team_batch import TeamBatch
@@ -12,7 +13,14 @@ from .vector_gym import MctfVectorEnv
 if TYPE_CHECKING:
     from .vector_sb3 import MctfVecEnv as MctfVecEnv
 
-__all__ = ["MctfVectorEnv", "ShieldedCallable", "ShieldedParallelEnv", "ShieldedTeamPolicy", "TeamBatch"]
+__all__ = [
+    "MctfVectorEnv",
+    "ShieldedCallable",
+    "ShieldedParallelEnv",
+    "ShieldedTeamPolicy",
+    "TeamBatch",
+    "games_shield",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -44,7 +44,7 @@ class MctfReader:
 
 
 def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings:
-    """Fixed things of a `BatchedMctf`: field edge, obstacles, and with ``keep_out`` the circle of the team's own flag."""
+    """Fixed things of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle."""
     return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), keep_out)
 
 
@@ -52,7 +52,7 @@ def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings
 def _surroundings_cached(
     size: tuple[float, float], circles: tuple[Any, ...], polygons: tuple[Any, ...], keep_out: tuple[Any, ...]
 ) -> Surroundings:
-    return Surroundings((0.0, 0.0, size[0], size[1]), circles, polygons, keep_out)
+    return Surroundings((0.0, 0.0, size[0], size[1]), circles, polygons, stops=keep_out)
 
 
 def _surroundings(config: Any, size: Any, flag: tuple[float, float], home: bool) -> Surroundings:

@@ -73,7 +73,7 @@ class PyquaticusReader:
         if keep_out and not flag.taken:
             radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
-        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle)
+        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), stops=circle)
 
 
 def _team(player: Any) -> int:

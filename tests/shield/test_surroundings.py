@@ -24,6 +24,8 @@ TRIANGLE = [(0.0, 0.0), (4.0, 0.0), (2.0, 3.0)]
         ({"circles": [(0, 0, math.nan)]}, "circles holds a value that is not finite"),
         ({"circles": [3.0]}, "circles holds"),
         ({"keep_out": [(0, 0, -0.1)]}, "negative radius"),
+        ({"stops": [(0, 0)]}, "stops holds"),
+        ({"stops": [(0, 0, -0.1)]}, "negative radius"),
         ({"keep_out": [(0, math.inf, 1)]}, "keep_out holds a value that is not finite"),
         ({"polygons": [TRIANGLE[:2]]}, "fewer than three corners"),
         ({"polygons": [[*TRIANGLE[:2], (math.nan, 0.0)]]}, "polygons holds a value that is not finite"),
@@ -47,11 +49,12 @@ def test_lists_and_arrays_will_do():
 
 
 def test_packing_widens_by_the_distances_of_the_settings():
-    fixed = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)]).pack(
+    fixed = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)], [(7, 7, 3)]).pack(
         ShieldConfig(edge_m=0.5, hull_m=1.5)
     )
     assert fixed.field.tolist() == [0.5, 0.5, 39.5, 19.5]
-    assert fixed.circles.tolist() == [[1.0, 2.0, 4.5], [5.0, 5.0, 2.0]]
+    assert fixed.circles.tolist() == [[1.0, 2.0, 4.5], [7.0, 7.0, 3.0]]  # a circle that stops boats has no hull
+    assert fixed.keep_out.tolist() == [[5.0, 5.0, 2.0]]
     assert fixed.segments.shape == (3, 4)
     assert fixed.segment_m == 1.5
 

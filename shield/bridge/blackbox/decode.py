@@ -118,8 +118,8 @@ def _column(rows: list[dict[str, Any]], name: str, kind: Callable[[Any], Any]) -
 
 def _surroundings(row: Mapping[str, Any]) -> Surroundings:
     circles = {
-        name: [(entry["x_m"], entry["y_m"], entry["radius_m"]) for entry in row[name]]
-        for name in ("circles", "keep_out")
+        name: [(entry["x_m"], entry["y_m"], entry["radius_m"]) for entry in row.get(name, ())]
+        for name in ("circles", "keep_out", "stops")
     }
     polygons = [list(zip(line["x_m"], line["y_m"], strict=True)) for line in row["polygons"]]
     return Surroundings(field=tuple(row["field"]) or None, polygons=polygons, **circles)

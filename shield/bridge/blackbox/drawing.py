@@ -75,7 +75,7 @@ def field_of(header: LogHeader, surroundings: Surroundings | None, time_ns: int)
         lines.append(fg.outline(_corners(*fixed.field), _CHANGED))
     discs = [
         fg.disc(fg.pose(x_m, y_m), max(radius_m, 0.01), {**_FIXED, "a": 0.3})
-        for x_m, y_m, radius_m in (*fixed.circles, *fixed.keep_out)
+        for x_m, y_m, radius_m in (*fixed.circles, *fixed.keep_out, *fixed.stops)
     ]
     return fg.scene_update([fg.entity(time_ns, "field", lines=lines, cylinders=discs)])
 

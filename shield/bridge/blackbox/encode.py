@@ -95,7 +95,7 @@ def _platform(kind: str | Platform, known: Mapping[str, Platform]) -> str:
 def _surroundings(fixed: Surroundings) -> dict[str, Any]:
     circles = {
         name: [{"x_m": x, "y_m": y, "radius_m": radius} for x, y, radius in getattr(fixed, name)]
-        for name in ("circles", "keep_out")
+        for name in ("circles", "keep_out", "stops")
     }
     polygons = [{"x_m": [x for x, _ in line], "y_m": [y for _, y in line]} for line in fixed.polygons]
     return {"field": list(fixed.field or ()), **circles, "polygons": polygons}

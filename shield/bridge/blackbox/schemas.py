@@ -104,6 +104,7 @@ TICK = named(
                 field=many(NUMBER, "xmin, ymin, xmax, ymax, m"),
                 circles=many(_CIRCLE),
                 keep_out=many(_CIRCLE),
+                stops=many(_CIRCLE),
                 polygons=many(record("corners", x_m=many(NUMBER), y_m=many(NUMBER))),
             )
         ),

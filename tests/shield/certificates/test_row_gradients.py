@@ -6,8 +6,12 @@ from shield_loops import fill, packed
 from stages import built, screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings, flow, rows
 from steerclear.shield.certificates.clearance import FAR, MARGIN
-from steerclear.shield.certificates.manoeuvre import clear_of_boat, lay_path
-from steerclear.shield.certificates.surroundings import clear_of_surroundings
+from steerclear.shield.certificates.manoeuvre import (
+    clear_of_boat,
+    clear_of_obstacles_by,
+    clear_of_rules_by,
+    lay_path,
+)
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -56,11 +60,12 @@ class Linearised:
         at = self.at
         self.move(z)
         i, j = at.plan.label[self.row]
-        if at.plan.kind[self.row] == rows.PAIR_ROW:
+        if j != rows.NOBODY:
             clear_of_boat(i, j, at.work.path[i], at.state, at.ours, at.boats, at.tuning, at.work, -FAR, FAR)
+        elif at.plan.kind[self.row] == rows.PAIR_ROW:
+            clear_of_obstacles_by(i, i, at.boats, at.fixed, at.work, at.work.out)
         else:
-            looked_at = at.boats.static_samples[i], at.boats.samples[i]
-            clear_of_surroundings(at.work.path[i], *looked_at, *at.fixed, at.work.out)
+            clear_of_rules_by(i, i, at.boats, at.fixed, at.work, at.work.out)
         return at.work.out[MARGIN]
 
     def gradients(self):
@@ -110,17 +115,35 @@ def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
     assert np.median(np.abs(told - measured) / np.abs(measured)) < error
 
 
-def test_a_turn_does_to_the_distance_from_the_edge_what_the_row_says():
+def edge(y):
+    return Surroundings(field=(-200.0, -200.0, 200.0, y))
+
+
+def wall(y):
+    return Surroundings(polygons=[[(-90.0, y + 1.0), (90.0, y + 1.0), (90.0, y + 9.0), (-90.0, y + 9.0)]])
+
+
+def rule(y):
+    return Surroundings(keep_out=[(3.0, y + 30.0, 30.0)])
+
+
+def flag(y):
+    return Surroundings(stops=[(3.0, y + 30.0, 30.0)])
+
+
+@pytest.mark.parametrize(
+    ("around", "kind"), [(edge, rows.FIXED_ROW), (rule, rows.FIXED_ROW), (wall, rows.PAIR_ROW), (flag, rows.PAIR_ROW)]
+)
+def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around, kind):
     random, told, measured = np.random.default_rng(3), [], []
     for _ in range(60):
         state = np.zeros((1, L.N_STATE))
         state[0, [L.HEADING, L.SPEED, L.THRUST]] = random.uniform(-40.0, 40.0), 3.0, 100.0
-        around = Surroundings(field=(-200.0, -200.0, 200.0, random.uniform(2.0, 6.0)))
-        at = stages_of(ShieldConfig(), state, ["surveyor"], [0], around)
+        at = stages_of(ShieldConfig(), state, ["surveyor"], [0], around(random.uniform(2.0, 6.0)))
         if screened(at, np.array([[2.9, 1.0]])):
             continue
         task = Linearised(at, *built(at))
-        if at.plan.kind[task.row] == rows.FIXED_ROW:
+        if at.plan.kind[task.row] == kind:
             a, b = task.gradients()
             told.append(a[0])
             measured.append(b[0])

@@ -7,10 +7,9 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield import ShieldConfig, wrappers
-from steerclear.shield.batch import BatchedShield
-from steerclear.shield.exceptions import ConfigError, PolicyError
-from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch
+from steerclear.shield import Reason, wrappers
+from steerclear.shield.exceptions import ConfigError, FleetError, PolicyError
+from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch, games_shield
 from steerclear.shield.wrappers.reading import DISCRETE
 
 GAMES = 4
@@ -19,10 +18,7 @@ GAMES = 4
 def batch(shielded=False, opponent=None, team="blue", actions="discrete", **rules):
     config = GameConfig.preset("aamas2024", **rules)
     core = BatchedMctf(config, n_games=GAMES, seed=0)
-    kinds, sides = (config.platforms[0],) * config.n_boats, tuple(core.team.tolist())
-    if isinstance(config.platforms, tuple):
-        kinds = config.platforms
-    shield = BatchedShield(ShieldConfig(), GAMES, kinds, sides) if shielded else None
+    shield = games_shield(core, team=team) if shielded else None
     other = None if opponent is None else policies.make_batch(opponent)
     return TeamBatch(core, other, team, shield, actions, seed=5)
 
@@ -43,6 +39,42 @@ def closest_mates(games, steps=150):
 
 def test_the_shield_keeps_learners_apart_that_act_at_random():
     assert closest_mates(batch()) < 2.5 <= closest_mates(batch(shielded=True))
+
+
+@pytest.mark.parametrize("team", ["blue", "red"])
+def test_a_boat_is_kept_off_its_own_flag_while_that_is_home_and_not_without(team):
+    core = BatchedMctf("aamas2024", n_games=2, seed=0)
+    number = ("blue", "red").index(team)
+    shield = games_shield(core, team=team)
+    command_filter = shield.filter_for(number)
+    boat, home = np.flatnonzero(core.team == number)[0], core.flag_home[number]
+    core.state[:, :, 1] = np.where(core.team == number, home[1] + 20.0, -500.0)  # all others are far away
+    core.state[:, boat, :4] = home[0], home[1] - 12.0, 0.0, 2.0  # due south of the flag, bound for it
+    core.flag_taken[1, number] = True
+    nearest = np.full(2, np.inf)
+    for _ in range(60):
+        commands = np.zeros((2, core.n_boats, 2))
+        commands[:, boat, 0] = 2.0
+        core.step(commands, command_filter)
+        gap = np.linalg.norm(core.state[:, boat, :2] - home, axis=1)
+        nearest = np.minimum(nearest, gap)
+    stopped_m = core.config.flag_keepout_m + float(np.max(core.config.agent_radius_m))
+    assert nearest[0] > stopped_m
+    assert nearest[1] < stopped_m
+    assert shield.reason[1, boat] == Reason.PASSED
+
+
+def test_a_shield_for_games_takes_their_step_and_can_leave_the_flag_out():
+    core = BatchedMctf(GameConfig.preset("aamas2024", dt_s=0.2), n_games=1, seed=0)
+    assert games_shield(core).config.dt_s == 0.2
+    with_flag, without = games_shield(core), games_shield(core, keep_out=False)
+    shape = (1, core.n_boats, 2)
+    ours = np.broadcast_to(core.team == 0, shape[:2]).copy()
+    with_flag.decide(core.state, np.zeros(shape), ours, np.ones((1, 1), bool))
+    with pytest.raises(FleetError, match="lifted"):
+        without.decide(core.state, np.zeros(shape), ours, np.ones((1, 1), bool))
+    with pytest.raises(ConfigError, match="unknown team"):
+        games_shield(core, team="green")
 
 
 @pytest.mark.parametrize("team", ["blue", "red"])

@@ -1,0 +1,32 @@
+"""`games_shield`: the shield for one team in a batch of our own games, with their fixed things."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..batch import BatchedShield
+from ..config import ShieldConfig
+from .mctf import surroundings_of
+from .reading import team_number
+
+
+def games_shield(
+    core: Any, config: ShieldConfig | None = None, team: str | int = "blue", keep_out: bool = True
+) -> BatchedShield:
+    """Build the shield for a `BatchedMctf`: its boats, field edge, obstacles and the own flag's circle.
+
+    Args:
+        core: the games.
+        config: settings; None takes the defaults, with the games' step.
+        team: "blue" or "red", the team that will be shielded, see `BatchedShield.filter_for`.
+        keep_out: keep clear of the own flag's circle while the flag is home; boats that enter it are stopped.
+
+    Raises:
+        ConfigError: unknown team, or a setting that a batch cannot honour.
+    """
+    number = team_number(team)
+    settings = ShieldConfig(dt_s=core.config.dt_s) if config is None else config
+    kinds = core.config.platforms
+    platforms = tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * core.n_boats
+    around = surroundings_of(core, number, keep_out)
+    return BatchedShield(settings, core.n_games, platforms, tuple(core.team.tolist()), around)

@@ -1,0 +1,82 @@
+"""Clearance from things that do not move, against a plain scan of all samples."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear.shield.certificates.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
+from steerclear.shield.certificates.surroundings import clear_of_obstacles, clear_of_rules
+
+NO_EDGE = np.array([-np.inf, -np.inf, np.inf, np.inf])
+NONE = np.zeros((0, 3))
+NO_WALL = np.zeros((0, 4))
+
+
+@st.composite
+def wandering_paths(draw):
+    """Samples no farther apart than 1 m."""
+    seed = draw(st.integers(0, 10_000))
+    random = np.random.default_rng(seed)
+    headings = np.cumsum(random.uniform(-0.6, 0.6, 60)) + random.uniform(0, 2 * np.pi)
+    steps = random.uniform(0.0, 1.0, 60)[:, None] * np.column_stack([np.sin(headings), np.cos(headings)])
+    return np.cumsum(steps, axis=0) + random.uniform(-15.0, 15.0, 2)
+
+
+def distances_to(path, wall):
+    start, way = wall[:2], wall[2:] - wall[:2]
+    parts = np.clip((path - start) @ way / max(way @ way, 1e-12), 0.0, 1.0)
+    return np.linalg.norm(path - start - parts[:, None] * way, axis=1)
+
+
+def excused(margins):
+    return (margins - min(0.0, margins[0])).min()
+
+
+@settings(max_examples=150)
+@given(wandering_paths(), st.integers(0, 10_000))
+def test_no_sample_that_counts_is_skipped(path, seed):
+    random = np.random.default_rng(seed)
+    circles = np.column_stack([random.uniform(-20, 20, (3, 2)), random.uniform(0.0, 8.0, 3)])
+    walls = random.uniform(-20, 20, (2, 4))
+    last = len(path) - 1
+    out = np.zeros(N_CLEARANCE)
+    clear_of_obstacles(path, last, 1.0, circles, walls, 0.7, out)
+    margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
+    margins += [distances_to(path, wall) - 0.7 for wall in walls]
+    assert out[MARGIN] == pytest.approx(min(excused(each) for each in margins), abs=1e-9)
+    clear_of_rules(path, last, last, NO_EDGE, circles, 1.0, out)
+    assert out[MARGIN] == pytest.approx(min(each.min() for each in margins[:3]), abs=1e-9)
+    at = path[int(out[SAMPLE])]
+    nearest = min(circles, key=lambda circle: np.linalg.norm(at - circle[:2]) - circle[2])
+    away = (at - nearest[:2]) / np.linalg.norm(at - nearest[:2])
+    np.testing.assert_allclose([out[NORMAL_X], out[NORMAL_Y]], away, atol=1e-9)
+
+
+def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
+    out, circle = np.zeros(N_CLEARANCE), np.array([[0.0, 0.0, 5.0]])
+    outwards = np.column_stack([np.linspace(4.0, 9.0, 20), np.zeros(20)])
+    clear_of_obstacles(outwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    assert out[MARGIN] == 0.0
+    clear_of_obstacles(outwards - [2.5, 0.0], 19, 1.0, circle, NO_WALL, 0.0, out)
+    assert out[MARGIN] == 0.0
+    inwards = np.column_stack([np.linspace(4.0, 1.0, 20), np.zeros(20)])
+    clear_of_obstacles(inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    assert out[MARGIN] == pytest.approx(-3.0)
+
+
+def test_the_edge_counts_only_as_long_as_it_is_looked_at():
+    path = np.column_stack([np.zeros(20), np.arange(20.0)])
+    out, field = np.zeros(N_CLEARANCE), np.array([-50.0, -50.0, 50.0, 10.0])
+    clear_of_rules(path, 5, 19, field, NONE, 1.0, out)
+    assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
+    clear_of_rules(path, 19, 19, field, NONE, 1.0, out)
+    assert out[MARGIN] == -9.0
+
+
+def test_nothing_there_is_far_away():
+    out = np.zeros(N_CLEARANCE)
+    path = np.zeros((5, 2))
+    clear_of_obstacles(path, 4, 1.0, NONE, NO_WALL, 1.0, out)
+    assert out[MARGIN] == FAR
+    clear_of_rules(path, 4, 4, NO_EDGE, NONE, 1.0, out)
+    assert out[MARGIN] > FAR - 1.0
