@@ -32,7 +32,7 @@ def excused(margins):
     return (margins - min(0.0, margins[0])).min()
 
 
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None)
 @given(wandering_paths(), st.integers(0, 10_000))
 def test_no_sample_that_counts_is_skipped(path, seed):
     random = np.random.default_rng(seed)

@@ -52,7 +52,7 @@ def test_a_boat_is_kept_off_its_own_flag_while_that_is_home_and_not_without(team
     core.state[:, boat, :4] = home[0], home[1] - 12.0, 0.0, 2.0  # due south of the flag, bound for it
     core.flag_taken[1, number] = True
     nearest = np.full(2, np.inf)
-    for _ in range(60):
+    for _ in range(90):
         commands = np.zeros((2, core.n_boats, 2))
         commands[:, boat, 0] = 2.0
         core.step(commands, command_filter)
