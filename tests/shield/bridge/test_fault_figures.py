@@ -1,7 +1,7 @@
 """Every fault drill of the loop with its figures, and that the documentation tells these and no others.
 
-Two boats of ours head on, 40 m apart, both told to go on; the fault begins after 4 s, when they are 24 m apart. Told are:
-how long until the declared answer is in effect, and how near they come to each other in the next 20 s.
+Two boats of ours head on, 40 m apart, both told to go on; the fault begins after 4 s, when they are 24 m apart. Told
+are: how long until the declared answer is in effect, and how near they come to each other in the next 20 s.
 """
 
 import math
