@@ -1,7 +1,7 @@
 """Whether a fix can be true: finite, of a boat's size of values, and reachable from the last one.
 
 A jump is refused at first. A boat that keeps saying the same new place is believed in the end: receivers do settle on
-a better fix, and a track that never comes back would be worse.
+a better fix, and a track that never comes back would be worse. Not as long as somebody else sees it elsewhere.
 """
 
 from __future__ import annotations
@@ -60,11 +60,19 @@ class Gate:
         self._doubted: Fix | None = None
         self._doubted_since_s = 0.0
 
-    def refuse(self, fix: Fix) -> str:
-        """Why this fix is not taken; empty: it is taken."""
+    def refuse(self, fix: Fix, witness: Fix | None = None) -> str:
+        """Why this fix is not taken; empty: it is taken.
+
+        Args:
+            fix: what is told.
+            witness: where somebody else lately saw the boat; None: nobody did.
+        """
         text = self._impossible(fix) or self._frozen(fix)
         if text:
             return text
+        if self._doubted is not None and witness is not None and not _agree(witness, fix):
+            self._doubted, self._doubted_since_s = fix, fix.fixed_s
+            return "position jumped, and the feed sees it elsewhere"
         if self._last is None or self._near(self._last, fix):
             self._last, self._doubted = fix, None
             return ""
@@ -105,3 +113,9 @@ class Gate:
             return ""
         x, y = last.after(fix.fixed_s)
         return f"position jumped {math.hypot(fix.x_m - x, fix.y_m - y):.0f} m"
+
+
+def _agree(witness: Fix, fix: Fix) -> bool:
+    """Whether two fixes of a boat are of one place."""
+    x, y = witness.after(fix.fixed_s)
+    return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M

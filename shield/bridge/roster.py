@@ -140,13 +140,20 @@ class Roster:
         if not math.isfinite(reading.age_s):
             return  # something was never received: no fix
         fix = Fix(*reading.position_m, reading.heading_rad, reading.speed_mps, reading.read_s - reading.position_age_s)
-        text = self._own_gates[name].refuse(fix)
+        text = self._own_gates[name].refuse(fix, self._witness(name))
         if text:
             self._note(name, text)
         else:
             estimator.correct(reading)
             self._telemetry_s[name] = reading.read_s - reading.age_s
             self._fed_m.pop(name, None)
+
+    def _witness(self, name: str) -> Fix | None:
+        """Where the feed lately saw an own boat."""
+        seen = self._contacts.get(name)
+        if seen is None or self._now_s - seen.fixed_s > self.fleet.limits.contact.max_age_s:
+            return None
+        return Fix(*seen.position_m, seen.heading_rad, seen.speed_mps, seen.fixed_s)
 
     def _take_feed(self, name: str, estimator: Estimator) -> None:
         """Let the feed say where an own boat is when its own telemetry does not: what is left is used."""

@@ -76,8 +76,13 @@ def play(part: Part, folder: Path) -> dict:
         names = [boat.name for boat in fleet.boats if boat.link is not None] if part.per_boat else [""]
         runners = [runner(part, fleet_file, name) for name in names]
         end = time.monotonic() + START_S + 60.0 * part.minutes + LATE_S
-        for process in runners:
-            process.wait(max(1.0, end - time.monotonic()))
+        try:
+            for process in runners:
+                process.wait(max(1.0, end - time.monotonic()))
+        finally:
+            for process in runners:
+                process.kill()
+                process.wait()
         water.close(JUDGE_S)
     texts = "\n".join(path.read_text() for path in sorted(folder.glob("runner*.txt")))
     assert [process.returncode for process in runners] == [0] * len(runners), texts

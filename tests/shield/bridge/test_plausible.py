@@ -44,6 +44,23 @@ def test_a_place_told_long_enough_is_believed():
     assert said[first:] == [""] * (39 - first)
 
 
+@pytest.mark.parametrize(("seen_m", "believed"), [(0.0, False), (29.0, True), (60.0, False)])
+def test_a_new_place_is_not_believed_while_somebody_sees_the_boat_elsewhere(seen_m, believed):
+    gate = Gate(2.0)
+    gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))
+    said = [gate.refuse(Fix(30.0, 0.0, 0.0, 0.0, 0.1 * k), Fix(seen_m, 0.0, 0.0, 0.0, 0.1 * k)) for k in range(1, 80)]
+    assert ("" in said) == believed
+    if not believed:
+        assert "the feed sees it elsewhere" in said[-1]
+        assert gate.refuse(Fix(1.0, 0.0, 0.0, 0.0, 8.0), Fix(0.0, 0.0, 0.0, 0.0, 8.0)) == "", "the way back is"
+
+
+def test_a_witness_who_is_wrong_does_no_harm_to_a_boat_that_goes_its_way():
+    gate = Gate(2.0)
+    wrong = Fix(50.0, 0.0, 0.0, 0.0, 0.0)
+    assert [gate.refuse(Fix(0.2 * k, 0.0, math.pi / 2, 2.0, 0.1 * k), wrong) for k in range(50)] == [""] * 50
+
+
 def test_jumps_all_over_the_place_are_never_believed():
     gate = Gate(2.0)
     gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))

@@ -44,8 +44,37 @@ def test_a_boat_that_obeys_is_never_accused(platform, hold_steps):
         assert watched(platform, wild(seed, hold_steps), delay_steps=3) == []
 
 
-def test_stopping_on_order_is_no_fault():
-    assert watched("heron", [(90.0, 2.0)] * 100 + [(90.0, 0.0)] * 400) == []
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_stopping_on_order_is_no_fault(platform):
+    assert watched(platform, [(90.0, 9.0)] * 300 + [(90.0, 0.0)] * 400) == []
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("sweep_dps", [2.0, 6.0, 10.0, 14.0, 20.0, 30.0])
+@pytest.mark.parametrize("back_s", [3.0, 6.0, 15.0])
+def test_headings_that_sweep_accuse_nobody(platform, sweep_dps, back_s):
+    """A shield that steers by the autopilot's own derivative sweeps the heading it tells: the boat turns against it."""
+    time_s = DT_S * np.arange(1500)
+    swept = sweep_dps * (back_s / 2.0 - np.abs(time_s % (2.0 * back_s) - back_s))
+    for ahead in (0.0, 60.0, 120.0, 170.0):
+        orders = [(float(90.0 + ahead + heading), 3.0) for heading in swept]
+        assert watched(platform, orders, delay_steps=1) == []
+    round_and_round = [(float(sweep_dps * t), 3.0) for t in time_s]
+    assert watched(platform, round_and_round, delay_steps=1) == []
+
+
+def test_headings_that_keep_half_a_turn_away_from_the_boat_accuse_nobody():
+    """As a shield tells a surveyor to turn as hard as it can, first to one side, then to the other."""
+    params, row, watch, found = get_platform("surveyor").pack(), fresh_state(0.0, 0.0, 0.0, 2.0), Obedience(), []
+    rate = 0.0
+    for k in range(1200):
+        told = row[L.HEADING] + 120.0 * math.sin(0.04 * k)
+        watch.told(math.radians(told), 3.0, k * DT_S)
+        before = row[L.HEADING]
+        step_boat(params, row, 3.0, (told - row[L.HEADING] + 180.0) % 360.0 - 180.0, DT_S)
+        rate = ((row[L.HEADING] - before + 180.0) % 360.0 - 180.0) / DT_S
+        found += [watch.fault(math.radians(row[L.HEADING]), math.radians(rate), row[L.SPEED], k * DT_S)]
+    assert set(found) == {""}
 
 
 def test_a_second_commander_nobody_sees_is_found():
