@@ -271,7 +271,7 @@ def build_rows(
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
-        clear_of_obstacles_by(i, i, boats, fixed, work, work.out)
+        clear_of_obstacles_by(i, i, state, boats, fixed, work, work.out)
         if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, NOBODY
             r += 1

@@ -205,10 +205,12 @@ def worst_clearance(
 
 
 @kernel
-def clear_of_obstacles_by(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
+def clear_of_obstacles_by(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
     """Clearance row of boat i on the path in ``slot`` from obstacles."""
     way_m = boats.fastest_mps[i] * boats.sample_s
-    clear_of_obstacles(work.path[slot], boats.samples[i], way_m, fixed.circles, fixed.segments, fixed.segment_m, out)
+    clear_of_obstacles(
+        state[i], work.path[slot], boats.samples[i], way_m, fixed.circles, fixed.segments, fixed.segment_m, out
+    )
 
 
 @kernel
@@ -245,7 +247,7 @@ def rate_path(
     work.fixed[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
-    clear_of_obstacles_by(i, slot, boats, fixed, work, work.fixed[slot])
+    clear_of_obstacles_by(i, slot, state, boats, fixed, work, work.fixed[slot])
     if work.fixed[slot, MARGIN] < 0.0:
         return OBSTACLE_BASE + max(-OBSTACLE_BASE, work.fixed[slot, MARGIN])
     floor = -FAR

@@ -53,6 +53,16 @@ def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[floa
 
 
 @kernel
+def _to_obstacle(
+    x: float, y: float, o: int, circles: Array, segments: Array, hull_m: float
+) -> tuple[float, float, float]:
+    """The same for obstacle number o: the circles come first, then the walls."""
+    if o < circles.shape[0]:
+        return _to_circle(x, y, circles[o])
+    return _to_segment(x, y, segments[o - circles.shape[0]], hull_m)
+
+
+@kernel
 def clear_of_rules(
     path: Array, near_samples: int, samples: int, field: Array, keep_out: Array, way_m: float, out: Array
 ) -> None:
@@ -82,14 +92,15 @@ def clear_of_rules(
 
 @kernel
 def clear_of_obstacles(
-    path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
+    here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
 
     A boat that is already too near to one only has to come no nearer: its clearance there counts from where it is.
 
     Args:
-        path: positions, m, shape (>= samples + 1, 2).
+        here: where the boat is now, m, shape (>= 2,).
+        path: positions from the next step on, m, shape (>= samples + 1, 2).
         samples: last sample.
         way_m: most the boat moves from sample to sample, m.
         circles: shape (c, 3): centre x, y and radius, m.
@@ -99,15 +110,10 @@ def clear_of_obstacles(
     """
     out[MARGIN] = FAR
     for o in range(circles.shape[0] + segments.shape[0]):
-        k, excused = 0, 0.0
+        excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        k = 0
         while k <= samples:
-            x, y = path[k, 0], path[k, 1]
-            if o < circles.shape[0]:
-                margin, nx, ny = _to_circle(x, y, circles[o])
-            else:
-                margin, nx, ny = _to_segment(x, y, segments[o - circles.shape[0]], hull_m)
-            if k == 0:
-                excused = min(0.0, margin)
+            margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)
             margin -= excused
             _lower(out, margin, k, nx, ny)
             k += max(1, int((margin - out[MARGIN]) / way_m))

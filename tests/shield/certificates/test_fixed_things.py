@@ -40,7 +40,7 @@ def test_no_sample_that_counts_is_skipped(path, seed):
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
     out = np.zeros(N_CLEARANCE)
-    clear_of_obstacles(path, last, 1.0, circles, walls, 0.7, out)
+    clear_of_obstacles(path[0], path, last, 1.0, circles, walls, 0.7, out)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     margins += [distances_to(path, wall) - 0.7 for wall in walls]
     assert out[MARGIN] == pytest.approx(min(excused(each) for each in margins), abs=1e-9)
@@ -55,13 +55,15 @@ def test_no_sample_that_counts_is_skipped(path, seed):
 def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
     out, circle = np.zeros(N_CLEARANCE), np.array([[0.0, 0.0, 5.0]])
     outwards = np.column_stack([np.linspace(4.0, 9.0, 20), np.zeros(20)])
-    clear_of_obstacles(outwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(outwards[0], outwards, 19, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == 0.0
-    clear_of_obstacles(outwards - [2.5, 0.0], 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == 0.0
     inwards = np.column_stack([np.linspace(4.0, 1.0, 20), np.zeros(20)])
-    clear_of_obstacles(inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(inwards[0], inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == pytest.approx(-3.0)
+    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    assert out[MARGIN] == pytest.approx(-4.0)  # outside so far: there is nothing to excuse
 
 
 def test_the_edge_counts_only_as_long_as_it_is_looked_at():
@@ -76,7 +78,7 @@ def test_the_edge_counts_only_as_long_as_it_is_looked_at():
 def test_nothing_there_is_far_away():
     out = np.zeros(N_CLEARANCE)
     path = np.zeros((5, 2))
-    clear_of_obstacles(path, 4, 1.0, NONE, NO_WALL, 1.0, out)
+    clear_of_obstacles(path[0], path, 4, 1.0, NONE, NO_WALL, 1.0, out)
     assert out[MARGIN] == FAR
     clear_of_rules(path, 4, 4, NO_EDGE, NONE, 1.0, out)
     assert out[MARGIN] > FAR - 1.0

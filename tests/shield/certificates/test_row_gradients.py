@@ -63,7 +63,7 @@ class Linearised:
         if j != rows.NOBODY:
             clear_of_boat(i, j, at.work.path[i], at.state, at.ours, at.boats, at.tuning, at.work, -FAR, FAR)
         elif at.plan.kind[self.row] == rows.PAIR_ROW:
-            clear_of_obstacles_by(i, i, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_obstacles_by(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
         else:
             clear_of_rules_by(i, i, at.boats, at.fixed, at.work, at.work.out)
         return at.work.out[MARGIN]
