@@ -10,8 +10,9 @@ from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .fleet import LARGEST
-from .flow import Plan, decide_compiled, new_plan
+from .flow import decide_compiled
 from .jit import Array, BoolArray, IntArray, kernel
+from .plan import Plan, new_plan
 from .platforms import Platform
 from .platforms import layout as L
 from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work

@@ -10,7 +10,7 @@ from typing import overload
 
 import numpy as np
 
-from . import flow
+from . import plan
 from .commands import Commands
 from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray
@@ -19,19 +19,19 @@ from .jit import Array, BoolArray, IntArray
 class Reason(IntEnum):
     """Why a command is what it is."""
 
-    PASSED = flow.PASSED
+    PASSED = plan.PASSED
     """The wanted command leaves every boat its escape; it is sent bit for bit."""
-    QP = flow.QP
+    QP = plan.QP
     """The least change, found by the quadratic program, re-checked with the full boat model."""
-    QP_RELAXED = flow.QP_RELAXED
+    QP_RELAXED = plan.QP_RELAXED
     """Not all rows could hold; the program's answer with reported slack, better than any escape."""
-    ESCAPE = flow.ESCAPE
+    ESCAPE = plan.ESCAPE
     """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats."""
-    BEST_EFFORT = flow.BEST_EFFORT
+    BEST_EFFORT = plan.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
-    HELD = flow.HELD
+    HELD = plan.HELD
     """The wanted command was not finite or absurdly large; the boat is told to stop on its course."""
-    NOT_COVERED = flow.NOT_COVERED
+    NOT_COVERED = plan.NOT_COVERED
     """The shield does not decide for this boat."""
 
 

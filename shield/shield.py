@@ -9,18 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from . import flow
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
-from .flow import Plan
+from .flow import ROUNDS, finish
 from .jit import Array, BoolArray
+from .linearised import add_slack, build, check, pick_movers, take_answer
+from .plan import NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .scene import Boats, Fixed, Memory, Work, new_memory, new_work
+from .screening import lost, screen
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
@@ -132,7 +134,7 @@ class Shield:
             seats = 1 if self.config.coordination == "team" else n
             rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
             samples = int(self._boats.hunt_samples.max(initial=1))
-            self._seats = [_Seat(new_memory(n), new_work(n, samples), flow.new_plan(n, rows)) for _ in range(seats)]
+            self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(seats)]
             self._key, self._pending = key, np.full((steps_of_delay(self.config), n, 2), np.nan)
         return self._boats
 
@@ -149,18 +151,18 @@ class Shield:
         """The stages of `flow` with the QP backend in between."""
         tuning, plans = self._tuning, self._plans
         memory, work, plan = seat.memory, seat.work, seat.plan
-        safe = flow.screen(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
+        safe = screen(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
         count = 0
-        for _ in range(0 if flow.lost(ours, memory, work) else flow.ROUNDS):
+        for _ in range(0 if lost(ours, memory, work) else ROUNDS):
             if safe:
                 break
-            count = flow.pick_movers(ours, work, plan)
-            rows = flow.build(count, state, ours, boats, fixed, tuning, work, plan)
+            count = pick_movers(ours, work, plan)
+            rows = build(count, state, ours, boats, fixed, tuning, work, plan)
             z = self._solve(count, rows, plan) if rows >= 0 else None
-            if z is None or not flow.take_answer(z, count, state, boats, tuning, plan):
+            if z is None or not take_answer(z, count, state, boats, tuning, plan):
                 break
-            safe = flow.check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        flow.finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+            safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
         """Answer of the program, relaxed with slack when it has none."""
@@ -168,7 +170,7 @@ class Shield:
         z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
         if z is not None:
             return z
-        flow.add_slack(count, rows, plan)
+        add_slack(count, rows, plan)
         n += 2
         return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
 
@@ -190,7 +192,7 @@ class Shield:
     def _report(
         self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer, started: float
     ) -> Decisions:
-        changed = (answer.reason != flow.NOT_COVERED) & (answer.reason != flow.PASSED)
+        changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
         changed &= (answer.commands != asked).any(axis=1)
         seen_deg = fleet.state[:, L.HEADING]
         sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), seen_deg) if changed.any() else wanted
@@ -223,7 +225,7 @@ class _Answer:
         self.commands = plan.commands.copy()
         self.reason = plan.reason.copy()
         self.slack = plan.slack_m.copy()
-        self.margin = np.where(self.reason == flow.NOT_COVERED, np.inf, work.clear[:n, 0])
+        self.margin = np.where(self.reason == NOT_COVERED, np.inf, work.clear[:n, 0])
         self.bound = work.bound[:n].copy()
 
     @classmethod
@@ -231,7 +233,7 @@ class _Answer:
         """An answer that covers nobody."""
         answer = cls.__new__(cls)
         answer.commands, answer.slack = np.zeros((n, 2)), np.zeros(n)
-        answer.reason, answer.bound = np.full(n, flow.NOT_COVERED), np.full(n, -1)
+        answer.reason, answer.bound = np.full(n, NOT_COVERED), np.full(n, -1)
         answer.margin = np.full(n, np.inf)
         return answer
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.flow import Plan
 from steerclear.shield.jit import Array
+from steerclear.shield.plan import Plan
 from steerclear.shield.program import Program
 
 from ..match import Match

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 from steerclear.shield.active_set import OPTIMAL, project
-from steerclear.shield.flow import BEST_EFFORT, ESCAPE, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.step import step_boat

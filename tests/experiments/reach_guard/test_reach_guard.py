@@ -8,7 +8,7 @@ from steerclear.experiments.encounters.guards import build_guard, check_guard, p
 from steerclear.experiments.reach_guard import ReachGuard
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
-from steerclear.shield.flow import BEST_EFFORT, ESCAPE, HELD, NOT_COVERED, PASSED, QP
+from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tables.files import load_table, stack_tables

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield import Surroundings, flow
+from steerclear.shield import Surroundings, flow, linearised, plan, screening
 from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.platforms import layout as L
@@ -39,13 +39,13 @@ def stages_of(config, state, platforms, team, surroundings=None):
         tuning_of(config),
         new_memory(n),
         new_work(n, int(boats.hunt_samples.max())),
-        flow.new_plan(n, n * (n + 5) + 2),
+        plan.new_plan(n, n * (n + 5) + 2),
     )
 
 
 def screened(at, wanted):
     """Screen the wanted commands; True when they are safe."""
-    return flow.screen(
+    return screening.screen(
         at.state,
         wanted,
         np.zeros(len(wanted)),
@@ -61,19 +61,19 @@ def screened(at, wanted):
 
 
 def screened_with_all_pairs(at, wanted):
-    """`flow.screen` again, with no pair left out."""
+    """`screening.screen` again, with no pair left out."""
     n = len(wanted)
     look_around(at.state, np.zeros(n), at.ours, at.boats, at.tuning, at.work)
     left_out = ~at.work.near & ~np.eye(n, dtype=bool)
     at.work.radius[left_out] = at.tuning.radius_m
     at.work.near[left_out] = True
-    flow.set_targets(at.ours, at.boats, at.memory, at.work)
+    screening.set_targets(at.ours, at.boats, at.memory, at.work)
     for i in range(n):
         at.plan.commands[i] = wanted[i]
         at.plan.slack_m[i], at.plan.moving[i] = 0.0, False
-        at.plan.reason[i] = flow.PASSED if at.ours[i] else flow.NOT_COVERED
+        at.plan.reason[i] = plan.PASSED if at.ours[i] else plan.NOT_COVERED
         if at.ours[i]:
-            flow.predict(i, at.plan.commands, at.state, at.boats, at.tuning, at.work)
+            screening.predict(i, at.plan.commands, at.state, at.boats, at.tuning, at.work)
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
     at.plan.kept_commands[:] = at.plan.commands
@@ -96,24 +96,24 @@ def screened_with_all_pairs(at, wanted):
 
 def checked(at, count):
     """The exact check of the candidate commands."""
-    return flow.check(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.memory, at.work, at.plan)
+    return linearised.check(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.memory, at.work, at.plan)
 
 
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
-    count = flow.pick_movers(at.ours, at.work, at.plan)
-    return count, flow.build(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work, at.plan)
+    count = linearised.pick_movers(at.ours, at.work, at.plan)
+    return count, linearised.build(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work, at.plan)
 
 
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
     count = 0
-    for _ in range(0 if flow.lost(at.ours, at.memory, at.work) else flow.ROUNDS):
+    for _ in range(0 if screening.lost(at.ours, at.memory, at.work) else flow.ROUNDS):
         if safe:
             break
         count, rows = built(at)
         z = _answer(at, count, rows, solver)
-        if z is None or not flow.take_answer(z, count, at.state, at.boats, at.tuning, at.plan):
+        if z is None or not linearised.take_answer(z, count, at.state, at.boats, at.tuning, at.plan):
             break
         safe = checked(at, count)
     flow.finish(safe, count, at.state, at.ours, at.boats, at.fixed, at.plans, at.tuning, at.memory, at.work, at.plan)
@@ -124,7 +124,7 @@ def _answer(at, count, rows, solver):
     n, plan = 2 * count, at.plan
     z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
     if z is None:
-        flow.add_slack(count, rows, plan)
+        linearised.add_slack(count, rows, plan)
         n += 2
         z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
     return z

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed
 from stages import built, screened, stages_of
-from steerclear.shield import ShieldConfig, Surroundings, flow, rows
+from steerclear.shield import ShieldConfig, Surroundings, rows, screening
 from steerclear.shield.certificates.clearance import FAR, MARGIN
 from steerclear.shield.certificates.manoeuvre import (
     clear_of_boat,
@@ -52,7 +52,7 @@ class Linearised:
             speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
             turn = z[2 * m] * at.plan.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
-            flow.predict(i, commands, at.state, at.boats, at.tuning, at.work)
+            screening.predict(i, commands, at.state, at.boats, at.tuning, at.work)
             lay_path(i, i, *self.manoeuvres[i], 1, at.state, at.boats, at.tuning, at.work)
 
     def margin(self, z):

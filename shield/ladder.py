@@ -1,0 +1,123 @@
+"""The last stage without a checked answer: escapes, the program's answer if it is better, and the reasons given."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .certificates.assign import assign_plans, hold
+from .certificates.clearance import MARGIN
+from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE
+from .certificates.values import run_opponents
+from .jit import Array, BoolArray, kernel
+from .linearised import check
+from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
+from .platforms import layout as L
+from .platforms.actuator import command_for_turn, full_turn
+from .scene import Boats, Fixed, Memory, Tuning, Work
+
+CLEARLY = 1e-2
+"""Difference of merit that counts when an answer of the program is weighed against an escape."""
+
+
+@kernel
+def worst_merit(ours: BoolArray, work: Work) -> float:
+    """Least merit of any boat of ours."""
+    worst = 2.0 * PAIR_SAFE
+    for i in range(ours.shape[0]):
+        if ours[i]:
+            worst = min(worst, work.merit[i])
+    return worst
+
+
+@kernel
+def unchanged(i: int, plan: Plan) -> bool:
+    """Whether boat i's command is the wanted one, bit for bit."""
+    return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
+
+
+@kernel
+def mark_answer(count: int, reason: int, plan: Plan) -> None:
+    """Give the reason to the movers whose command changed."""
+    for m in range(count):
+        i = plan.movers[m]
+        if not unchanged(i, plan):
+            plan.reason[i] = reason
+
+
+@kernel
+def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
+    """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
+    for m in range(count):
+        i = plan.movers[m]
+        if plan.reason[i] == PASSED or not unchanged(i, plan):
+            plan.reason[i] = QP_RELAXED
+        plan.slack_m[i] = max(0.0, -min(work.clear[i, MARGIN], work.fixed[i, MARGIN]))
+
+
+@kernel
+def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
+    """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
+    side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
+    if togo > 0.0:
+        togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
+    plan.commands[i, 0] = speed
+    plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
+
+
+@kernel
+def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
+    """Make boat i's command and plan those of its escape; the program's answer is put aside."""
+    plan.answer[i], plan.answer_held[i] = plan.commands[i], plan.held[i]
+    first_move(i, state, boats, tuning, work, plan)
+    side, togo = work.plan[i, 0], work.plan[i, 1]
+    plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
+    plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
+
+
+@kernel
+def ladder(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> None:
+    """No checked answer of the program: the movers take the escape that keeps the worst margin largest.
+
+    Escapes are searched from the present state, the one under way first. When even the best leaves somebody short
+    (reason BEST_EFFORT) it is still carried out: avoidance does not switch itself off. A program's answer that
+    leaves a better worst margin than any escape is kept (reason QP_RELAXED). When only fixed things are at stake and
+    no escape does better by them than the program's answer or the wanted command, that one is sent.
+    """
+    before = worst_merit(ours, work)
+    look = 1
+    for m in range(count):
+        i = plan.movers[m]
+        work.target[i] = 0.0
+        hold(i, plan.held, work)
+        look = max(look, boats.look[i])
+    run_opponents(look, ours, state, boats, tuning, work, work.ways)
+    good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
+    run_opponents(1, ours, state, boats, tuning, work, work.ways)
+    for m in range(count):
+        set_off(plan.movers[m], state, boats, tuning, work, plan)
+    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+    after = worst_merit(ours, work)
+    if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
+        for m in range(count):
+            i = plan.movers[m]
+            plan.commands[i], plan.held[i] = plan.answer[i], plan.answer_held[i]
+        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        mark_relaxed(count, work, plan)
+        return
+    for m in range(count):
+        i = plan.movers[m]
+        plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
+        plan.slack_m[i] = max(0.0, -work.clear[i, MARGIN])

@@ -1,0 +1,157 @@
+"""The quadratic program about candidate commands: who takes part, its rows, its answer, and the exact check of that."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .active_set import OPTIMAL, project
+from .certificates.assign import hold, recheck
+from .certificates.manoeuvre import PAIR_SAFE
+from .jit import Array, BoolArray, kernel
+from .plan import Plan
+from .platforms import layout as L
+from .platforms.actuator import command_for_turn
+from .rows import BOX_ROW, build_rows, inputs_of
+from .scene import Boats, Fixed, Memory, Tuning, Work
+from .screening import predict
+
+SAME = 1e-6
+"""Scaled input change below which a command counts as unchanged and the wanted one is sent."""
+
+SLACK_COST = np.array([1e4, 1e2])
+"""Weight of the squared slack of boat rows and of fixed-thing rows when they cannot all hold."""
+
+
+@kernel
+def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
+    """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
+    n = ours.shape[0]
+    for i in range(n):
+        if ours[i] and work.merit[i] < PAIR_SAFE:
+            plan.moving[i] = True
+            j = work.bound[i]
+            if j >= 0 and ours[j]:
+                plan.moving[j] = True
+    count = 0
+    for i in range(n):
+        plan.place[i] = -1
+        if plan.moving[i]:
+            plan.movers[count], plan.place[i] = i, count
+            count += 1
+    return count
+
+
+@kernel
+def build(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+    plan: Plan,
+) -> int:
+    """Linearise about the candidate commands; returns the number of rows, -1 when there are too many."""
+    movers = plan.movers[:count]
+    for m in range(count):
+        hold(movers[m], plan.held, work)
+    inputs_of(
+        plan.commands,
+        plan.kept_commands,
+        movers,
+        state,
+        boats,
+        tuning,
+        work,
+        plan.wanted_turn,
+        plan.gain,
+        plan.z_now,
+        plan.z0,
+    )
+    return build_rows(
+        movers,
+        plan.place,
+        state,
+        ours,
+        boats,
+        fixed,
+        tuning,
+        work,
+        plan.gain,
+        plan.z_now[: 2 * count],
+        plan.C[:, : 2 * count],
+        plan.d,
+        plan.kind,
+        plan.label,
+    )
+
+
+@kernel
+def add_slack(count: int, rows: int, plan: Plan) -> None:
+    """Give boat rows and fixed-thing rows one slack input each (the last two columns), limits none."""
+    n = 2 * count
+    for r in range(rows):
+        for s in range(2):
+            plan.C[r, n + s] = 0.0
+        if plan.kind[r] != BOX_ROW:
+            plan.C[r, n + plan.kind[r]] = 1.0 / math.sqrt(SLACK_COST[plan.kind[r]])
+    plan.z0[n], plan.z0[n + 1] = 0.0, 0.0
+
+
+@kernel
+def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
+    """Solve the program by projection; relaxed with slack when it has no solution. False when neither works."""
+    n = 2 * count
+    status = project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n])
+    if status == OPTIMAL:
+        return True
+    add_slack(count, rows, plan)
+    n += 2
+    return project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n]) == OPTIMAL
+
+
+@kernel
+def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> bool:
+    """Turn scaled inputs into the commands whose autopilot yields them; False when any of them is not finite.
+
+    A boat whose inputs are unchanged keeps its wanted command, bit for bit.
+    """
+    root = math.sqrt(tuning.speed_weight)
+    for m in range(2 * count):
+        if not math.isfinite(z[m]):
+            return False
+    for m in range(count):
+        i = plan.movers[m]
+        wanted = plan.kept_commands[i]
+        same_speed = abs(z[2 * m + 1] - plan.z0[2 * m + 1]) <= SAME
+        if same_speed and abs(z[2 * m] - plan.z0[2 * m]) <= SAME:
+            plan.commands[i] = wanted
+            continue
+        speed = z[2 * m + 1] / root * boats.params[i, L.MAX_SPEED]
+        speed = wanted[0] if same_speed else max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
+        plan.commands[i, 0] = speed
+        plan.commands[i, 1] = command_for_turn(
+            boats.params[i], state[i], speed, z[2 * m] * plan.gain[i, 2], tuning.dt_s
+        )
+    return True
+
+
+@kernel
+def check(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> bool:
+    """Exact re-check of candidate commands: full model one step on, then the escapes the rows were about."""
+    for m in range(count):
+        predict(plan.movers[m], plan.commands, state, boats, tuning, work)
+    return recheck(plan.moving, plan.held, state, ours, boats, fixed, tuning, memory, work)

@@ -1,0 +1,63 @@
+"""`Plan`: the arrays of one decision's quadratic program, and the codes of why a command is what it is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import Array, BoolArray, IntArray
+
+PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED = range(7)
+
+LARGEST_COMMAND = 1e6
+"""Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""
+
+
+class Plan(NamedTuple):
+    """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows)."""
+
+    commands: Array
+    kept_commands: Array
+    wanted_turn: Array
+    held: Array
+    answer: Array
+    answer_held: Array
+    movers: IntArray
+    place: IntArray
+    moving: BoolArray
+    gain: Array
+    z_now: Array
+    z0: Array
+    z: Array
+    C: Array
+    d: Array
+    kind: IntArray
+    label: IntArray
+    slack_m: Array
+    reason: IntArray
+
+
+def new_plan(boats: int, rows: int) -> Plan:
+    """Program arrays for a scene of that many boats and rows."""
+    return Plan(
+        commands=np.zeros((boats, 2)),
+        kept_commands=np.zeros((boats, 2)),
+        wanted_turn=np.zeros(boats),
+        held=np.zeros((boats, 3)),
+        answer=np.zeros((boats, 2)),
+        answer_held=np.zeros((boats, 3)),
+        movers=np.zeros(boats, np.int64),
+        place=np.full(boats, -1, np.int64),
+        moving=np.zeros(boats, np.bool_),
+        gain=np.zeros((boats, 3)),
+        z_now=np.zeros(2 * boats + 2),
+        z0=np.zeros(2 * boats + 2),
+        z=np.zeros(2 * boats + 2),
+        C=np.zeros((rows, 2 * boats + 2)),
+        d=np.zeros(rows),
+        kind=np.zeros(rows, np.int64),
+        label=np.zeros((rows, 2), np.int64),
+        slack_m=np.zeros(boats),
+        reason=np.zeros(boats, np.int64),
+    )

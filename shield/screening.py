@@ -1,0 +1,80 @@
+"""The first stage of a decision: whether the wanted commands can be sent as they are."""
+
+from __future__ import annotations
+
+from .certificates.assign import assign_plans
+from .certificates.manoeuvre import STRAIGHT_SAFE, look_around
+from .jit import Array, BoolArray, kernel
+from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
+from .platforms import layout as L
+from .platforms.step import step_boat
+from .platforms.usv import wrap_degrees
+from .scene import Boats, Fixed, Memory, Tuning, Work
+
+
+@kernel
+def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """State of boat i one step after its command, by the full boat and autopilot model."""
+    work.next_state[i] = state[i]
+    step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
+
+
+@kernel
+def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> None:
+    """Margin each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0."""
+    for i in range(ours.shape[0]):
+        work.target[i] = 0.0
+        if ours[i] and memory.kept[i] and memory.margin_m[i] > 0.0:
+            work.target[i] = boats.decay[i] * min(memory.margin_m[i], boats.cap_m[i])
+
+
+@kernel
+def screen(
+    state: Array,
+    wanted: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> bool:
+    """Check the wanted commands as they are; True when every boat still has its escape after them.
+
+    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
+    the check.
+    """
+    n = state.shape[0]
+    look_around(state, margin_m, ours, boats, tuning, work)
+    set_targets(ours, boats, memory, work)
+    for i in range(n):
+        plan.commands[i] = wanted[i]
+        plan.slack_m[i] = 0.0
+        plan.moving[i] = False
+        plan.reason[i] = PASSED if ours[i] else NOT_COVERED
+        if not ours[i]:
+            continue
+        if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
+            plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
+            plan.reason[i] = HELD
+        predict(i, plan.commands, state, boats, tuning, work)
+        plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
+    plan.kept_commands[:] = plan.commands
+    return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
+
+
+@kernel
+def lost(ours: BoolArray, memory: Memory, work: Work) -> bool:
+    """Whether some boat is short of its margin, as it was on its escape: then the escape goes on until all is safe.
+
+    One step of the program cannot win back what no manoeuvre could; searching for it costs time and makes the boat
+    dither.
+    """
+    found = False
+    for i in range(ours.shape[0]):
+        short = memory.escaping[i] and memory.margin_m[i] < 0.0 and work.merit[i] < STRAIGHT_SAFE
+        found = found or (ours[i] and short)
+    return found
