@@ -95,6 +95,7 @@ class BatchedShield:
         platforms: platforms of the n boats.
         team: team of the n boats.
         surroundings: fixed things, the same for all games.
+        flag_of: team whose flag's circle the surroundings' ``stops`` are, see `filter_for`.
 
     Raises:
         ConfigError: a setting that a batch cannot honour.
@@ -107,6 +108,7 @@ class BatchedShield:
         platforms: tuple[str | Platform, ...],
         team: tuple[int, ...],
         surroundings: Surroundings = OPEN_WATER,
+        flag_of: int | None = None,
     ) -> None:
         if config.coordination != "team":
             raise ConfigError("a batch decides for whole teams at once: set coordination='team'")
@@ -114,7 +116,7 @@ class BatchedShield:
             raise ConfigError(f"games is {games!r}; give a whole number >= 1")
         if len(platforms) != len(team) or not platforms:
             raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
-        self.config = config
+        self.config, self.flag_of = config, flag_of
         n = len(platforms)
         self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
         self._fixed = surroundings.pack(config)
@@ -187,17 +189,23 @@ class BatchedShield:
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
 
-        A circle in the surroundings' ``stops`` is taken as that of the team's own flag, and counts while the flag is
-        home.
+        With ``flag_of`` the surroundings' ``stops`` count while that team's flag is home, without it always.
 
         Args:
             team: the team to shield.
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
+
+        Raises:
+            ConfigError: the shield was built for the other team's flag.
         """
+        if self.flag_of not in (None, team):
+            raise ConfigError(f"this shield keeps off the flag of team {self.flag_of}; build another for team {team}")
 
         def command_filter(core: Any, commands: Array) -> Array:
             ours = np.broadcast_to(core.team == team, core.driven.shape)
             ours = ours.copy() if shield_autopilot else ours & ~core.driven
+            if self.flag_of is None:
+                return self.decide(core.state, commands, ours)
             taken = np.repeat(core.flag_taken[:, team : team + 1], self._lifted.shape[1], axis=1)
             return self.decide(core.state, commands, ours, taken)
 

@@ -11,6 +11,7 @@ from typing import overload
 import numpy as np
 
 from . import plan
+from .certificates.manoeuvre import FIXED_THING
 from .commands import Commands
 from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray
@@ -133,7 +134,7 @@ class Decisions(Sequence[Decision]):
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:
-        if bound == -2:
+        if bound == FIXED_THING:
             return ("field",)
         return (self.fleet.names[bound],) if bound >= 0 else ()
 

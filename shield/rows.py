@@ -19,8 +19,9 @@ from __future__ import annotations
 import math
 
 from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from .certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from .certificates.hunters import clear_of_hunter, hunts
-from .certificates.manoeuvre import clear_of_boat, clear_of_obstacles_by, clear_of_rules_by
+from .certificates.manoeuvre import clear_of_boat
 from .certificates.values import WAYS, looked_up, table_slope
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
@@ -35,7 +36,7 @@ SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 
 PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
-"""Classes of rows: boats and obstacles give way last, what is kept by rule before them, limits never."""
+"""Classes of rows: boats and obstacles near in time give way last, other fixed things before them, limits never."""
 
 NOBODY = -1
 """Neighbour of a row that is not about a boat."""
@@ -271,11 +272,11 @@ def build_rows(
             if _pair_row(i, j, m, place, state, ours, boats, tuning, work, gain, z_now, C, d, r):
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
-        clear_of_obstacles_by(i, i, state, boats, fixed, work, work.out)
+        clear_of_near_obstacles(i, i, state, boats, fixed, work, work.out)
         if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, NOBODY
             r += 1
-        clear_of_rules_by(i, i, boats, fixed, work, work.out)
+        clear_of_fixed(i, i, state, boats, fixed, work, work.out)
         if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, NOBODY
             r += 1

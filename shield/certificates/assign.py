@@ -9,7 +9,8 @@ import numpy as np
 from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
-from .manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, lay_path, most_merit, rate_path, run_out, set_out
+from .laying import lay_path, most_merit, run_out, set_out
+from .manoeuvre import FIXED_LOST, PAIR_SAFE, STRAIGHT_SAFE, rate_path
 from .paths import angle_to_go
 
 COMMANDED = -1.0

@@ -18,25 +18,28 @@ from ..jit import Array, BoolArray, kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
+from .fixed_things import clear_of_fixed, share_before_touch
 from .hunters import closing, worst_hunter
-from .paths import trace_path
-from .surroundings import clear_of_obstacles, clear_of_rules
-from .values import find_beset, looked_up, run_opponents, set_place, worst_by_tables
+from .values import find_beset, run_opponents
 
 PAIR_SAFE = 1e3
 """Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
 
 FIXED_LOST = 500.0
-"""Merit from which it keeps clear of all boats, but not of fixed things."""
+"""Merit from which it keeps clear of all boats and of obstacles near in time, but not of all fixed things."""
 
 STRAIGHT_SAFE = 100.0
-"""Merit from which it keeps clear of team-mates and of opponents that hold their course, but not of pursuers."""
-
-OBSTACLE_BASE = 50.0
-"""Merit of a manoeuvre that keeps clear of them but just touches an obstacle; the (negative) margin is added."""
+"""Merit from which it keeps clear of team-mates, of opponents that hold their course and of obstacles near in time, but
+not of pursuers."""
 
 STRAIGHT_BASE = 300.0
 """Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
+
+OBSTACLE_BASE = 50.0
+"""Merit of a manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it counts."""
+
+FIXED_THING = -2
+"""In the place of the neighbour that binds: a fixed thing does."""
 
 REGAIN_M = 0.01
 """A pair inside the buffer must part by at least this in the next step, m."""
@@ -205,23 +208,6 @@ def worst_clearance(
 
 
 @kernel
-def clear_of_obstacles_by(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
-    """Clearance row of boat i on the path in ``slot`` from obstacles."""
-    way_m = boats.fastest_mps[i] * boats.sample_s
-    clear_of_obstacles(
-        state[i], work.path[slot], boats.samples[i], way_m, fixed.circles, fixed.segments, fixed.segment_m, out
-    )
-
-
-@kernel
-def clear_of_rules_by(i: int, slot: int, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
-    """Clearance row of boat i on the path in ``slot`` from what is kept by rule."""
-    way_m = boats.fastest_mps[i] * boats.sample_s
-    near = boats.static_samples[i]
-    clear_of_rules(work.path[slot], near, boats.samples[i], fixed.field, fixed.keep_out, way_m, out)
-
-
-@kernel
 def rate_path(
     i: int,
     slot: int,
@@ -236,8 +222,9 @@ def rate_path(
     """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
     What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
-    first, of obstacles second, of hunting opponents third; then what is kept by rule, and last room to spare. Of a
-    manoeuvre that fails at the first the merit is the margin itself, m.
+    first, of obstacles near in time second, of hunting opponents third; then of all fixed things, and last room to
+    spare. Of a manoeuvre that fails at the first the merit is the margin itself, m. The clearance told is from all
+    boats, whatever the merit hangs on.
     """
     target = work.target[i]
     clear = work.clear[slot]
@@ -247,86 +234,23 @@ def rate_path(
     work.fixed[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
-    clear_of_obstacles_by(i, slot, state, boats, fixed, work, work.fixed[slot])
-    if work.fixed[slot, MARGIN] < 0.0:
-        return OBSTACLE_BASE + max(-OBSTACLE_BASE, work.fixed[slot, MARGIN])
+    share = share_before_touch(i, slot, state, boats, fixed, work)
     floor = -FAR
-    if best >= FIXED_LOST:
+    if share == 1.0 and best >= FIXED_LOST:
         floor = target
-    elif best >= STRAIGHT_SAFE:
+    elif share == 1.0 and best >= STRAIGHT_SAFE:
         floor = min(target, best - STRAIGHT_BASE)
+    if share < 1.0 and OBSTACLE_BASE * share <= best:
+        return OBSTACLE_BASE * share
     if clear[MARGIN] >= floor:
         worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
+    if share < 1.0:
+        work.bound[slot] = FIXED_THING
+        return OBSTACLE_BASE * share
     if clear[MARGIN] < target:
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
-    clear_of_rules_by(i, slot, boats, fixed, work, work.out)
-    if work.out[MARGIN] < work.fixed[slot, MARGIN]:
-        work.fixed[slot] = work.out
+    clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
+    if work.fixed[slot, MARGIN] < 0.0:
+        work.bound[slot] = FIXED_THING
     spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
     return PAIR_SAFE + max(FIXED_LOST - PAIR_SAFE, min(work.fixed[slot, MARGIN], 0.0)) + spare
-
-
-@kernel
-def _runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
-    """Whether some opponent near boat i is to be run through as a hunter, which takes the long path."""
-    if not work.hunted[i] or boats.look[i] == 0:
-        return work.hunted[i]
-    for j in range(work.near.shape[0]):
-        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j]:
-            continue
-        if boats.granted_turn_dps[j] > 0.0 and not looked_up(i, j, slot, work.nobody, boats, work):
-            return True
-    return False
-
-
-@kernel
-def set_out(
-    i: int,
-    slot: int,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    done: int,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
-    """Write a manoeuvre of boat i into ``slot`` and where its opponents are looked up for it."""
-    work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
-    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
-
-
-@kernel
-def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
-    """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
-    margin = worst_by_tables(i, slot, ours, boats, work)
-    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if margin < work.target[i] else 2.0 * PAIR_SAFE
-
-
-@kernel
-def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
-    """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
-    samples = boats.hunt_samples[i] if _runs_hunters(i, slot, boats, work) else boats.samples[i]
-    side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
-    work.row[:] = work.next_state[i] if done == 1 else state[i]
-    path = work.path[slot]
-    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
-
-
-@kernel
-def lay_path(
-    i: int,
-    slot: int,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    done: int,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
-    """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
-    set_out(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
-    run_out(i, slot, done, state, boats, tuning, work)

@@ -117,3 +117,20 @@ def clear_of_obstacles(
             margin -= excused
             _lower(out, margin, k, nx, ny)
             k += max(1, int((margin - out[MARGIN]) / way_m))
+
+
+@kernel
+def first_touch(
+    here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float
+) -> int:
+    """First sample of a path that is too near to an obstacle, ``samples + 1`` for none; arguments as above."""
+    first = samples + 1
+    for o in range(circles.shape[0] + segments.shape[0]):
+        excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        k = 0
+        while k < first:
+            margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0] - excused
+            if margin < 0.0:
+                first = k
+            k += max(1, int(margin / way_m))
+    return first

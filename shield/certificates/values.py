@@ -67,7 +67,7 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work
     """Mark the boats of ours that more than one opponent can come near to, as far as the tables tell.
 
     Each table knows of one opponent only: two may each leave a way out, and not the same. Such a boat is looked up
-    some time into its manoeuvre, against all of them at that place: then one manoeuvre has to do for all.
+    some time into its manoeuvre as well, against all of them at that place: then one manoeuvre has to do for all.
     """
     n = state.shape[0]
     some = False
@@ -154,9 +154,12 @@ def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: 
 @kernel
 def worst_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
     """Margin of boat i on the manoeuvre in ``slot`` against the worst opponent j can do, m."""
-    if work.beset[i]:
-        return table_margin(i, j, work.later[slot], work.ways_later[j], boats, work)
-    return table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+    margin = table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+    if not work.beset[i]:
+        return margin
+    if work.later[slot, PLACE_USABLE] == 0.0:  # nothing is known of a boat that has let its thrust go by then
+        return -work.radius[i, j]
+    return min(margin, table_margin(i, j, work.later[slot], work.ways_later[j], boats, work))
 
 
 @kernel

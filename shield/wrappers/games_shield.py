@@ -29,4 +29,4 @@ def games_shield(
     kinds = core.config.platforms
     platforms = tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * core.n_boats
     around = surroundings_of(core, number, keep_out)
-    return BatchedShield(settings, core.n_games, platforms, tuple(core.team.tolist()), around)
+    return BatchedShield(settings, core.n_games, platforms, tuple(core.team.tolist()), around, number)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.certificates.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
-from steerclear.shield.certificates.surroundings import clear_of_obstacles, clear_of_rules
+from steerclear.shield.certificates.surroundings import clear_of_obstacles, clear_of_rules, first_touch
 
 NO_EDGE = np.array([-np.inf, -np.inf, np.inf, np.inf])
 NONE = np.zeros((0, 3))
@@ -44,6 +44,9 @@ def test_no_sample_that_counts_is_skipped(path, seed):
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     margins += [distances_to(path, wall) - 0.7 for wall in walls]
     assert out[MARGIN] == pytest.approx(min(excused(each) for each in margins), abs=1e-9)
+    touched = np.any([each - min(0.0, each[0]) < 0.0 for each in margins], axis=0)
+    first = np.argmax(touched) if touched.any() else last + 1
+    assert first_touch(path[0], path, last, 1.0, circles, walls, 0.7) == first
     clear_of_rules(path, last, last, NO_EDGE, circles, 1.0, out)
     assert out[MARGIN] == pytest.approx(min(each.min() for each in margins[:3]), abs=1e-9)
     at = path[int(out[SAMPLE])]
@@ -80,5 +83,6 @@ def test_nothing_there_is_far_away():
     path = np.zeros((5, 2))
     clear_of_obstacles(path[0], path, 4, 1.0, NONE, NO_WALL, 1.0, out)
     assert out[MARGIN] == FAR
-    clear_of_rules(path, 4, 4, NO_EDGE, NONE, 1.0, out)
-    assert out[MARGIN] > FAR - 1.0
+    clear_of_rules(path, 4, 4, np.array([-1e9, -1e9, 1e9, 1e9]), NONE, 1.0, out)
+    assert out[MARGIN] == FAR
+    assert first_touch(path[0], path, 4, 1.0, NONE, NO_WALL, 1.0) == 5

@@ -8,7 +8,8 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.clearance import MARGIN
 from steerclear.shield.certificates.hunters import clear_of_hunter
-from steerclear.shield.certificates.manoeuvre import lay_path, look_around
+from steerclear.shield.certificates.laying import lay_path
+from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, largest_turn

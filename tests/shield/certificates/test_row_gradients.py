@@ -6,12 +6,9 @@ from shield_loops import fill, packed
 from stages import built, screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings, rows, screening
 from steerclear.shield.certificates.clearance import FAR, MARGIN
-from steerclear.shield.certificates.manoeuvre import (
-    clear_of_boat,
-    clear_of_obstacles_by,
-    clear_of_rules_by,
-    lay_path,
-)
+from steerclear.shield.certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
+from steerclear.shield.certificates.laying import lay_path
+from steerclear.shield.certificates.manoeuvre import clear_of_boat
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -63,9 +60,9 @@ class Linearised:
         if j != rows.NOBODY:
             clear_of_boat(i, j, at.work.path[i], at.state, at.ours, at.boats, at.tuning, at.work, -FAR, FAR)
         elif at.plan.kind[self.row] == rows.PAIR_ROW:
-            clear_of_obstacles_by(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_near_obstacles(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
         else:
-            clear_of_rules_by(i, i, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_fixed(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
         return at.work.out[MARGIN]
 
     def gradients(self):

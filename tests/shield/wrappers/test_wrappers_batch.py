@@ -75,6 +75,8 @@ def test_a_shield_for_games_takes_their_step_and_can_leave_the_flag_out():
         without.decide(core.state, np.zeros(shape), ours, np.ones((1, 1), bool))
     with pytest.raises(ConfigError, match="unknown team"):
         games_shield(core, team="green")
+    with pytest.raises(ConfigError, match="build another for team 1"):
+        with_flag.filter_for(1)
 
 
 @pytest.mark.parametrize("team", ["blue", "red"])

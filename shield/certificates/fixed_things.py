@@ -1,0 +1,58 @@
+"""What of the fixed things concerns a boat on a manoeuvre, and when.
+
+An obstacle stops a boat, and who is stopped is caught: one that is touched before a half turn could be over counts
+before what hunters may do. Later ones leave time for another manoeuvre, and count with what is kept by rule.
+"""
+
+from __future__ import annotations
+
+from ..jit import Array, kernel
+from ..platforms import layout as L
+from ..scene import Boats, Fixed, Work
+from .clearance import MARGIN
+from .surroundings import clear_of_obstacles, clear_of_rules, first_touch
+
+
+@kernel
+def way_per_sample(i: int, state: Array, boats: Boats) -> float:
+    """Most boat i moves from sample to sample of a path, m."""
+    return max(boats.fastest_mps[i], state[i, L.SPEED]) * boats.sample_s
+
+
+@kernel
+def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
+    """Clearance row of boat i on the path in ``slot`` from obstacles at any time, field edge and keep-out circles.
+
+    ``work.spare2`` is overwritten.
+    """
+    path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
+    clear_of_rules(path, boats.static_samples[i], last, fixed.field, fixed.keep_out, way_m, out)
+    clear_of_obstacles(state[i], path, last, way_m, fixed.circles, fixed.segments, fixed.segment_m, work.spare2)
+    if work.spare2[MARGIN] < out[MARGIN]:
+        out[:] = work.spare2
+
+
+@kernel
+def clear_of_near_obstacles(
+    i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array
+) -> None:
+    """The same from obstacles alone until a half turn could be over."""
+    clear_of_obstacles(
+        state[i],
+        work.path[slot],
+        boats.static_samples[i],
+        way_per_sample(i, state, boats),
+        fixed.circles,
+        fixed.segments,
+        fixed.segment_m,
+        out,
+    )
+
+
+@kernel
+def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> float:
+    """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
+    last = boats.static_samples[i]
+    way_m = way_per_sample(i, state, boats)
+    first = first_touch(state[i], work.path[slot], last, way_m, fixed.circles, fixed.segments, fixed.segment_m)
+    return first / (last + 1.0)

@@ -1,0 +1,75 @@
+"""Laying a manoeuvre of a boat into a slot of the working memory: where it is looked up, and its path."""
+
+from __future__ import annotations
+
+from ..jit import Array, BoolArray, kernel
+from ..scene import Boats, Tuning, Work
+from .manoeuvre import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
+from .paths import trace_path
+from .values import looked_up, set_place, worst_by_tables
+
+
+@kernel
+def runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
+    """Whether some opponent near boat i is to be run through as a hunter, which takes the long path."""
+    if not work.hunted[i] or boats.look[i] == 0:
+        return work.hunted[i]
+    for j in range(work.near.shape[0]):
+        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j]:
+            continue
+        if boats.granted_turn_dps[j] > 0.0 and not looked_up(i, j, slot, work.nobody, boats, work):
+            return True
+    return False
+
+
+@kernel
+def set_out(
+    i: int,
+    slot: int,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    done: int,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+) -> None:
+    """Write a manoeuvre of boat i into ``slot`` and where its opponents are looked up for it."""
+    work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
+    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+
+
+@kernel
+def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
+    """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
+    margin = worst_by_tables(i, slot, ours, boats, work)
+    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if margin < work.target[i] else 2.0 * PAIR_SAFE
+
+
+@kernel
+def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
+    samples = boats.hunt_samples[i] if runs_hunters(i, slot, boats, work) else boats.samples[i]
+    side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
+    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    path = work.path[slot]
+    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
+
+
+@kernel
+def lay_path(
+    i: int,
+    slot: int,
+    side: float,
+    togo_deg: float,
+    speed_mps: float,
+    done: int,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+) -> None:
+    """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
+    set_out(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+    run_out(i, slot, done, state, boats, tuning, work)
