@@ -45,13 +45,17 @@ def test_an_opponent_that_leaves_does_not_help_against_one_that_rams():
     assert joined[1] <= rammed[1] + 0.05
 
 
-def test_what_each_leaves_open_both_together_may_not():
-    pincers = 0
-    for first, second in scenes(250, 18.0):
-        alone = decided([(0, 0, 0), first])[0], decided([(0, 0, 0), second])[0]
-        if alone == (Reason.PASSED, Reason.PASSED) and decided([(0, 0, 0), first, second])[0] != Reason.PASSED:
-            pincers += 1
-    assert pincers >= 2
+@pytest.mark.parametrize(("aside_m", "ahead_m"), [(5, 25), (7, 16), (7, 25), (9, 12), (9, 20)])
+def test_what_each_leaves_open_both_together_do_not(aside_m, ahead_m):
+    bearing = np.degrees(np.arctan2(-aside_m, -ahead_m))
+    starboard, port = (aside_m, ahead_m, bearing), (-aside_m, ahead_m, -bearing)
+    for one in (starboard, port):
+        reason, certificate_m = decided([(0, 0, 0), one])
+        assert reason == Reason.PASSED
+        assert certificate_m > 0.1
+    reason, certificate_m = decided([(0, 0, 0), starboard, port])
+    assert reason != Reason.PASSED
+    assert certificate_m < 0.0
 
 
 @pytest.mark.parametrize("gap_m", [60.0, 200.0])
