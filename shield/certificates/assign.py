@@ -246,6 +246,8 @@ def assign_plans(
             side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
             lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
     stale = True
+    searched = np.full(n, -1)  # changes of plans there had been when boat i was last searched for
+    changes = 0
     for sweep in range(SWEEPS):
         changed = False
         for i in range(n):
@@ -255,6 +257,9 @@ def assign_plans(
                 refresh(i, state, ours, boats, fixed, tuning, work)
                 if settled(i, sweep, exhaustive, memory, work):
                     continue
+            if searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
+                continue
+            side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
             choose_plan(
                 i,
                 commands[i, 0],
@@ -269,6 +274,9 @@ def assign_plans(
                 memory,
                 work,
             )
+            if work.plan[i, 0] != side or work.plan[i, 1] != togo or work.plan[i, 2] != speed:
+                changes += 1
+            searched[i] = changes
             changed = True
         if not changed:
             stale = False
