@@ -109,10 +109,10 @@ class Loop:
 
     def _is_clear(self) -> bool:
         """Whether boats can be handed over: they lie still, and nobody is on the way to one of them."""
-        return at_rest(self._readings) and not nearing(self.fleet, self.roster)
+        return at_rest(self._readings) and not nearing(self.fleet, self.roster, self._readings)
 
     def _tell_near(self) -> None:
-        self.near = tuple(nearing(self.fleet, self.roster))
+        self.near = tuple(nearing(self.fleet, self.roster, self._readings))
         for text in self.near:
             LOG.warning("handed over although %s: take it over by hand", text)
 
