@@ -30,6 +30,7 @@ class BoatReading:
         mode: name of the autopilot's mode.
         ready: whether commands of heading and speed would be obeyed now (armed, in the right mode).
         why_not: why not, in words; empty when ready.
+        released: whether somebody took the boat and nobody of ours took it back yet; in whatever mode it is now.
         heartbeat_age_s: s.
         texts: what the autopilot said since the last reading.
         faults: what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind.
@@ -49,6 +50,7 @@ class BoatReading:
     mode: str = ""
     ready: bool = False
     why_not: str = "nothing heard yet"
+    released: bool = False
     heartbeat_age_s: float = NEVER_S
     texts: tuple[str, ...] = ()
     faults: dict[str, int] = field(default_factory=dict)

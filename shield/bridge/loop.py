@@ -95,7 +95,7 @@ class Loop:
             self._keep_on(due, lambda now: now < latest and not self._is_clear())
             self._tell_near()
         finally:
-            self._helm.stop_all(tuple(self.parts.links))
+            self._stop_ours()
             self._retaking.close()
         return self._ending
 
@@ -121,10 +121,15 @@ class Loop:
         try:
             self.turn(due_s)
         except Exception:
-            self._helm.stop_all(tuple(self.parts.links))
+            self._stop_ours()
             if self.clock.now_s() - self._broke_s >= TALK_EVERY_S:
                 self._broke_s = self.clock.now_s()
                 LOG.exception("a turn of the loop broke; boats told to stop")
+
+    def _stop_ours(self) -> None:
+        """Stop boats by their links; those that somebody took are left alone, unless STOP ALL was asked for twice."""
+        readings = {} if self.operator.hard else self._readings
+        self._helm.stop_all([name for name in self.parts.links if name not in readings or not readings[name].released])
 
     def turn(self, due_s: float) -> Tick:
         """One turn.

@@ -120,6 +120,7 @@ class MavlinkLink:
                 mode=boat.mode,
                 ready=not why_not,
                 why_not=why_not,
+                released=bool(boat.released),
                 heartbeat_age_s=NEVER_S if boat.heartbeat is None else _age(now_s, boat.heartbeat.received_s),
                 texts=boat.dialogue.take_texts(),
                 faults=boat.take_faults(),

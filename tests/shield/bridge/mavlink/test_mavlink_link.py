@@ -260,8 +260,10 @@ def test_a_boat_given_back_is_ours_again_only_when_it_is_prepared_again(taken):
         boat.mode, boat.armed = 15, True
         assert wait_for(lambda: "given back" in link.read().why_not)
         assert not wait_for(lambda: link.read().ready, 1.5), "never by itself"
+        assert link.read().released
         link.prepare(20.0)
         assert link.read().ready
+        assert not link.read().released
 
 
 def test_a_boat_given_back_and_not_taken_is_left_alone_at_the_end():
