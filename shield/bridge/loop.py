@@ -126,6 +126,10 @@ class Loop:
                 self._broke_s = self.clock.now_s()
                 LOG.exception("a turn of the loop broke; boats told to stop")
 
+    def _no_taking(self) -> str:
+        """Why no boat is taken back now; empty: it may be."""
+        return "the run ends" if self._ending else "STOP ALL is in force" if self.operator.stopped else ""
+
     def _stop_ours(self) -> None:
         """Stop boats by their links; those that somebody took are left alone, unless STOP ALL was asked for twice."""
         readings = {} if self.operator.hard else self._readings
@@ -139,7 +143,7 @@ class Loop:
         """
         began = self.clock.now_s()
         self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
-        self._retaking.look(self.operator.take_requests(), readings, began)
+        self._retaking.look(self.operator.take_requests(), readings, began, self._no_taking())
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
         answer, policy_age, fault = _latest(self.parts.policy)
