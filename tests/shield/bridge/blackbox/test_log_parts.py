@@ -94,6 +94,15 @@ def test_a_part_that_was_cut_off_is_told_and_the_next_is_read(log):
     assert any("cut off" in text for text in damage)
 
 
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_only_the_part_that_was_cut_off_is_named(log, number):
+    cut = part_path(log, number)
+    cut.write_bytes(cut.read_bytes()[:-200])
+    _, complete, damage, files = read(log)
+    assert (complete, files) == (False, 3)
+    assert [text for text in damage if "was cut off" in text] == [f"{cut.name} was cut off"] * (number < 3)
+
+
 class FullLater(Disk):
     """No new file finds room after the first."""
 
