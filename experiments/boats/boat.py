@@ -13,6 +13,7 @@ from .autopilot import Autopilot
 from .faults import Faults
 from .helmsman import Helmsman
 from .hull import Hull
+from .modes import Mode
 from .orders import Order
 from .radio import Radio
 from .sensing import Sensors
@@ -90,6 +91,11 @@ class Boat:
         """Whether it obeys a commander at this moment."""
         vehicle = self.autopilot.vehicle
         return vehicle.armed and vehicle.target is not None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether its autopilot is in HOLD."""
+        return self.autopilot.vehicle.mode is Mode.HOLD
 
     def step(self, time_s: float, order: Order | None = None) -> None:
         """Move by one step, to ``time_s``, as its autopilot orders or as given."""

@@ -14,6 +14,10 @@ from .hull import STEP_S
 RECENT_S = 5.0
 """A fault counts for what happens so long after it, s."""
 
+LEFT_S = 2.0
+"""A boat is left in order when it is in HOLD so soon after the last command it obeyed, s: while HOLD is asked for, 4 s,
+that may time out, after 3 s. A boat whose runner died stays in GUIDED, or its failsafe holds it later."""
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -23,11 +27,13 @@ class Mark:
         steered: whether a policy or a commander whom it obeys steers it.
         faults: kinds of faults that act on it.
         commanded: whether it obeys a commander.
+        held: whether its autopilot is in HOLD, as the end of a run leaves it.
     """
 
     steered: bool
     faults: tuple[str, ...] = ()
     commanded: bool = False
+    held: bool = False
 
 
 class Marks:
@@ -35,14 +41,13 @@ class Marks:
 
     def __init__(self) -> None:
         self._rows: list[tuple[Mark, ...]] = []
-        self._last_commanded = 0
+        self._last_commanded: dict[int, int] = {}
         self._kept: dict[Mark, Mark] = {}
 
     def add(self, marks: Sequence[Mark]) -> None:
         """Those of the step that was just moved."""
         self._rows.append(tuple(self._kept.setdefault(mark, mark) for mark in marks))
-        if any(mark.commanded for mark in marks):
-            self._last_commanded = len(self._rows)
+        self._last_commanded |= {boat: len(self._rows) for boat, mark in enumerate(marks) if mark.commanded}
 
     def commanded(self, n_boats: int) -> Array:
         """(T, n) bool: whether each boat obeyed a commander."""
@@ -56,8 +61,17 @@ class Marks:
         return {
             "unsteered_s": [self._unsteered_s(step, boat) for boat in boats],
             "faults": sorted(faults),
-            "after_run": 0 < self._last_commanded < step,
+            "after_run": self._is_over(step) and all(map(self._is_left, boats)),
         }
+
+    def _is_over(self, step: int) -> bool:
+        """Whether boats had been commanded, and none is at that step or later."""
+        return 0 < max(self._last_commanded.values(), default=0) < step
+
+    def _is_left(self, boat: int) -> bool:
+        """Whether a boat was left in order by whoever commanded it; also one that nobody ever commanded."""
+        last = self._last_commanded.get(boat)
+        return last is None or any(row[boat].held for row in self._rows[last : last + round(LEFT_S / STEP_S)])
 
     def _unsteered_s(self, step: int, boat: int) -> float:
         for back, row in enumerate(reversed(self._rows[:step])):

@@ -97,7 +97,9 @@ class World:
         if self._game is not None and self.is_playing:
             self._game.follow([boat.hull.state for boat in self._players])
         if self.truth is not None:
-            marks = [Mark(_is_steered(boat), boat.faults.active, boat.is_commanded) for boat in self._players]
+            marks = [
+                Mark(_is_steered(boat), boat.faults.active, boat.is_commanded, boat.is_held) for boat in self._players
+            ]
             self.truth.step([boat.order for boat in self._players], headings_deg, marks)
         if self._hub is not None:
             self._hub.send(self._boats, time_s)

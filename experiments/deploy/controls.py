@@ -76,12 +76,13 @@ class Controls:
             self._operator.stop_all(BY)
 
     def _command(self, key: str) -> None:
+        self._said = ""
         if key in ("q", "Q"):
             self._operator.end(BY)
         elif key in ("r", "R") and self._operator.stopped:
             self._open = "resume"
         elif key in ("o", "O"):
-            self._open, self._said = "condition", ""
+            self._open = "condition"
         elif key in ("t", "T"):
             self._open = "take"
 

@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -56,35 +56,69 @@ def undisturbed() -> Iterator[None]:
 def before_others() -> Iterator[None]:
     """All threads of this process go before other programs, as far as the system lets them; what is started later not.
 
-    The calling thread goes before the others of this process.
+    The calling thread goes before the others of this process; where it may not, they stay behind it too. A thread that
+    has more already keeps it, and each is given back what it had.
     """
-    niceness = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
     own = threading.get_native_id()
-    with contextlib.suppress(OSError):  # each takes a right that few have; without it all goes on as it is
-        for task in _tasks():
-            os.setpriority(os.PRIO_PROCESS, task, NICENESS)
-    with contextlib.suppress(OSError):
-        for task in _tasks():
-            _schedule(task, LOOP_FIRST if task == own else OTHERS_FIRST)
+    before = {task: place for task in _tasks() if (place := _place(task)) is not None}
+    for task in before:
+        with contextlib.suppress(OSError):  # each takes a right that few have; without it all goes on as it is
+            os.setpriority(os.PRIO_PROCESS, task, min(NICENESS, before[task].niceness))
+    if own in before and _schedule(own, before[own], LOOP_FIRST):
+        for task in before.keys() - {own}:
+            _schedule(task, before[task], OTHERS_FIRST)
     try:
         yield
     finally:
-        for task in _tasks():
-            with contextlib.suppress(OSError):
-                _schedule(task, 0)
-                os.setpriority(os.PRIO_PROCESS, task, niceness)
+        for task, place in before.items():
+            _give_back(task, place)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Policy, real-time priority and niceness of a thread."""
+
+    policy: int
+    priority: int
+    niceness: int
+
+
+def _place(task: int) -> _Place | None:
+    """What a thread has; None: it has ended."""
+    try:
+        priority = os.sched_getparam(task).sched_priority
+        return _Place(os.sched_getscheduler(task), priority, os.getpriority(os.PRIO_PROCESS, task))
+    except OSError:
+        return None
+
+
+def _schedule(task: int, place: _Place, priority: int) -> bool:
+    """Let a thread have at least a real-time priority; processes and threads it starts have none. Whether it has it."""
+    if place.priority >= priority:
+        return True
+    try:
+        os.sched_setscheduler(task, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except OSError:
+        return False
+    return True
+
+
+def _give_back(task: int, place: _Place) -> None:
+    parameter = os.sched_param(place.priority)
+    for policy in (place.policy, place.policy | os.SCHED_RESET_ON_FORK):  # few have the right to take the flag off
+        try:
+            os.sched_setscheduler(task, policy, parameter)
+            break
+        except OSError:
+            continue
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, task, place.niceness)
 
 
 def _tasks() -> list[int]:
     """Numbers of this process's threads, where the system tells them."""
     folder = Path("/proc/self/task")
     return [int(task.name) for task in folder.iterdir()] if folder.is_dir() else []
-
-
-def _schedule(task: int, priority: int) -> None:
-    """Give a thread a real-time priority, 0: none; processes and threads it starts have none."""
-    policy = (os.SCHED_RR if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
-    os.sched_setscheduler(task, policy, os.sched_param(priority))
 
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))

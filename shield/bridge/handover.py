@@ -24,34 +24,34 @@ def at_rest(readings: Mapping[str, BoatReading]) -> bool:
     return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in readings.values())
 
 
-def nearing(fleet: FleetFile, roster: Roster) -> list[str]:
+def nearing(fleet: FleetFile, roster: Roster, readings: Mapping[str, BoatReading]) -> list[str]:
     """Boats that come within the separation radius of one of ours within ``end.clear_s``, a line each.
 
-    Both are run straight on, their errors added; a contact too old to be known is not told.
+    Both are run straight on, their errors added; one not heard of for too long is not told. A boat of ours that does
+    not obey, because a pilot steers it, may come near the others as any boat may.
     """
-    own = {name: roster.track(name) for name in roster.commanded}
-    others = {
-        name: roster.track(name)
-        for name in fleet.names
-        if name not in own and roster.contact_age_s(name) <= fleet.limits.contact.lost_after_s
-    }
+    tracks = {name: roster.track(name) for name in fleet.names}
+    obeys = {name for name in roster.commanded if name not in readings or readings[name].ready}
     return [
         text
-        for name, track in own.items()
-        for other, seen in others.items()
-        if track is not None and seen is not None
-        for text in _told(fleet, (name, track), (other, seen))
+        for name in roster.commanded
+        for other in fleet.names
+        if other != name and other not in obeys
+        for text in _told(fleet, (name, tracks[name]), (other, tracks[other]))
     ]
 
 
-def _told(fleet: FleetFile, own: tuple[str, Track], other: tuple[str, Track]) -> list[str]:
-    apart, closing = _place(other[1]) - _place(own[1]), _velocity(other[1]) - _velocity(own[1])
+def _told(fleet: FleetFile, own: tuple[str, Track | None], other: tuple[str, Track | None]) -> list[str]:
+    ours, seen = own[1], other[1]
+    if ours is None or seen is None or seen.age_s > fleet.limits.contact.lost_after_s:
+        return []
+    apart, closing = _place(seen) - _place(ours), _velocity(seen) - _velocity(ours)
     if float(np.hypot(*closing)) < REST_MPS:
         return []
     soonest = -float(apart @ closing) / float(closing @ closing)
     time_s = min(max(soonest, 0.0), fleet.end.clear_s)
     near_m = float(np.hypot(*(apart + time_s * closing)))
-    if near_m > fleet.shield_config.separation_m + own[1].error_m + other[1].error_m:
+    if near_m > fleet.shield_config.separation_m + ours.error_m + seen.error_m:
         return []
     return [f"{other[0]} comes within {near_m:.1f} m of {own[0]} in {time_s:.0f} s"]
 

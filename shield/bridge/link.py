@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Protocol, Self
 
 NEVER_S = math.inf
 """Age of what was never received."""
+
+
+def never() -> bool:
+    """What is not called off."""
+    return False
 
 
 @dataclass(frozen=True)
@@ -30,6 +36,7 @@ class BoatReading:
         mode: name of the autopilot's mode.
         ready: whether commands of heading and speed would be obeyed now (armed, in the right mode).
         why_not: why not, in words; empty when ready.
+        released: whether somebody took the boat and nobody of ours took it back yet; in whatever mode it is now.
         heartbeat_age_s: s.
         texts: what the autopilot said since the last reading.
         faults: what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind.
@@ -49,6 +56,7 @@ class BoatReading:
     mode: str = ""
     ready: bool = False
     why_not: str = "nothing heard yet"
+    released: bool = False
     heartbeat_age_s: float = NEVER_S
     texts: tuple[str, ...] = ()
     faults: dict[str, int] = field(default_factory=dict)
@@ -96,14 +104,19 @@ class Link(Protocol):
             LinkError: no boat answers in time, or the address cannot be used.
         """
 
-    def prepare(self, timeout_s: float) -> None:
+    def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
 
-        Also one that somebody took from us, which is left alone until then, whatever mode it comes back to.
+        Also one that somebody took from us, which is left alone until then, whatever mode it comes back to. When that
+        fails it is left alone as before.
+
+        Args:
+            timeout_s: how long to try, s.
+            is_off: true once it is not to be done any more; it then ends at once.
 
         Raises:
             LinkRefused: the autopilot says no; its own words are in the text.
-            LinkError: no answer in time.
+            LinkError: no answer in time, or called off.
         """
 
     def read(self) -> BoatReading:

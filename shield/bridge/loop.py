@@ -95,7 +95,7 @@ class Loop:
             self._keep_on(due, lambda now: now < latest and not self._is_clear())
             self._tell_near()
         finally:
-            self._helm.stop_all(tuple(self.parts.links))
+            self._stop_ours()
             self._retaking.close()
         return self._ending
 
@@ -109,10 +109,10 @@ class Loop:
 
     def _is_clear(self) -> bool:
         """Whether boats can be handed over: they lie still, and nobody is on the way to one of them."""
-        return at_rest(self._readings) and not nearing(self.fleet, self.roster)
+        return at_rest(self._readings) and not nearing(self.fleet, self.roster, self._readings)
 
     def _tell_near(self) -> None:
-        self.near = tuple(nearing(self.fleet, self.roster))
+        self.near = tuple(nearing(self.fleet, self.roster, self._readings))
         for text in self.near:
             LOG.warning("handed over although %s: take it over by hand", text)
 
@@ -121,10 +121,19 @@ class Loop:
         try:
             self.turn(due_s)
         except Exception:
-            self._helm.stop_all(tuple(self.parts.links))
+            self._stop_ours()
             if self.clock.now_s() - self._broke_s >= TALK_EVERY_S:
                 self._broke_s = self.clock.now_s()
                 LOG.exception("a turn of the loop broke; boats told to stop")
+
+    def _no_taking(self) -> str:
+        """Why no boat is taken back now; empty: it may be."""
+        return "the run ends" if self._ending else "STOP ALL is in force" if self.operator.stopped else ""
+
+    def _stop_ours(self) -> None:
+        """Stop boats by their links; those that somebody took are left alone, unless STOP ALL was asked for twice."""
+        readings = {} if self.operator.hard else self._readings
+        self._helm.stop_all([name for name in self.parts.links if name not in readings or not readings[name].released])
 
     def turn(self, due_s: float) -> Tick:
         """One turn.
@@ -134,7 +143,7 @@ class Loop:
         """
         began = self.clock.now_s()
         self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
-        self._retaking.look(self.operator.take_requests(), readings, began)
+        self._retaking.look(self.operator.take_requests(), readings, began, self._no_taking())
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
         answer, policy_age, fault = _latest(self.parts.policy)

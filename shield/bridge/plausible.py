@@ -30,13 +30,14 @@ BELIEVED_AFTER_S = 2.0
 
 @dataclass(frozen=True)
 class Fix:
-    """Where a boat was: position m, speed m/s, heading rad, and when, s."""
+    """Where a boat was: position m, speed m/s, heading rad, when, s, and how wrong the place may be as told, m."""
 
     x_m: float
     y_m: float
     heading_rad: float
     speed_mps: float
     fixed_s: float
+    error_m: float = 0.0
 
     def after(self, time_s: float) -> tuple[float, float]:
         """Position at another time on the same course, m."""
@@ -65,12 +66,13 @@ class Gate:
 
         Args:
             fix: what is told.
-            witness: where somebody else lately saw the boat; None: nobody did.
+            witness: where somebody else lately saw the boat; None: nobody did. It never refuses a fix that goes on
+                from the last one taken: it may be the one that is wrong.
         """
         text = self._impossible(fix) or self._frozen(fix)
         if text:
             return text
-        if self._doubted is not None and witness is not None and not _agree(witness, fix):
+        if self._doubted is not None and self._is_contradicted(fix, witness):
             self._doubted, self._doubted_since_s = fix, fix.fixed_s
             return "position jumped, and the feed sees it elsewhere"
         if self._last is None or self._near(self._last, fix):
@@ -98,6 +100,12 @@ class Gate:
         self._newest_s = max(self._newest_s, fix.fixed_s)
         return f"position frozen while it runs {abs(fix.speed_mps):.1f} m/s" if self._run_m > FROZEN_M else ""
 
+    def _is_contradicted(self, fix: Fix, witness: Fix | None) -> bool:
+        """Whether a witness sees the boat elsewhere, and its own last fix says nothing else."""
+        if witness is None or _agree(witness, fix):
+            return False
+        return self._last is None or not _agree(self._last, fix)
+
     def _near(self, before: Fix, fix: Fix) -> bool:
         """Whether the boat can have come from there, whatever it did on the way."""
         seconds = abs(fix.fixed_s - before.fixed_s)
@@ -116,6 +124,6 @@ class Gate:
 
 
 def _agree(witness: Fix, fix: Fix) -> bool:
-    """Whether two fixes of a boat are of one place."""
+    """Whether a fix is of the place where the boat was seen, as well as that is known."""
     x, y = witness.after(fix.fixed_s)
-    return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M
+    return math.hypot(fix.x_m - x, fix.y_m - y) <= JUMP_M + witness.error_m

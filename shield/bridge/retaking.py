@@ -29,17 +29,27 @@ class Retaking:
     def __init__(self, links: Mapping[str, Link]) -> None:
         self._links = links
         self._threads: dict[str, threading.Thread] = {}
+        self._off = threading.Event()
         self._told: dict[str, tuple[float, str]] = {}
         self._ended: dict[str, str] = {}
 
-    def look(self, requests: Iterable[tuple[str, str]], readings: Mapping[str, BoatReading], now_s: float) -> None:
+    def look(
+        self, requests: Iterable[tuple[str, str]], readings: Mapping[str, BoatReading], now_s: float, why_not: str = ""
+    ) -> None:
         """Begin what is asked for.
 
         Args:
             requests: boats, and who asked.
             readings: of own boats; one that obeys needs nothing.
             now_s: time, s.
+            why_not: why boats are not to be taken back now; what is under way is called off. Empty: they may be.
         """
+        if why_not:
+            self._off.set()
+            self._told |= {boat: (now_s, f"{boat} is not taken back: {why_not}") for boat, _ in requests}
+            requests = ()
+        elif self._off.is_set():
+            self._off = threading.Event()  # what was called off stays so: it has the old one
         for boat, by in requests:
             if boat not in self._links or readings[boat].ready:
                 self._told[boat] = (
@@ -50,7 +60,7 @@ class Retaking:
             elif boat not in self._threads:
                 self._told[boat] = now_s, f"{boat} is being taken back, asked for by {by}"
                 self._threads[boat] = threading.Thread(
-                    target=self._take, args=(boat,), name=f"take {boat}", daemon=True
+                    target=self._take, args=(boat, self._off), name=f"take {boat}", daemon=True
                 )
                 self._threads[boat].start()
         self._finish(now_s)
@@ -63,13 +73,14 @@ class Retaking:
         return tuple(Action(boat, "take_back", "none", text) for boat, (_, text) in self._told.items())
 
     def close(self) -> None:
-        """Wait for what is under way."""
+        """Call off what is under way, and wait for it."""
+        self._off.set()
         for thread in self._threads.values():
             thread.join(2.0 * WITHIN_S)
 
-    def _take(self, boat: str) -> None:
+    def _take(self, boat: str, off: threading.Event) -> None:
         try:
-            self._links[boat].prepare(WITHIN_S)
+            self._links[boat].prepare(WITHIN_S, off.is_set)
             text = f"{boat} is taken back and obeys"
         except BridgeError as error:
             text = f"not taken back: {error}"

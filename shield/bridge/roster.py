@@ -153,7 +153,7 @@ class Roster:
         seen = self._contacts.get(name)
         if seen is None or self._now_s - seen.fixed_s > self.fleet.limits.contact.max_age_s:
             return None
-        return Fix(*seen.position_m, seen.heading_rad, seen.speed_mps, seen.fixed_s)
+        return Fix(*seen.position_m, seen.heading_rad, seen.speed_mps, seen.fixed_s, seen.error_m)
 
     def _take_feed(self, name: str, estimator: Estimator) -> None:
         """Let the feed say where an own boat is when its own telemetry does not: what is left is used."""

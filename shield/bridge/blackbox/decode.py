@@ -117,8 +117,9 @@ def _column(rows: list[dict[str, Any]], name: str, kind: Callable[[Any], Any]) -
 
 
 def _surroundings(row: Mapping[str, Any]) -> Surroundings:
+    known = {"stops": (), **row}  # logs of before there were stops have none
     circles = {
-        name: [(entry["x_m"], entry["y_m"], entry["radius_m"]) for entry in row.get(name, ())]
+        name: [(entry["x_m"], entry["y_m"], entry["radius_m"]) for entry in known[name]]
         for name in ("circles", "keep_out", "stops")
     }
     polygons = [list(zip(line["x_m"], line["y_m"], strict=True)) for line in row["polygons"]]

@@ -115,11 +115,12 @@ class LogReader:
     def _read(self) -> Iterator[tuple[str, Message]]:
         """Messages with their topics, file after file; ends where the log can no longer be read."""
         yield from self._read_file()
+        are_whole = True
         for number, path in later_parts(self.path):
-            cut_off = not self.complete
-            self.complete = False
-            if cut_off:
+            if not self.complete:
+                are_whole = False
                 self._tell(f"{self.files[-1].name} was cut off")
+            self.complete = False
             try:
                 later = path.open("rb")
             except OSError as error:
@@ -134,7 +135,7 @@ class LogReader:
                 return
             self.files.append(path)
             yield from messages
-            self.complete &= not cut_off
+        self.complete &= are_whole
 
     def _belongs(self, message: Message) -> bool:
         return follows(self.header, LogHeader.from_message(_object(message)))

@@ -76,6 +76,7 @@ _READING = record(
     mode=TEXT,
     ready=FLAG,
     why_not=TEXT,
+    released=FLAG,
     heartbeat_age_s=NUMBER,
     texts=many(TEXT),
     faults=many(record("refused since the last reading", kind=TEXT, count=WHOLE)),

@@ -12,6 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..clock import Clock
+from ..link import never
 from .routes import Abilities
 from .texts import Texts
 
@@ -30,22 +31,24 @@ class Patience:
     Args:
         clock: the loop's.
         timeout_s: s.
+        is_off: true once what is waited for is not wanted any more.
     """
 
-    def __init__(self, clock: Clock, timeout_s: float) -> None:
+    def __init__(self, clock: Clock, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         self._clock = clock
+        self.is_off = is_off
         self._end_s = clock.now_s() + timeout_s
         self._real_end_s = time.monotonic() + timeout_s
 
     @property
     def is_over(self) -> bool:
-        """Whether the time is up."""
-        return self._clock.now_s() >= self._end_s or time.monotonic() >= self._real_end_s
+        """Whether the time is up, or it was called off."""
+        return self.is_off() or self._clock.now_s() >= self._end_s or time.monotonic() >= self._real_end_s
 
     def part(self, timeout_s: float) -> Patience:
         """A shorter one that is over with this one."""
         left = min(self._end_s - self._clock.now_s(), self._real_end_s - time.monotonic())
-        return Patience(self._clock, max(0.0, min(timeout_s, left)))
+        return Patience(self._clock, max(0.0, min(timeout_s, left)), self.is_off)
 
 
 class Dialogue:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
 from ...exceptions import LinkError
 from ..clock import Clock
 from ..frame import FieldFrame
-from ..link import NEVER_S, BoatReading, Sent
+from ..link import NEVER_S, BoatReading, Sent, never
 from .autopilot import Autopilot
 from .dialogue import Patience
 from .endpoint import Endpoint
@@ -88,14 +89,14 @@ class MavlinkLink:
         """Ask what the autopilot can do and for the parameters that checks look at; what it does not answer is left."""
         learn(self.autopilot, Patience(self._clock, timeout_s))
 
-    def prepare(self, timeout_s: float) -> None:
+    def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Read what the autopilot can do and choose the route; GUIDED; arm, all checks on.
 
         Raises:
             LinkRefused: the autopilot says no; its own words are in the text.
-            LinkError: no answer in time.
+            LinkError: no answer in time, called off, or somebody took the boat meanwhile.
         """
-        prepare(self.autopilot, self._wanted_route, Patience(self._clock, timeout_s))
+        prepare(self.autopilot, self._wanted_route, Patience(self._clock, timeout_s, is_off))
 
     def read(self) -> BoatReading:
         """The latest of everything; never waits."""
@@ -120,6 +121,7 @@ class MavlinkLink:
                 mode=boat.mode,
                 ready=not why_not,
                 why_not=why_not,
+                released=bool(boat.released),
                 heartbeat_age_s=NEVER_S if boat.heartbeat is None else _age(now_s, boat.heartbeat.received_s),
                 texts=boat.dialogue.take_texts(),
                 faults=boat.take_faults(),

@@ -39,7 +39,7 @@ def prepare(boat: Autopilot, route: str, patience: Patience) -> None:
 
     Raises:
         LinkRefused: the autopilot says no until the time is up.
-        LinkError: no answer in time.
+        LinkError: no answer in time, called off, or somebody took the boat meanwhile; it is left alone as before.
     """
     if boat.heartbeat is None:
         raise LinkError(f"boat {boat.boat}: not connected; call connect first")
@@ -47,9 +47,28 @@ def prepare(boat: Autopilot, route: str, patience: Patience) -> None:
     boat.route = choose_route(boat.boat, route, boat.dialogue.abilities)
     _reach(boat, mode_request(*boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
     _reach(boat, arm_request(*boat.target), lambda: boat.is_armed, "arming", patience)
-    boat.expects_guided, boat.released = True, ""
+    taken_by = boat.released
+    _take(boat, patience)
     if not boat.dialogue.wait(lambda: not boat.why_not(boat.clock.now_s()), patience):
-        raise LinkError(f"boat {boat.boat}: {boat.why_not(boat.clock.now_s())}; put that right, then start again")
+        with boat.dialogue.changed:
+            text = boat.why_not(boat.clock.now_s())
+            boat.released = boat.released or taken_by
+        raise LinkError(f"boat {boat.boat}: {text}; put that right, then start again")
+
+
+def _take(boat: Autopilot, patience: Patience) -> None:
+    """From now on it is ours, unless a pilot took it since it was seen to be ready, or nobody wants it any more."""
+    with boat.dialogue.changed:
+        _check_wanted(boat, patience)
+        if boat.mode != GUIDED or not boat.is_armed:
+            state = "armed" if boat.is_armed else "disarmed"
+            raise LinkError(f"boat {boat.boat}: {state} in {boat.mode} again; see who else commands it")
+        boat.expects_guided, boat.released = True, ""
+
+
+def _check_wanted(boat: Autopilot, patience: Patience) -> None:
+    if patience.is_off():
+        raise LinkError(f"boat {boat.boat}: taking it was called off; it is left alone")
 
 
 def _reach(boat: Autopilot, request: Any, holds: Callable[[], bool], what: str, patience: Patience) -> None:
@@ -64,6 +83,7 @@ def _reach(boat: Autopilot, request: Any, holds: Callable[[], bool], what: str, 
             return
         if patience.is_over:
             break
+    _check_wanted(boat, patience)
     if result is None:
         raise LinkError(f"boat {boat.boat}: no answer to the request for {what}; check the radio, then start again")
     if result == mavlink.MAV_RESULT_ACCEPTED:

@@ -1,14 +1,19 @@
 """What held simulated boats when they came too near: who steered, which faults acted, whether the run was over."""
 
+import contextlib
+
 import pytest
 from boat_links import READY
 from steerclear.experiments.boats import SimBoat, SimFleet
+from steerclear.experiments.boats.hull import STEP_S
 from steerclear.experiments.boats.marks import Mark, Marks
+from steerclear.experiments.boats.modes import Mode
 from steerclear.experiments.boats.report import _counts
 
-HELD = Mark(True, (), True)
+STEERED = Mark(True, (), True)
 ALONE = Mark(False, ("link_loss",))
 PLAYED = Mark(True)
+LEFT = Mark(False, held=True)
 
 
 def marks_of(*rows):
@@ -19,22 +24,49 @@ def marks_of(*rows):
 
 
 def test_how_long_a_boat_was_steered_by_nobody_is_told():
-    marks = marks_of(*[(HELD, PLAYED)] * 3, *[(ALONE, PLAYED)] * 4, (HELD, PLAYED))
+    marks = marks_of(*[(STEERED, PLAYED)] * 3, *[(ALONE, PLAYED)] * 4, (STEERED, PLAYED))
     assert marks.of(7, (0, 1)) == {"unsteered_s": [0.4, 0.0], "faults": ["link_loss"], "after_run": False}
     assert marks.of(3, (0, 1)) == {"unsteered_s": [0.0, 0.0], "faults": [], "after_run": False}
 
 
 def test_a_fault_counts_for_five_seconds():
-    rows = [(ALONE,), *[(HELD,)] * 60]
+    rows = [(ALONE,), *[(STEERED,)] * 60]
     assert marks_of(*rows).of(50, (0,))["faults"] == ["link_loss"]
     assert marks_of(*rows).of(52, (0,))["faults"] == []
 
 
 def test_the_run_is_over_when_nobody_commands_any_more():
-    marks = marks_of(*[(HELD, PLAYED)] * 5, *[(Mark(False), PLAYED)] * 5)
+    marks = marks_of(*[(STEERED, PLAYED)] * 5, *[(LEFT, PLAYED)] * 5)
     assert not marks.of(5, (0, 1))["after_run"]
     assert marks.of(6, (0, 1))["after_run"]
     assert not marks_of(*[(PLAYED,)] * 5).of(5, (0,))["after_run"], "nobody ever commanded: no run"
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "then", "in_order"),
+    [
+        (0.0, LEFT, True),
+        (1.5, LEFT, True),  # its commands timed out while HOLD was asked for
+        (3.5, LEFT, False),  # its own failsafe
+        (0.0, Mark(False), False),  # GUIDED, and nobody there
+    ],
+)
+def test_a_runner_that_dies_does_not_end_the_run(gap_s, then, in_order):
+    gap = round(gap_s / STEP_S)
+    rows = [*[(STEERED, PLAYED, STEERED)] * 5, *[(Mark(False), PLAYED, LEFT)] * gap, *[(then, PLAYED, LEFT)] * 5]
+    marks = marks_of(*rows)
+    assert marks.of(len(rows), (0, 1))["after_run"] == in_order
+    assert marks.of(len(rows), (2, 1))["after_run"], "the other was left in order"
+    assert marks.of(len(rows), (2, 0))["after_run"] == in_order
+
+
+def test_a_boat_in_hold_says_so():
+    boats = [SimBoat("b0", address="udpin:127.0.0.1:0"), SimBoat("b1", start=(30.0, 10.0, 0.0))]
+    with contextlib.closing(SimFleet(boats, autopilot=READY)) as fleet:
+        boat = fleet.boats["b0"]
+        assert not boat.is_held
+        boat.autopilot.vehicle.set_mode(Mode.HOLD, fleet.time_s)
+        assert boat.is_held
 
 
 @pytest.mark.parametrize(("after", "counts"), [(False, True), (True, False)])

@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 from deploy_ticks import Stream
 from steerclear.experiments.deploy.plain import PlainLines, logging_aside
-from steerclear.experiments.deploy.quiet import LOOP_FIRST, NICENESS, OTHERS_FIRST, ended_by_signals, undisturbed
+from steerclear.experiments.deploy.quiet import (
+    LOOP_FIRST,
+    NICENESS,
+    OTHERS_FIRST,
+    before_others,
+    ended_by_signals,
+    undisturbed,
+)
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
@@ -86,14 +93,35 @@ def scheduled():
     return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
 
 
+def in_a_thread(act):
+    """What is returned in a thread of its own: what it does to its scheduling ends with it."""
+    answers = []
+    thread = threading.Thread(target=lambda: answers.append(act()))
+    thread.start()
+    thread.join(20.0)
+    return answers[0]
+
+
 def may_go_first():
     """Whether this system lets a program go before others."""
-    try:
-        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
-    except OSError:
-        return False
-    os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
-    return True
+
+    def go_first():
+        try:
+            os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(LOOP_FIRST))
+        except OSError:
+            return False
+        return True
+
+    return in_a_thread(go_first)
+
+
+AT_FIRST = os.sched_getscheduler(0)
+GOES_FIRST = pytest.mark.skipif(not may_go_first(), reason="this system gives no program real-time priority")
+
+
+def test_asking_what_the_system_allows_leaves_these_tests_as_they_were():
+    assert may_go_first() in (True, False)
+    assert os.sched_getscheduler(0) == AT_FIRST
 
 
 def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
@@ -111,7 +139,7 @@ def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
     assert scheduled() == plain
 
 
-@pytest.mark.skipif(not may_go_first(), reason="this system gives no program real-time priority")
+@GOES_FIRST
 def test_the_loop_goes_before_all_other_programs_and_the_runners_threads_after_it():
     seen, ends = [], threading.Event()
 
@@ -126,6 +154,55 @@ def test_the_loop_goes_before_all_other_programs_and_the_runners_threads_after_i
         ends.set()
         thread.join(20.0)
     assert seen == [(os.SCHED_RR, OTHERS_FIRST)]
+
+
+@GOES_FIRST
+def test_a_run_that_goes_before_others_already_is_not_put_back_and_is_left_as_it_was():
+    def run():
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(7))
+        with undisturbed():
+            seen = scheduled()
+        return seen, (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)
+
+    assert in_a_thread(run) == ((os.SCHED_FIFO, 7), (os.SCHED_FIFO, 7))
+
+
+class System:
+    """Threads and what they were given; some may not be given more than a priority, some have ended."""
+
+    def __init__(self, monkeypatch, tasks, most=99, gone=()):
+        self.given, self.most, self.gone = dict.fromkeys(tasks, (os.SCHED_BATCH, 0)), most, gone
+        monkeypatch.setattr("steerclear.experiments.deploy.quiet._tasks", lambda: list(self.given))
+        monkeypatch.setattr(os, "sched_getscheduler", lambda task: self._of(task)[0])
+        monkeypatch.setattr(os, "sched_getparam", lambda task: os.sched_param(self._of(task)[1]))
+        monkeypatch.setattr(os, "sched_setscheduler", self._give)
+        monkeypatch.setattr(os, "getpriority", lambda which, task: 3)
+        monkeypatch.setattr(os, "setpriority", lambda which, task, niceness: self._of(task))
+
+    def _of(self, task):
+        if task in self.gone:
+            raise ProcessLookupError
+        return self.given[task]
+
+    def _give(self, task, policy, parameter):
+        self._of(task)
+        if parameter.sched_priority > self.most:
+            raise PermissionError
+        self.given[task] = policy & ~os.SCHED_RESET_ON_FORK, parameter.sched_priority
+
+
+def test_a_thread_that_has_just_ended_keeps_no_other_from_going_first(monkeypatch):
+    own = threading.get_native_id()
+    system = System(monkeypatch, [1, own, 2], gone=(1,))
+    with before_others():
+        assert (system.given[own], system.given[2]) == ((os.SCHED_RR, LOOP_FIRST), (os.SCHED_RR, OTHERS_FIRST))
+    assert set(system.given.values()) == {(os.SCHED_BATCH, 0)}, "as they were"
+
+
+def test_no_thread_goes_first_where_the_loop_may_not(monkeypatch):
+    system = System(monkeypatch, [1, threading.get_native_id(), 2], most=OTHERS_FIRST)
+    with before_others():
+        assert set(system.given.values()) == {(os.SCHED_BATCH, 0)}, "the others would make the loop wait"
 
 
 def test_a_system_that_allows_nothing_is_no_fault(monkeypatch):

@@ -68,7 +68,7 @@ class FakeLink:
     def connect(self, timeout_s):
         pass
 
-    def prepare(self, timeout_s):
+    def prepare(self, timeout_s, is_off=lambda: False):
         pass
 
     def advance(self, dt_s):

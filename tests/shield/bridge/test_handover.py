@@ -40,6 +40,10 @@ def lying(other, **more):
     )
 
 
+def near(world):
+    return nearing(world.fleet, world.loop.roster, world.loop._readings)
+
+
 def test_a_boat_that_is_hunted_at_the_end_is_kept_out_of_the_way_until_it_is_left_in_peace():
     world = lying(("red_1", 40.0, 5.0, 0.0, 2.0))
 
@@ -81,13 +85,28 @@ def test_on_quiet_water_boats_are_handed_over_at_once():
 )
 def test_who_is_on_the_way_is_told_and_nobody_else(other, told):
     world = lying(("red_1", *other)).run(0.2)
-    assert bool(nearing(world.fleet, world.loop.roster)) == told
+    assert bool(near(world)) == told
 
 
 def test_a_boat_not_heard_of_any_more_holds_nothing_up():
     world = lying(("red_1", 40.0, 12.0, 0.0, 2.0)).run(0.2)
-    assert nearing(world.fleet, world.loop.roster)
+    assert near(world)
     world.contacts.silent.add("red_1")
     world.contacts.rows["red_1"][: L.Y + 1] = np.array([0.0, 0.0])
     world.run(6.0)
-    assert nearing(world.fleet, world.loop.roster) == []
+    assert near(world) == []
+
+
+@pytest.mark.parametrize("is_piloted", [True, False])
+def test_a_boat_of_ours_that_its_pilot_steers_at_another_is_told(is_piloted):
+    starts = [(40.0, 20.0, 0.0, 0.0), (40.0, 8.0, 0.0, 2.0)]
+    world = World(fleet_of(blue=2, red=0, more=END), starts, straight(0.0, 0.0))
+    if is_piloted:
+        world.links["blue_2"].changed = {"ready": False, "why_not": "it is in MANUAL"}
+    world.run(0.2)
+    found = near(world)
+    assert len(found) == is_piloted, "a boat that obeys is the shield's business"
+    assert all("blue_2 comes within" in text and "of blue_1" in text for text in found)
+    world.links["blue_2"].silent_since_s = world.clock.now_s()
+    world.run(6.0)
+    assert near(world) == [], "one not heard of any more holds nothing up"

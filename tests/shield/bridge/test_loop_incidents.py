@@ -73,6 +73,31 @@ def test_a_link_that_breaks_the_turn_leaves_all_told_to_stop():
     assert world.links["blue_1"].stops == 5
 
 
+GIVEN_BACK = {"ready": False, "released": True, "why_not": "it was taken from us (MANUAL) and given back"}
+
+
+def test_a_boat_that_was_taken_and_given_back_is_left_alone_by_a_broken_turn_and_at_the_end():
+    world = pair()
+    taken, ours = world.links["blue_1"], world.links["blue_2"]
+    taken.changed = GIVEN_BACK
+    world.run(0.5)
+    ours.read = lambda: 1 / 0
+    world.run(0.5)
+    assert (taken.stops, ours.stops) == (0, 5)
+    world.loop.run(0.0)
+    assert taken.stops == 0
+    assert ours.stops > 5
+
+
+def test_stop_all_past_the_shield_stops_also_a_boat_that_was_taken_and_given_back():
+    world = pair()
+    world.links["blue_1"].changed = GIVEN_BACK
+    for _ in range(2):
+        world.operator.stop_all("key")
+    world.run(0.3)
+    assert [link.stops for link in world.links.values()] == [3, 3]
+
+
 def test_a_sink_that_breaks_stops_nobody():
     world = pair()
     world.sink.take = lambda tick: 1 / 0

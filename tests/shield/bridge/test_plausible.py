@@ -61,6 +61,30 @@ def test_a_witness_who_is_wrong_does_no_harm_to_a_boat_that_goes_its_way():
     assert [gate.refuse(Fix(0.2 * k, 0.0, math.pi / 2, 2.0, 0.1 * k), wrong) for k in range(50)] == [""] * 50
 
 
+def way(k, off_m=0.0):
+    """A boat at 2 m/s along x, its k-th fix at 10 Hz, so far off it."""
+    return Fix(0.2 * k, off_m, math.pi / 2, 2.0, 0.1 * k)
+
+
+def test_one_outlier_under_a_witness_who_is_a_little_off_does_not_silence_the_boat():
+    gate = Gate(2.0)
+    said = [gate.refuse(way(k, 30.0 if k == 20 else 0.0), way(k, 4.0)) for k in range(600)]
+    assert said[:20] == [""] * 20
+    assert "jumped" in said[20]
+    assert said[21:] == [""] * 579
+
+
+def test_a_witness_who_knows_how_wrong_it_may_be_contradicts_less():
+    def believed(error_m):
+        gate = Gate(2.0)
+        gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))
+        seen = [Fix(24.0, 0.0, 0.0, 0.0, 0.1 * k, error_m) for k in range(80)]
+        return "" in [gate.refuse(Fix(30.0, 0.0, 0.0, 0.0, 0.1 * k), seen[k]) for k in range(1, 80)]
+
+    assert not believed(0.3)
+    assert believed(3.5)
+
+
 def test_jumps_all_over_the_place_are_never_believed():
     gate = Gate(2.0)
     gate.refuse(Fix(0.0, 0.0, 0.0, 0.0, 0.0))

@@ -1,10 +1,11 @@
 """A boat that somebody took from us is taken back when the operator asks, beside the loop, and never otherwise."""
 
 import threading
+import time
 
 import pytest
 from bridge_fakes import pair
-from steerclear.shield.exceptions import LinkRefused
+from steerclear.shield.exceptions import LinkError, LinkRefused
 
 TAKEN = {"ready": False, "why_not": "it is in MANUAL"}
 
@@ -16,7 +17,7 @@ def taken():
     link = world.links["blue_1"]
     link.changed, link.prepared = dict(TAKEN), 0
 
-    def prepare(timeout_s):
+    def prepare(timeout_s, is_off):
         link.prepared += 1
         link.changed = {}
 
@@ -63,7 +64,7 @@ def test_the_operator_takes_it_back_and_it_is_in_the_record(caplog):
 def test_a_boat_that_refuses_is_told_and_the_loop_goes_on():
     world, link = taken()
 
-    def refuse(timeout_s):
+    def refuse(timeout_s, is_off):
         raise LinkRefused("blue_1 refuses arming: safety switch; put that right, then start again")
 
     link.prepare = refuse
@@ -78,7 +79,7 @@ def test_the_loop_never_waits_for_it_and_a_second_press_asks_no_second_time():
     world, link = taken()
     goes_on, calls = threading.Event(), []
 
-    def slow(timeout_s):
+    def slow(timeout_s, is_off):
         calls.append(timeout_s)
         goes_on.wait(20.0)
 
@@ -90,6 +91,48 @@ def test_the_loop_never_waits_for_it_and_a_second_press_asks_no_second_time():
     assert "is being taken back" in told(world)[0]
     goes_on.set()
     finish(world)
+
+
+def until_called_off(link):
+    """``prepare`` that lasts until it is called off; its calls, and how often it was."""
+    calls = []
+
+    def slow(timeout_s, is_off):
+        end = time.monotonic() + 20.0
+        while not is_off() and time.monotonic() < end:
+            time.sleep(0.005)
+        calls.append(is_off())
+        raise LinkError("blue_1: called off")
+
+    link.prepare = slow
+    return calls
+
+
+def test_stop_all_calls_it_off_and_nothing_is_taken_back_until_boats_go_on():
+    world, link = taken()
+    calls = until_called_off(link)
+    world.operator.take_back("blue_1")
+    world.run(0.1)
+    world.operator.stop_all("key")
+    world.run(0.1)
+    finish(world)
+    assert calls == [True]
+    assert "called off" in told(world)[0]
+    world.operator.take_back("blue_1")
+    world.run(0.2)
+    finish(world)
+    assert calls == [True]
+    assert "STOP ALL" in told(world)[0]
+
+
+def test_the_end_of_the_run_calls_it_off():
+    world, link = taken()
+    calls = until_called_off(link)
+    world.operator.take_back("blue_1")
+    world.run(0.1)
+    world.operator.end("key")
+    world.loop.run()
+    assert calls == [True]
 
 
 @pytest.mark.parametrize(("boat", "text"), [("blue_2", "obeys"), ("red_9", "not commanded here")])

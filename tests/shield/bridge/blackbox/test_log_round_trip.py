@@ -163,6 +163,19 @@ def test_a_tick_without_a_part_is_refused(key):
         tick_from_json(message, HERON)
 
 
+@pytest.mark.parametrize(
+    ("key", "is_refused"),
+    [("field", True), ("circles", True), ("polygons", True), ("keep_out", True), ("stops", False)],
+)
+def test_surroundings_without_a_part_are_refused_except_stops_which_older_logs_lack(key, is_refused):
+    fixed = Surroundings(field=(-5.0, -5.0, 85.0, 45.0), keep_out=[(1.0, 2.0, 3.0)])
+    tick = dataclasses.replace(next(iter(Encounter(header_of(), 1))), surroundings=fixed)
+    message = tick_to_json(tick, HERON)
+    del message["surroundings"][0][key]
+    with pytest.raises(LogError, match="damaged") if is_refused else contextlib.nullcontext():
+        tick_from_json(message, HERON)
+
+
 @quick
 @given(st.data())
 def test_a_tick_with_anything_in_it_reads_or_is_refused(data):

@@ -260,8 +260,53 @@ def test_a_boat_given_back_is_ours_again_only_when_it_is_prepared_again(taken):
         boat.mode, boat.armed = 15, True
         assert wait_for(lambda: "given back" in link.read().why_not)
         assert not wait_for(lambda: link.read().ready, 1.5), "never by itself"
+        assert link.read().released
         link.prepare(20.0)
         assert link.read().ready
+        assert not link.read().released
+
+
+def retaken(boat, link, timeout_s=3.0, is_off=lambda: False):
+    """What taking back a boat that its pilot has in MANUAL, disarmed, comes to; given back it is in GUIDED, armed."""
+    boat.mode, boat.armed = 0, False
+    assert wait_for(lambda: "it is in MANUAL" in link.read().why_not)
+    with pytest.raises(LinkError) as error:
+        link.prepare(timeout_s, is_off)
+    boat.mode, boat.armed = 15, True
+    assert wait_for(lambda: link.autopilot.mode == "GUIDED" and link.autopilot.is_armed)
+    return str(error.value), link.read()
+
+
+def test_a_pilot_who_takes_the_boat_again_while_it_is_taken_back_keeps_it():
+    with linked() as (boat, link):
+
+        def arm_and_take(arm, force):
+            boat.armed, boat.mode = True, 4
+            return mavlink.MAV_RESULT_ACCEPTED
+
+        boat._arm = arm_and_take
+        text, reading = retaken(boat, link)
+        assert "HOLD" in text
+        assert reading.released
+        assert "given back" in reading.why_not
+
+
+def test_a_boat_that_is_not_reached_in_the_end_is_not_taken_back(monkeypatch):
+    with linked() as (boat, link):
+        plain = link.autopilot.why_not
+        monkeypatch.setattr(
+            link.autopilot, "why_not", lambda now_s: plain(now_s) or ("" if link.autopilot.released else "no heartbeat")
+        )
+        text, reading = retaken(boat, link)
+        assert "no heartbeat" in text
+        assert reading.released
+
+
+def test_taking_back_is_called_off_at_once():
+    with linked() as (boat, link):
+        text, reading = retaken(boat, link, 1e3, lambda: boat.mode == 15)
+        assert "called off" in text
+        assert reading.released
 
 
 def test_a_boat_given_back_and_not_taken_is_left_alone_at_the_end():
