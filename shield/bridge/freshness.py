@@ -102,6 +102,10 @@ def judge(fleet: FleetFile, roster: Roster, seen: Seen) -> Verdict:
 
 def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict: Verdict) -> None:
     limits, reading = fleet.limits, seen.readings[boat]
+    if reading.released:  # it stays his who took it, heard or not
+        verdict.idle.add(boat)
+        verdict.actions.append(Action(boat, "mode", "none", f"{boat} does not obey: {reading.why_not or reading.mode}"))
+        return
     age, known = roster.navigation_age_s(boat), roster.known_age_s(boat)
     silent = link_age_s(reading)
     why = f" ({roster.faults[boat]})" if boat in roster.faults else ""

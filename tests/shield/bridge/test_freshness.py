@@ -104,6 +104,16 @@ def test_a_boat_that_is_unknown_or_obeys_somebody_else_is_named():
     assert verdict.responses == {}
 
 
+@pytest.mark.parametrize("silent_s", [0.0, 2.0, 30.0])
+def test_a_boat_somebody_took_is_told_nothing_however_long_it_is_silent(silent_s):
+    taken = {"ready": False, "released": True, "why_not": "taken from us", "heartbeat_age_s": silent_s}
+    verdict = verdict_of(navigation_s=silent_s, reading=taken)
+    assert verdict.idle == {"blue_1"}
+    assert verdict.unknown == set()
+    assert verdict.responses == {}
+    assert "taken from us" in verdict.actions[0].text
+
+
 @pytest.mark.parametrize(
     ("situation", "condition"),
     [
