@@ -215,6 +215,27 @@ def recheck(
 
 
 @kernel
+def lay_first(
+    commands: Array,
+    done: int,
+    who: BoolArray,
+    state: Array,
+    boats: Boats,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+) -> None:
+    """Give each boat of ``who`` the manoeuvre to begin with: the one in memory, else the first of the family."""
+    for i in range(state.shape[0]):
+        if who[i]:
+            heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
+            first = 0 if remembered(i, done, heading, memory) else 1
+            side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
+            lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
+
+
+@kernel
 def assign_plans(
     commands: Array,
     done: int,
@@ -239,12 +260,7 @@ def assign_plans(
         Whether all boats of ours keep clear of all boats and of fixed things.
     """
     n = state.shape[0]
-    for i in range(n):
-        if who[i]:
-            heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-            first = 0 if remembered(i, done, heading, memory) else 1
-            side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
-            lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
+    lay_first(commands, done, who, state, boats, plans, tuning, memory, work)
     stale = True
     searched = np.full(n, -1)  # changes of plans there had been when boat i was last searched for
     changes = 0
