@@ -22,7 +22,7 @@ SIM_BOATS = {
     "tags[]": "tags made by blue and red, when recorded",
     "breaches[].unsteered_s[]": "for how long nobody had steered each of the two boats, s; 0: somebody did",
     "breaches[].faults[]": "faults of simulated boats that acted on one of the two then or in the 5 s before",
-    "breaches[].after_run": "whether commanders had left the boats of the breach in HOLD, and steered none any more, then or later",
+    "breaches[].after_run": "whether the boats of the breach had been left in HOLD and nobody steered any from then on",
     "clean": "whether the run had neither a breach of team-mates nor an avoidable one; false when not recorded",
     "files[]": "what was written",
 }

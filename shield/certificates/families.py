@@ -14,7 +14,7 @@ import numpy as np
 from ..jit import Array
 from ..platforms import Platform
 from ..platforms.limits import Limits, limits_of
-from .assign import COMMANDED
+from .candidates import COMMANDED
 
 TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
 
