@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .certificates.clearance import MARGIN
-from .jit import Array, BoolArray, kernel
+from .jit import Array, BoolArray, lean_kernel
 from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan
@@ -27,7 +27,7 @@ LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
 
 
-@kernel
+@lean_kernel
 def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan) -> None:
     """Keep every boat's manoeuvre for the next decision, as an absolute heading."""
     for i in range(ours.shape[0]):
@@ -47,7 +47,7 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
 
 
-@kernel
+@lean_kernel
 def finish(
     safe: bool,
     count: int,
@@ -70,7 +70,7 @@ def finish(
     commit(state, ours, memory, work, plan)
 
 
-@kernel
+@lean_kernel
 def decide_compiled(
     state: Array,
     wanted: Array,

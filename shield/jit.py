@@ -34,11 +34,33 @@ def kernel(function: F) -> F:
     """Compile a function with numba: cached on disk, without the GIL, IEEE division (no ZeroDivisionError).
 
     Fast-math stays off: results must be the same bits everywhere, and NaN tests must work.
-    numba's cache looks at a function's own file only, although callees from other files are compiled into it;
-    the stamp is therefore replaced by one over all sources, so that no stale machine code is ever run.
     """
-    compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
+    return _compiled(function, counted=True)
+
+
+def lean_kernel(function: F) -> F:
+    """The same for a function that makes no array: those it is handed stay its caller's, and are not counted.
+
+    numba otherwise counts references at every call, to each array of each tuple: for the tuples of a decision that
+    costs more than most functions do. Assigning a slice counts as making an array, see `copy_row`; compiling says so.
+    """
+    return _compiled(function, counted=False)
+
+
+def _compiled(function: F, counted: bool) -> F:
+    """numba's cache looks at a function's own file only, although callees from other files are compiled into it.
+
+    Its stamp is therefore replaced by one over all sources, so that no stale machine code is ever run.
+    """
+    compiled = njit(cache=True, nogil=True, error_model="numpy", _nrt=counted)(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if cache_file is not None and hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = _tree_stamp()
     return cast(F, compiled)
+
+
+@lean_kernel
+def copy_row(to: Array, source: Array) -> None:
+    """Copy a row of numbers, as long as ``source``."""
+    for k in range(source.shape[0]):
+        to[k] = source[k]

@@ -10,7 +10,7 @@ from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
 from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE
 from .certificates.values import run_opponents
-from .jit import Array, BoolArray, kernel
+from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check
 from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
 from .platforms import layout as L
@@ -21,7 +21,7 @@ CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
 
 
-@kernel
+@lean_kernel
 def worst_merit(ours: BoolArray, work: Work) -> float:
     """Least merit of any boat of ours."""
     worst = 2.0 * PAIR_SAFE
@@ -31,13 +31,13 @@ def worst_merit(ours: BoolArray, work: Work) -> float:
     return worst
 
 
-@kernel
+@lean_kernel
 def unchanged(i: int, plan: Plan) -> bool:
     """Whether boat i's command is the wanted one, bit for bit."""
     return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
 
 
-@kernel
+@lean_kernel
 def mark_answer(count: int, reason: int, plan: Plan) -> None:
     """Give the reason to the movers whose command changed."""
     for m in range(count):
@@ -46,7 +46,7 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
             plan.reason[i] = reason
 
 
-@kernel
+@lean_kernel
 def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
@@ -56,7 +56,7 @@ def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
         plan.slack_m[i] = max(0.0, -min(work.clear[i, MARGIN], work.fixed[i, MARGIN]))
 
 
-@kernel
+@lean_kernel
 def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
     """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
     side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
@@ -66,17 +66,18 @@ def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, p
     plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
 
 
-@kernel
+@lean_kernel
 def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
     """Make boat i's command and plan those of its escape; the program's answer is put aside."""
-    plan.answer[i], plan.answer_held[i] = plan.commands[i], plan.held[i]
+    copy_row(plan.answer[i], plan.commands[i])
+    copy_row(plan.answer_held[i], plan.held[i])
     first_move(i, state, boats, tuning, work, plan)
     side, togo = work.plan[i, 0], work.plan[i, 1]
     plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
     plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
 
 
-@kernel
+@lean_kernel
 def ladder(
     count: int,
     state: Array,
@@ -113,7 +114,8 @@ def ladder(
     if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
         for m in range(count):
             i = plan.movers[m]
-            plan.commands[i], plan.held[i] = plan.answer[i], plan.answer_held[i]
+            copy_row(plan.commands[i], plan.answer[i])
+            copy_row(plan.held[i], plan.answer_held[i])
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
         mark_relaxed(count, work, plan)
         return

@@ -9,7 +9,7 @@ import numpy as np
 from .active_set import OPTIMAL, project
 from .certificates.assign import hold, recheck
 from .certificates.manoeuvre import PAIR_SAFE
-from .jit import Array, BoolArray, kernel
+from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
@@ -24,7 +24,7 @@ SLACK_COST = np.array([1e4, 1e2])
 """Weight of the squared slack of boat rows and of fixed-thing rows when they cannot all hold."""
 
 
-@kernel
+@lean_kernel
 def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
     """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
     n = ours.shape[0]
@@ -43,7 +43,7 @@ def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
     return count
 
 
-@kernel
+@lean_kernel
 def build(
     count: int,
     state: Array,
@@ -89,7 +89,7 @@ def build(
     )
 
 
-@kernel
+@lean_kernel
 def add_slack(count: int, rows: int, plan: Plan) -> None:
     """Give boat rows and fixed-thing rows one slack input each (the last two columns), limits none."""
     n = 2 * count
@@ -101,7 +101,7 @@ def add_slack(count: int, rows: int, plan: Plan) -> None:
     plan.z0[n], plan.z0[n + 1] = 0.0, 0.0
 
 
-@kernel
+@lean_kernel
 def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
     """Solve the program by projection; relaxed with slack when it has no solution. False when neither works."""
     n = 2 * count
@@ -113,7 +113,7 @@ def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
     return project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n]) == OPTIMAL
 
 
-@kernel
+@lean_kernel
 def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> bool:
     """Turn scaled inputs into the commands whose autopilot yields them; False when any of them is not finite.
 
@@ -128,7 +128,7 @@ def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning
         wanted = plan.kept_commands[i]
         same_speed = abs(z[2 * m + 1] - plan.z0[2 * m + 1]) <= SAME
         if same_speed and abs(z[2 * m] - plan.z0[2 * m]) <= SAME:
-            plan.commands[i] = wanted
+            copy_row(plan.commands[i], wanted)
             continue
         speed = z[2 * m + 1] / root * boats.params[i, L.MAX_SPEED]
         speed = wanted[0] if same_speed else max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
@@ -139,7 +139,7 @@ def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning
     return True
 
 
-@kernel
+@lean_kernel
 def check(
     count: int,
     state: Array,

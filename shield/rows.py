@@ -23,7 +23,7 @@ from .certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from .certificates.hunters import clear_of_hunter, hunts
 from .certificates.manoeuvre import clear_of_boat
 from .certificates.values import WAYS, looked_up, table_slope
-from .jit import Array, BoolArray, IntArray, kernel
+from .jit import Array, BoolArray, IntArray, copy_row, lean_kernel
 from .platforms import layout as L
 from .platforms.actuator import full_turn
 from .platforms.step import step_boat
@@ -42,19 +42,19 @@ NOBODY = -1
 """Neighbour of a row that is not about a boat."""
 
 
-@kernel
+@lean_kernel
 def speed_effect(i: int, command: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> float:
     """Change of the next speed, m/s, per m/s of speed command, by a step of the model."""
     params = boats.params[i]
     step = 0.1 * params[L.MAX_SPEED]
     if command[0] > 0.5 * params[L.MAX_SPEED]:
         step = -step
-    work.row[:] = state[i]
+    copy_row(work.row, state[i])
     step_boat(params, work.row, command[0] + step, command[1], tuning.dt_s)
     return (work.row[L.SPEED] - work.next_state[i, L.SPEED]) / step
 
 
-@kernel
+@lean_kernel
 def _add_effect(
     C: Array,
     r: int,
@@ -79,7 +79,7 @@ def _add_effect(
     C[r, first + 1] += sign * (nx * rx + ny * ry) / speed * gain[i, 1]
 
 
-@kernel
+@lean_kernel
 def _close_row(C: Array, d: Array, lack: float, r: int, z_now: Array) -> bool:
     """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length."""
     norm = 0.0
@@ -93,11 +93,12 @@ def _close_row(C: Array, d: Array, lack: float, r: int, z_now: Array) -> bool:
     for c in range(z_now.shape[0]):
         d[r] += C[r, c] * z_now[c]
     d[r] /= norm
-    C[r, :] /= norm
+    for c in range(C.shape[1]):
+        C[r, c] /= norm
     return True
 
 
-@kernel
+@lean_kernel
 def inputs_of(
     commands: Array,
     wanted: Array,
@@ -130,7 +131,7 @@ def inputs_of(
         z0[2 * m + 1] = root * max(0.0, min(1.0, wanted[i, 0] / top))
 
 
-@kernel
+@lean_kernel
 def _pair_row(
     i: int,
     j: int,
@@ -150,10 +151,10 @@ def _pair_row(
     """Row of boat i (mover m) against boat j; False when neither input has any effect on it."""
     clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR, FAR)
     if hunts(i, j, ours, boats) and not work.breach[i, j] and not looked_up(i, j, i, ours, boats, work):
-        work.spare2[:] = work.out
+        copy_row(work.spare2, work.out)
         clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR, tuning.margin_cap_m)
         if work.out[MARGIN] > work.spare2[MARGIN]:
-            work.out[:] = work.spare2
+            copy_row(work.out, work.spare2)
     k, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
     lack = work.target[i] + AIM_M - work.out[MARGIN]
     C[r, :] = 0.0
@@ -165,7 +166,7 @@ def _pair_row(
     return _close_row(C, d, lack, r, z_now)
 
 
-@kernel
+@lean_kernel
 def _table_row(
     i: int,
     j: int,
@@ -191,7 +192,7 @@ def _table_row(
     return _close_row(C, d, lack, r, z_now)
 
 
-@kernel
+@lean_kernel
 def _fixed_row(
     i: int, m: int, tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int
 ) -> bool:
@@ -205,7 +206,7 @@ def _fixed_row(
     return not _out_of_reach(C, r, lack, tuning) and _close_row(C, d, lack, r, z_now)
 
 
-@kernel
+@lean_kernel
 def _out_of_reach(C: Array, r: int, lack: float, tuning: Tuning) -> bool:
     """Whether no inputs within their limits could violate row r: the margin exceeds all they can take from it."""
     root = math.sqrt(tuning.speed_weight)
@@ -215,7 +216,7 @@ def _out_of_reach(C: Array, r: int, lack: float, tuning: Tuning) -> bool:
     return lack + most < 0.0
 
 
-@kernel
+@lean_kernel
 def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> int:
     """Actuator limits: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight)."""
     root = math.sqrt(tuning.speed_weight)
@@ -232,7 +233,7 @@ def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> i
     return r
 
 
-@kernel
+@lean_kernel
 def build_rows(
     movers: IntArray,
     place: IntArray,
@@ -281,6 +282,6 @@ def build_rows(
             kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, NOBODY
             r += 1
     end = _box_rows(movers, tuning, C, d, r)
-    kind[r:end] = BOX_ROW
-    label[r:end, :] = -1
+    for k in range(r, end):
+        kind[k], label[k, 0], label[k, 1] = BOX_ROW, NOBODY, NOBODY
     return end

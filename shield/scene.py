@@ -154,6 +154,7 @@ class Work(NamedTuple):
         later: (n + 1, 5) place at which such a boat is looked up.
         ways_later: (n, 3, 5) places opponents may be at by then.
         nobody: (n,) False.
+        searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
     """
 
     next_state: Array
@@ -180,6 +181,7 @@ class Work(NamedTuple):
     later: Array
     ways_later: Array
     nobody: BoolArray
+    searched: IntArray
 
 
 def new_memory(*shape: int) -> Memory:
@@ -215,4 +217,5 @@ def new_work(boats: int, samples: int) -> Work:
         later=np.zeros((boats + 1, 5)),
         ways_later=np.zeros((boats, 3, 5)),
         nobody=np.zeros(boats, np.bool_),
+        searched=np.full(boats, -1, np.int64),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .certificates.assign import assign_plans
 from .certificates.manoeuvre import STRAIGHT_SAFE, look_around
-from .jit import Array, BoolArray, kernel
+from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L
 from .platforms.step import step_boat
@@ -12,14 +12,14 @@ from .platforms.usv import wrap_degrees
 from .scene import Boats, Fixed, Memory, Tuning, Work
 
 
-@kernel
+@lean_kernel
 def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """State of boat i one step after its command, by the full boat and autopilot model."""
-    work.next_state[i] = state[i]
+    copy_row(work.next_state[i], state[i])
     step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
 
 
-@kernel
+@lean_kernel
 def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> None:
     """Margin each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0."""
     for i in range(ours.shape[0]):
@@ -28,7 +28,7 @@ def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> No
             work.target[i] = boats.decay[i] * min(memory.margin_m[i], boats.cap_m[i])
 
 
-@kernel
+@lean_kernel
 def screen(
     state: Array,
     wanted: Array,
@@ -51,7 +51,7 @@ def screen(
     look_around(state, margin_m, ours, boats, tuning, work)
     set_targets(ours, boats, memory, work)
     for i in range(n):
-        plan.commands[i] = wanted[i]
+        copy_row(plan.commands[i], wanted[i])
         plan.slack_m[i] = 0.0
         plan.moving[i] = False
         plan.reason[i] = PASSED if ours[i] else NOT_COVERED
@@ -62,11 +62,12 @@ def screen(
             plan.reason[i] = HELD
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
-    plan.kept_commands[:] = plan.commands
+    for i in range(n):
+        copy_row(plan.kept_commands[i], plan.commands[i])
     return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
 
 
-@kernel
+@lean_kernel
 def lost(ours: BoolArray, memory: Memory, work: Work) -> bool:
     """Whether some boat is short of its margin, as it was on its escape: then the escape goes on until all is safe.
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
 from .candidates import DONE_DEG, candidate, kept_turn, preference, remembered
@@ -17,21 +17,22 @@ from .paths import angle_to_go
 SWEEPS = 3
 
 
-@kernel
+@lean_kernel
 def _take(i: int, slot: int, merit: float, work: Work) -> None:
     """Make the trial in ``slot`` boat i's plan."""
-    work.plan[i] = work.plan[slot]
-    work.path[i] = work.path[slot]
-    work.place[i] = work.place[slot]
+    for k in range(work.path.shape[1]):
+        copy_row(work.path[i, k], work.path[slot, k])
+    copy_row(work.plan[i], work.plan[slot])
+    copy_row(work.place[i], work.place[slot])
+    copy_row(work.later[i], work.later[slot])
+    copy_row(work.clear[i], work.clear[slot])
+    copy_row(work.fixed[i], work.fixed[slot])
     work.sealed[i] = work.sealed[slot]
-    work.later[i] = work.later[slot]
-    work.clear[i] = work.clear[slot]
-    work.fixed[i] = work.fixed[slot]
     work.bound[i] = work.bound[slot]
     work.merit[i] = merit
 
 
-@kernel
+@lean_kernel
 def choose_plan(
     i: int,
     wanted_mps: float,
@@ -75,7 +76,7 @@ def choose_plan(
             return
 
 
-@kernel
+@lean_kernel
 def refresh(
     i: int,
     state: Array,
@@ -89,13 +90,13 @@ def refresh(
     work.merit[i] = rate_path(i, i, -1e9, state, ours, boats, fixed, tuning, work)
 
 
-@kernel
+@lean_kernel
 def short(i: int, memory: Memory) -> bool:
     """Whether boat i was on its escape at the last decision, and that one short of its margin."""
     return memory.kept[i] and memory.escaping[i] and memory.margin_m[i] < 0.0
 
 
-@kernel
+@lean_kernel
 def settled(i: int, sweep: int, exhaustive: bool, memory: Memory, work: Work) -> bool:
     """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
     if work.merit[i] >= PAIR_SAFE or (sweep > 0 and work.merit[i] >= STRAIGHT_SAFE):
@@ -103,7 +104,7 @@ def settled(i: int, sweep: int, exhaustive: bool, memory: Memory, work: Work) ->
     return not exhaustive and short(i, memory)
 
 
-@kernel
+@lean_kernel
 def hold(i: int, held: Array, work: Work) -> None:
     """Note the manoeuvre boat i has from its predicted state: side, heading it ends on (NaN: no turn), speed."""
     side, togo = work.plan[i, 0], work.plan[i, 1]
@@ -111,7 +112,7 @@ def hold(i: int, held: Array, work: Work) -> None:
     held[i, 1] = work.next_state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
 
 
-@kernel
+@lean_kernel
 def recheck(
     who: BoolArray,
     held: Array,
@@ -156,7 +157,7 @@ def recheck(
     return good
 
 
-@kernel
+@lean_kernel
 def lay_first(
     commands: Array,
     done: int,
@@ -177,7 +178,7 @@ def lay_first(
             lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
 
 
-@kernel
+@lean_kernel
 def assign_plans(
     commands: Array,
     done: int,
@@ -204,7 +205,7 @@ def assign_plans(
     n = state.shape[0]
     lay_first(commands, done, who, state, boats, plans, tuning, memory, work)
     stale = True
-    searched = np.full(n, -1)  # changes of plans there had been when boat i was last searched for
+    work.searched[:] = -1
     changes = 0
     for sweep in range(SWEEPS):
         changed = False
@@ -215,7 +216,7 @@ def assign_plans(
                 refresh(i, state, ours, boats, fixed, tuning, work)
                 if settled(i, sweep, exhaustive, memory, work):
                     continue
-            if searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
+            if work.searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
                 continue
             side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
             choose_plan(
@@ -234,7 +235,7 @@ def assign_plans(
             )
             if work.plan[i, 0] != side or work.plan[i, 1] != togo or work.plan[i, 2] != speed:
                 changes += 1
-            searched[i] = changes
+            work.searched[i] = changes
             changed = True
         if not changed:
             stale = False

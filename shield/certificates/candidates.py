@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Memory, Tuning
 from .manoeuvre import FIXED_LOST
@@ -20,7 +20,7 @@ FURTHEST_DEG = 200.0
 """Largest turn to go with which a manoeuvre is committed to again."""
 
 
-@kernel
+@lean_kernel
 def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
     """Turn still to make of the manoeuvre in memory, deg; past its target it is done."""
     if math.isnan(memory.target_deg[i]):
@@ -29,7 +29,7 @@ def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
     return 0.0 if togo > DONE_DEG else togo
 
 
-@kernel
+@lean_kernel
 def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
     """Whether the manoeuvre in memory can be offered.
 
@@ -39,7 +39,7 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
     return memory.kept[i] and (done == 0 or kept_turn(i, heading_deg, memory) <= FURTHEST_DEG)
 
 
-@kernel
+@lean_kernel
 def candidate(
     i: int, p: int, wanted_mps: float, heading_deg: float, boats: Boats, plans: Array, memory: Memory
 ) -> tuple[float, float, float]:
@@ -51,13 +51,13 @@ def candidate(
     return row[0], row[1], speed
 
 
-@kernel
+@lean_kernel
 def hysteresis(merit: float, tuning: Tuning) -> float:
     """Merit by which another manoeuvre must beat the one under way, in the units of its level."""
     return tuning.hysteresis_m if merit < FIXED_LOST else 1e-3 * tuning.hysteresis_m
 
 
-@kernel
+@lean_kernel
 def preference(
     i: int, p: int, side: float, togo_deg: float, merit: float, boats: Boats, tuning: Tuning, memory: Memory
 ) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 
 MARGIN = 0
 SAMPLE = 1
@@ -20,7 +20,7 @@ FAR = 1e6
 """Margin, m, of a pair that cannot meet."""
 
 
-@kernel
+@lean_kernel
 def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k: int) -> float:
     """Least squared distance to the origin over a straight segment; noted in ``out`` when below ``best``."""
     dx, dy = x1 - x0, y1 - y0
@@ -36,7 +36,7 @@ def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k
     return best
 
 
-@kernel
+@lean_kernel
 def _finish(out: Array, best: float, radius_m: float) -> None:
     """Turn squared distance and vector into margin and unit normal; coincident boats get the x axis."""
     distance = math.sqrt(best)
@@ -48,7 +48,7 @@ def _finish(out: Array, best: float, radius_m: float) -> None:
         out[NORMAL_X], out[NORMAL_Y] = 1.0, 0.0
 
 
-@kernel
+@lean_kernel
 def _relative(own: Array, other: Array, x: float, y: float, sx: float, sy: float, k: int) -> tuple[float, float]:
     """Vector from the neighbour to the boat at sample k; ``other`` is its path, or empty for a straight course."""
     if other.shape[0] > 0:
@@ -56,7 +56,7 @@ def _relative(own: Array, other: Array, x: float, y: float, sx: float, sy: float
     return own[k, 0] - x - k * sx, own[k, 1] - y - k * sy
 
 
-@kernel
+@lean_kernel
 def clear_of_course(
     own: Array,
     other: Array,

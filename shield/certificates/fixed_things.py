@@ -6,20 +6,20 @@ before what hunters may do. Later ones leave time for another manoeuvre, and cou
 
 from __future__ import annotations
 
-from ..jit import Array, kernel
+from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Work
 from .clearance import MARGIN
 from .surroundings import clear_of_obstacles, clear_of_rules, first_touch
 
 
-@kernel
+@lean_kernel
 def way_per_sample(i: int, state: Array, boats: Boats) -> float:
     """Most boat i moves from sample to sample of a path, m."""
     return max(boats.fastest_mps[i], state[i, L.SPEED]) * boats.sample_s
 
 
-@kernel
+@lean_kernel
 def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
     """Clearance row of boat i on the path in ``slot`` from obstacles at any time, field edge and keep-out circles.
 
@@ -29,10 +29,10 @@ def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, 
     clear_of_rules(path, boats.static_samples[i], last, fixed.field, fixed.keep_out, way_m, out)
     clear_of_obstacles(state[i], path, last, way_m, fixed.circles, fixed.segments, fixed.segment_m, work.spare2)
     if work.spare2[MARGIN] < out[MARGIN]:
-        out[:] = work.spare2
+        copy_row(out, work.spare2)
 
 
-@kernel
+@lean_kernel
 def clear_of_near_obstacles(
     i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array
 ) -> None:
@@ -49,7 +49,7 @@ def clear_of_near_obstacles(
     )
 
 
-@kernel
+@lean_kernel
 def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> float:
     """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
     last = boats.static_samples[i]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN
@@ -25,7 +25,7 @@ LEAD_SHARE = 0.15
 """Share of the time it is followed by which a hunter leads the boat at most."""
 
 
-@kernel
+@lean_kernel
 def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
     """Most the distance of a pair can shrink from sample to sample, m."""
     top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
@@ -33,7 +33,7 @@ def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float
     return (top_i + top_j) * boats.sample_s
 
 
-@kernel
+@lean_kernel
 def clear_of_hunter(
     i: int,
     j: int,
@@ -81,18 +81,18 @@ def clear_of_hunter(
             work.spare,
         )
         if work.spare[MARGIN] < work.out[MARGIN]:
-            work.out[:] = work.spare
+            copy_row(work.out, work.spare)
             if work.out[MARGIN] < floor_m:
                 return
 
 
-@kernel
+@lean_kernel
 def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
     """Whether boat j is an opponent of boat i that is granted more than holding its course."""
     return not ours[j] and boats.team[i] != boats.team[j] and boats.granted_turn_dps[j] > 0.0
 
 
-@kernel
+@lean_kernel
 def worst_hunter(
     i: int,
     slot: int,
@@ -126,7 +126,7 @@ def worst_hunter(
         # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
         clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
         if work.out[MARGIN] < clear[MARGIN]:
-            clear[:] = work.out
+            copy_row(clear, work.out)
             work.bound[slot] = j
             if clear[MARGIN] < floor_m:
                 return

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..scene import Boats, Tuning, Work
 from .manoeuvre import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
 from .paths import trace_path
 from .values import looked_up, set_place, worst_by_tables
 
 
-@kernel
+@lean_kernel
 def runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
     """Whether some opponent near boat i is to be run through as a hunter, which takes the long path."""
     if not work.hunted[i] or boats.look[i] == 0:
@@ -22,7 +22,7 @@ def runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
     return False
 
 
-@kernel
+@lean_kernel
 def set_out(
     i: int,
     slot: int,
@@ -40,24 +40,24 @@ def set_out(
     set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
 
 
-@kernel
+@lean_kernel
 def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
     """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
     margin = worst_by_tables(i, slot, ours, boats, work)
     return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if margin < work.target[i] else 2.0 * PAIR_SAFE
 
 
-@kernel
+@lean_kernel
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     samples = boats.hunt_samples[i] if runs_hunters(i, slot, boats, work) else boats.samples[i]
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
-    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     path = work.path[slot]
     trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
 
 
-@kernel
+@lean_kernel
 def lay_path(
     i: int,
     slot: int,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
@@ -48,7 +48,7 @@ RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
 
-@kernel
+@lean_kernel
 def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
@@ -95,7 +95,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     find_beset(ours, state, boats, tuning, work)
 
 
-@kernel
+@lean_kernel
 def clear_of_opponent(
     i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
 ) -> None:
@@ -120,7 +120,7 @@ def clear_of_opponent(
     )
 
 
-@kernel
+@lean_kernel
 def _rank_recovery(
     i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work
 ) -> None:
@@ -138,7 +138,7 @@ def _rank_recovery(
     work.out[MARGIN] = -1e-3 + min(0.0, later - work.radius[i, j]) + 2.0 * min(0.0, least - now)
 
 
-@kernel
+@lean_kernel
 def clear_of_boat(
     i: int,
     j: int,
@@ -179,7 +179,7 @@ def clear_of_boat(
         _rank_recovery(i, j, path, state, ours, boats, tuning, work)
 
 
-@kernel
+@lean_kernel
 def worst_clearance(
     i: int,
     slot: int,
@@ -201,13 +201,13 @@ def worst_clearance(
             i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
         )
         if work.out[MARGIN] < clear[MARGIN]:
-            clear[:] = work.out
+            copy_row(clear, work.out)
             work.bound[slot] = j
             if clear[MARGIN] < floor_m:
                 return
 
 
-@kernel
+@lean_kernel
 def rate_path(
     i: int,
     slot: int,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate, full_turn
 from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
@@ -22,13 +22,13 @@ STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
 
 
-@kernel
+@lean_kernel
 def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
     """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
     return ((target_deg - heading_deg) * math.copysign(1.0, side)) % 360.0
 
 
-@kernel
+@lean_kernel
 def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
     """One model step of an escape manoeuvre on ``row``, in place; returns the turn still to make, deg."""
     before, sign = row[L.HEADING], math.copysign(1.0, side)
@@ -45,7 +45,7 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
     return togo_deg if togo_deg > 1e-9 else 0.0
 
 
-@kernel
+@lean_kernel
 def trace_path(
     params: Array,
     row: Array,
@@ -88,7 +88,7 @@ def trace_path(
             k += 1
 
 
-@kernel
+@lean_kernel
 def _trace_usv(
     params: Array,
     row: Array,
@@ -152,7 +152,7 @@ def _trace_usv(
             return
 
 
-@kernel
+@lean_kernel
 def _run_on(
     x: float, y: float, dx: float, dy: float, step: int, k: int, stride: int, samples: int, path: Array
 ) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 
 LONGEST_STRIDE = 6
 """Samples a hunter far away is moved on at once."""
 
 
-@kernel
+@lean_kernel
 def _note_faded(
     out: Array,
     worst: float,
@@ -48,7 +48,7 @@ def _note_faded(
     return worst
 
 
-@kernel
+@lean_kernel
 def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -> tuple[float, float]:
     """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity.
 
@@ -77,7 +77,7 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -
     return rx + time * vx, ry + time * vy
 
 
-@kernel
+@lean_kernel
 def clear_of_pursuer(
     own: Array,
     x: float,

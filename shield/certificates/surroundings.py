@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 
 
-@kernel
+@lean_kernel
 def _lower(out: Array, margin: float, k: int, nx: float, ny: float) -> None:
     if margin < out[MARGIN]:
         out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = margin, k, nx, ny
 
 
-@kernel
+@lean_kernel
 def _edges(x: float, y: float, k: int, field: Array, out: Array) -> None:
     """Distance inside a rectangle (xmin, ymin, xmax, ymax); infinite sides are none."""
     _lower(out, x - field[0], k, 1.0, 0.0)
@@ -27,7 +27,7 @@ def _edges(x: float, y: float, k: int, field: Array, out: Array) -> None:
     _lower(out, field[3] - y, k, 0.0, -1.0)
 
 
-@kernel
+@lean_kernel
 def _to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
     """Distance, m, from a circle (negative inside) and the unit vector away from it."""
     dx, dy = x - circle[0], y - circle[1]
@@ -37,7 +37,7 @@ def _to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
     return distance - circle[2], dx / distance, dy / distance
 
 
-@kernel
+@lean_kernel
 def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[float, float, float]:
     """Distance, m, from what is within ``hull_m`` of a wall segment, and the unit vector away from it."""
     dx, dy = segment[2] - segment[0], segment[3] - segment[1]
@@ -52,7 +52,7 @@ def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[floa
     return distance - hull_m, rx / distance, ry / distance
 
 
-@kernel
+@lean_kernel
 def _to_obstacle(
     x: float, y: float, o: int, circles: Array, segments: Array, hull_m: float
 ) -> tuple[float, float, float]:
@@ -62,7 +62,7 @@ def _to_obstacle(
     return _to_segment(x, y, segments[o - circles.shape[0]], hull_m)
 
 
-@kernel
+@lean_kernel
 def clear_of_rules(
     path: Array, near_samples: int, samples: int, field: Array, keep_out: Array, way_m: float, out: Array
 ) -> None:
@@ -90,7 +90,7 @@ def clear_of_rules(
             k += max(1, int((margin - out[MARGIN]) / way_m))
 
 
-@kernel
+@lean_kernel
 def clear_of_obstacles(
     here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
 ) -> None:
@@ -119,7 +119,7 @@ def clear_of_obstacles(
             k += max(1, int((margin - out[MARGIN]) / way_m))
 
 
-@kernel
+@lean_kernel
 def first_touch(
     here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float
 ) -> int:

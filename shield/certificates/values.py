@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
@@ -35,7 +35,7 @@ PLACE_X, PLACE_Y, PLACE_HEADING, PLACE_SPEED, PLACE_USABLE = range(5)
 """Columns of a place: position m, heading rad, speed m/s, and whether the table holds for the boat there."""
 
 
-@kernel
+@lean_kernel
 def _note_place(params: Array, row: Array, place: Array) -> None:
     """Write the place of a state row."""
     place[PLACE_X], place[PLACE_Y] = row[L.X], row[L.Y]
@@ -43,7 +43,7 @@ def _note_place(params: Array, row: Array, place: Array) -> None:
     place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= FULL_THRUST * params[L.MAX_THRUST] else 0.0
 
 
-@kernel
+@lean_kernel
 def run_opponents(
     steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work, ways: Array
 ) -> None:
@@ -54,7 +54,7 @@ def run_opponents(
         params = boats.params[j]
         full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.dt_s)
         for way in range(WAYS):
-            work.row[:] = state[j]
+            copy_row(work.row, state[j])
             turn = full * (0.0 if way == 0 else 2.0 * way - 3.0)
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(steps):
@@ -62,7 +62,7 @@ def run_opponents(
             _note_place(params, work.row, ways[j, way])
 
 
-@kernel
+@lean_kernel
 def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Mark the boats of ours that more than one opponent can come near to, as far as the tables tell.
 
@@ -86,7 +86,7 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work
         run_opponents(boats.joint_look + 1, ours, state, boats, tuning, work, work.ways_later)
 
 
-@kernel
+@lean_kernel
 def set_place(
     i: int,
     slot: int,
@@ -107,7 +107,7 @@ def set_place(
     """
     if boats.look[i] == 0:
         return
-    work.row[:] = work.next_state[i] if done == 1 else state[i]
+    copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     first = 0 if done == 1 else boats.look[i]
     for _ in range(first):
         togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
@@ -119,7 +119,7 @@ def set_place(
     _note_place(boats.params[i], work.row, work.later[slot])
 
 
-@kernel
+@lean_kernel
 def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
     """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
     table = boats.table[i, j]
@@ -128,7 +128,7 @@ def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Wo
     return work.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
 
 
-@kernel
+@lean_kernel
 def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: Work) -> float:
     """Margin of boat i at a place against opponent j at the worst of several, m; `FAR` beyond the table."""
     table = boats.table[i, j]
@@ -151,7 +151,7 @@ def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: 
     return least - work.radius[i, j] - boats.table_margin_m
 
 
-@kernel
+@lean_kernel
 def worst_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
     """Margin of boat i on the manoeuvre in ``slot`` against the worst opponent j can do, m."""
     margin = table_margin(i, j, work.place[slot], work.ways[j], boats, work)
@@ -162,7 +162,7 @@ def worst_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float
     return min(margin, table_margin(i, j, work.later[slot], work.ways_later[j], boats, work))
 
 
-@kernel
+@lean_kernel
 def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
     """The least of the margins of boat i on the manoeuvre in ``slot`` against opponents that are looked up, m."""
     least = FAR
@@ -172,7 +172,7 @@ def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work
     return least
 
 
-@kernel
+@lean_kernel
 def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
     """Value and derivatives for boat i one step on, opponent j moved on in one of its ways."""
     own, other = work.place[i], work.ways[j, way]

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
 
-@kernel
+@lean_kernel
 def largest_turn(params: Array, state: Array, dt_s: float) -> float:
     """Largest turn, deg, that one step can make with the present thrust (or turn-rate limit)."""
     if params[L.KIND] == L.KIND_USV:
@@ -27,7 +27,7 @@ def largest_turn(params: Array, state: Array, dt_s: float) -> float:
     return min(reach, params[L.MAX_TURN_RATE]) * dt_s
 
 
-@kernel
+@lean_kernel
 def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
     """Thrust, percent, that this step will have under a speed command."""
     thrust, _, _ = next_thrust(
@@ -36,7 +36,7 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
     return thrust
 
 
-@kernel
+@lean_kernel
 def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
     """Largest turn, deg, that this step can make under a speed command."""
     if params[L.KIND] == L.KIND_USV:
@@ -45,7 +45,7 @@ def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> flo
     return params[L.MAX_TURN_RATE] * dt_s
 
 
-@kernel
+@lean_kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
     """Advance one step turning by ``turn_deg`` as nearly as the actuators allow; changes ``state`` in place.
 
@@ -64,7 +64,7 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
         step_double_integrator(params, state, speed_mps, turn_deg, dt_s)
 
 
-@kernel
+@lean_kernel
 def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> float:
     """Heading error, deg in [-180, 180], that makes the autopilot turn the boat by ``turn_deg`` in this step.
 
@@ -82,7 +82,7 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
     return _error_for_rudder(params, state, rudder, dt_s)
 
 
-@kernel
+@lean_kernel
 def _error_for_rudder(params: Array, state: Array, rudder: float, dt_s: float) -> float:
     """Invert the heading controller, trying the integral free first, then clamped at its nearer end."""
     last = state[L.HEADING_ERROR]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from . import layout as L
 from .usv import clamp, wrap_degrees
 
 
-@kernel
+@lean_kernel
 def _move(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
     """Mean speed along the mean heading; the *new* speed is what is stored, unlike the thrust boats."""
     mean_speed = 0.5 * (speed_mps + state[L.SPEED])
@@ -20,7 +20,7 @@ def _move(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_
     state[L.HEADING] = wrap_degrees(heading_deg)
 
 
-@kernel
+@lean_kernel
 def step_single_integrator(
     params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float
 ) -> None:
@@ -31,7 +31,7 @@ def step_single_integrator(
     _move(params, state, speed, state[L.HEADING] + turn_rate * dt_s, dt_s)
 
 
-@kernel
+@lean_kernel
 def step_double_integrator(
     params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float
 ) -> None:

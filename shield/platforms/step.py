@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
 from .usv import step_usv
 
 
-@kernel
+@lean_kernel
 def step_boat(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
     """Advance one boat by one step, in place.
 

@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from ..jit import Array, kernel
+from ..jit import Array, lean_kernel
 from . import layout as L
 
 
-@kernel
+@lean_kernel
 def wrap_degrees(angle_deg: float) -> float:
     """Angle brought into [-180, 180]; both ends are kept, as the reference simulator keeps them.
 
@@ -30,7 +30,7 @@ def wrap_degrees(angle_deg: float) -> float:
     return angle_deg
 
 
-@kernel
+@lean_kernel
 def clamp(value: float, low: float, high: float) -> float:
     """Value limited to [low, high]; NaN stays NaN."""
     if value > high:
@@ -40,7 +40,7 @@ def clamp(value: float, low: float, high: float) -> float:
     return value
 
 
-@kernel
+@lean_kernel
 def speed_of_thrust(params: Array, thrust: float) -> float:
     """Steady straight-line speed, m/s, that a thrust (percent) gives; flat beyond the map's ends."""
     size = int(params[L.MAP_SIZE])
@@ -56,7 +56,7 @@ def speed_of_thrust(params: Array, thrust: float) -> float:
     return params[L.MAP_SPEED + size - 1]
 
 
-@kernel
+@lean_kernel
 def _controller(
     kp: float, ki: float, kd: float, limit: float, error: float, previous_error: float, integral: float, dt_s: float
 ) -> tuple[float, float]:
@@ -68,7 +68,7 @@ def _controller(
     return kp * error + kd * derivative + integral, integral
 
 
-@kernel
+@lean_kernel
 def next_thrust(
     params: Array, speed_mps: float, thrust: float, error: float, integral: float, desired_mps: float, dt_s: float
 ) -> tuple[float, float, float]:
@@ -93,7 +93,7 @@ def next_thrust(
     return clamp(thrust, -params[L.MAX_THRUST], params[L.MAX_THRUST]), error, integral
 
 
-@kernel
+@lean_kernel
 def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: float) -> None:
     """Advance the speed controller in ``state`` by one step and set its thrust."""
     state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL] = next_thrust(
@@ -107,7 +107,7 @@ def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: f
     )
 
 
-@kernel
+@lean_kernel
 def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: float) -> None:
     """Advance the heading controller; without thrust the rudder is 0 and its memory stays as it was."""
     if not state[L.THRUST] > 0.0:
@@ -129,7 +129,7 @@ def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: f
     state[L.HEADING_INTEGRAL] = integral
 
 
-@kernel
+@lean_kernel
 def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> float:
     """Heading change, deg, of one step with way on: proportional to rudder and to thrust."""
     turn = rudder * (params[L.TURN_GAIN] / 100.0) * dt_s * (1.0 + (abs(thrust) - 50.0) / 50.0)
@@ -138,7 +138,7 @@ def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> 
     return turn
 
 
-@kernel
+@lean_kernel
 def next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, dt_s: float) -> float:
     """Speed at the end of a step, m/s, before the hull's mean is stored."""
     speed = speed_of_thrust(params, thrust) * (1.0 - (abs(rudder) / 100.0) * params[L.TURN_LOSS])
@@ -151,7 +151,7 @@ def next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, dt
     return speed
 
 
-@kernel
+@lean_kernel
 def advance_hull(params: Array, state: Array, dt_s: float) -> None:
     """Move the hull one step under the thrust and rudder in ``state`` (positions in m, headings in deg)."""
     thrust = state[L.THRUST]
@@ -163,7 +163,7 @@ def advance_hull(params: Array, state: Array, dt_s: float) -> None:
     move_along_mean(params, state, speed, state[L.HEADING] + turn, dt_s)
 
 
-@kernel
+@lean_kernel
 def move_along_mean(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
     """Move with the mean of old and new speed along the mean heading; the mean speed is what is stored."""
     mean_speed = 0.5 * (speed_mps + state[L.SPEED])
@@ -174,7 +174,7 @@ def move_along_mean(params: Array, state: Array, speed_mps: float, heading_deg: 
     state[L.HEADING] = wrap_degrees(heading_deg)
 
 
-@kernel
+@lean_kernel
 def step_usv(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
     """One full step: speed controller, heading controller, hull. Changes ``state`` in place."""
     update_thrust(params, state, desired_speed_mps, dt_s)
@@ -182,7 +182,7 @@ def step_usv(params: Array, state: Array, desired_speed_mps: float, heading_erro
     advance_hull(params, state, dt_s)
 
 
-@kernel
+@lean_kernel
 def actuate_usv(params: Array, state: Array, desired_speed_mps: float, rudder: float, dt_s: float) -> None:
     """One step with the rudder given (percent) instead of asked of the heading controller."""
     update_thrust(params, state, desired_speed_mps, dt_s)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jit import Array, IntArray, kernel
+from ..jit import Array, IntArray, lean_kernel
 from .grid import (
     CAP,
     N_AXES,
@@ -67,14 +67,14 @@ def no_tables() -> Tables:
     return Tables(np.zeros(0, np.uint8), np.zeros(0, np.int64), np.zeros((0, N_AXES)))
 
 
-@kernel
+@lean_kernel
 def table_range_m(tables: Tables, table: int) -> float:
     """Largest range of a table, m; farther boats are looked up as if they were there."""
     axes = tables.axes[table]
     return rho_node(axes, int(axes[N_RHO]) - 1)
 
 
-@kernel
+@lean_kernel
 def _speed_places(axes: Array, own_mps: float, other_mps: float) -> tuple[tuple[int, float], tuple[int, float]]:
     n_own, n_other = int(axes[N_OWN]) - 1, int(axes[N_OTHER]) - 1
     return even_place(own_mps / axes[OWN_TOP] * n_own, n_own), even_place(
@@ -82,7 +82,7 @@ def _speed_places(axes: Array, own_mps: float, other_mps: float) -> tuple[tuple[
     )
 
 
-@kernel
+@lean_kernel
 def _angle_places(
     axes: Array, bearing_rad: float, own_rad: float, other_rad: float
 ) -> tuple[tuple[int, float], tuple[int, float], float]:
@@ -97,7 +97,7 @@ def _angle_places(
     return even_place((turns - math.floor(turns)) * n_psi, n_psi), even_place(side * half_turns * n_beta, n_beta), side
 
 
-@kernel
+@lean_kernel
 def table_value(
     tables: Tables,
     table: int,
@@ -132,7 +132,7 @@ def table_value(
     return steps * axes[CAP] / STEPS
 
 
-@kernel
+@lean_kernel
 def table_gradient(
     tables: Tables,
     table: int,
@@ -197,7 +197,7 @@ def table_gradient(
     return Gradient(value * unit, own_x, own_y, -d_beta - d_psi, d_own, d_psi, d_other)
 
 
-@kernel
+@lean_kernel
 def _clamped(speed_mps: float, top_mps: float) -> float:
     """1 within the speed axis, 0 outside it."""
     if speed_mps < 0.0 or speed_mps > top_mps:
