@@ -48,11 +48,12 @@ def lean_kernel(function: F) -> F:
 
 
 def _compiled(function: F, counted: bool) -> F:
-    """numba's cache looks at a function's own file only, although callees from other files are compiled into it.
+    """Compile; numba's cache looks at a function's own file only, although callees of others are compiled into it.
 
     Its stamp is therefore replaced by one over all sources, so that no stale machine code is ever run.
     """
-    compiled = njit(cache=True, nogil=True, error_model="numpy", _nrt=counted)(function)
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": counted}
+    compiled = njit(**options)(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if cache_file is not None and hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = _tree_stamp()

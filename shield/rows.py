@@ -217,8 +217,8 @@ def _out_of_reach(C: Array, r: int, lack: float, tuning: Tuning) -> bool:
 
 
 @lean_kernel
-def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> int:
-    """Actuator limits: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight)."""
+def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, kind: IntArray, label: IntArray, r: int) -> int:
+    """Actuator limits: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight); returns the row after the last."""
     root = math.sqrt(tuning.speed_weight)
     for m in range(movers.shape[0]):
         for side in range(2):
@@ -229,6 +229,8 @@ def _box_rows(movers: IntArray, tuning: Tuning, C: Array, d: Array, r: int) -> i
             C[r + 1, :] = 0.0
             C[r + 1, 2 * m + 1] = sign
             d[r + 1] = 0.0 if side == 0 else -root
+            for k in range(r, r + 2):
+                kind[k], label[k, 0], label[k, 1] = BOX_ROW, NOBODY, NOBODY
             r += 2
     return r
 
@@ -281,7 +283,4 @@ def build_rows(
         if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, NOBODY
             r += 1
-    end = _box_rows(movers, tuning, C, d, r)
-    for k in range(r, end):
-        kind[k], label[k, 0], label[k, 1] = BOX_ROW, NOBODY, NOBODY
-    return end
+    return _box_rows(movers, tuning, C, d, kind, label, r)
