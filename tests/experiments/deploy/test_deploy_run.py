@@ -225,13 +225,18 @@ def test_a_port_that_is_taken_is_one_line_and_exit_2(fleet_file, kind, command):
     assert "in use" in line
 
 
-@pytest.mark.parametrize("name", ["unknown key", "key file readable by all", "no geofence"])
+SENT_BY = ["unknown key", "two boats with one id", "missing platform", "no geofence", "key file readable by all"]
+
+
+@pytest.mark.parametrize("name", [*SENT_BY, "port taken"])
 def test_with_a_bad_file_nothing_is_sent_to_any_boat(fleet_file, boats, name):
-    old, new, _ = BAD[name]
+    old, new, _ = BAD.get(name, ("", "", ""))
+    address = load_fleet(fleet_file).boats[0].link.address
     (fleet_file.parent / "my.key").write_text("ab" * 32)
     os.chmod(fleet_file.parent / "my.key", 0o644)
-    fleet_file.write_text(fleet_file.read_text().replace(old, new, 1))
-    one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
+    fleet_file.write_text(fleet_file.read_text().replace(old, new.replace("ADDRESS", address), 1))
+    with taken(fleet_file, "feed") if name == "port taken" else contextlib.nullcontext():
+        one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
     counts = boats.boats["blue_1"].autopilot.counts
     assert counts["taken"] == counts["ignored"] == counts["refused"] == 0
 
