@@ -18,6 +18,7 @@ from steerclear.shield.bridge.roster import Roster
 from steerclear.shield.bridge.situation import SITUATION, check_situation
 from steerclear.shield.bridge.tick import TickSink
 
+from .grounds import grounds_of
 from .preflight_file import check_drill
 from .station import Station
 
@@ -55,7 +56,10 @@ def checks_of(station: Station, minutes: float) -> list[Check]:
     fleet, look = station.fleet, _Look(station)
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
     links = link_checks(station.links, fleet.platform_of, station.clock)
-    situation = [Check(name, lambda name=name: check_situation(name, fleet, look.roster)) for name in SITUATION]
+    grounds = grounds_of(fleet)
+    situation = [
+        Check(name, lambda name=name: check_situation(name, fleet, look.roster, grounds)) for name in SITUATION
+    ]
     return [disk, *links, *situation]
 
 
@@ -79,6 +83,7 @@ def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] 
         policy=drill,
         ears=station.ears,
         contacts=() if station.feed is None else (station.feed,),
+        grounds=grounds_of(fleet),
         sinks=(drill, *sinks),
     )
     Loop(fleet, parts, operator, station.clock).run(drill.seconds + 2.0 * fleet.dt_s)

@@ -48,6 +48,8 @@ class FieldMap:
         game = {} if tick is None else tick.game
         if self._lines is not None:
             self._draw_lines(canvas, self._lines, game)
+        for x, y, radius in _circles(tick):
+            canvas.circle((x, y), radius, "grey50")
         errors = {} if tick is None else _errors(tick)
         for name, (x, y, heading, speed) in places.items():
             self._draw_boat(canvas, name, (x, y), heading, speed, errors.get(name, 0.0))
@@ -116,6 +118,12 @@ def places_of(tick: Tick) -> dict[str, tuple[float, float, float, float]]:
         for name, position, heading, speed in rows:
             places[name] = (float(position[0]), float(position[1]), float(heading), float(speed))
     return {name: row for name, row in places.items() if all(map(math.isfinite, row))}
+
+
+def _circles(tick: Tick | None) -> tuple[tuple[float, float, float], ...]:
+    """Round things the shield keeps boats of ours out of: obstacles, the own flag's circle; x m, y m, radius m."""
+    around = None if tick is None else tick.surroundings
+    return () if around is None else (*around.circles, *around.stops)
 
 
 def _errors(tick: Tick) -> dict[str, float]:

@@ -16,6 +16,7 @@ from steerclear.shield.bridge.timing import Timing
 
 from .boxes import open_box
 from .checks import checks_of, drilled_check
+from .grounds import grounds_of
 from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
 from .policy_process import PolicyProcess
 from .preflight_file import DRILLED
@@ -92,6 +93,7 @@ def _run(
             ears=station.ears,
             contacts=() if station.feed is None else (station.feed,),
             game=station.feed,
+            grounds=grounds_of(fleet),
             sinks=tuple(sinks),
         )
         loop = Loop(fleet, parts, operator, clock)

@@ -23,18 +23,16 @@ from .fleet_file import FleetFile
 from .frame import TWO_PI
 from .freshness import Verdict
 from .link import Link, Sent
+from .parts import GameState
 from .responses import Responder
 from .roster import Roster
 from .tick import Action
+from .water import Water
 
 LOG = logging.getLogger(__name__)
 
 TALK_EVERY_S = 5.0
 """The same failure of the decision is logged again after this long, s."""
-
-
-ROOM_M = 10.0
-"""Room left behind a boat outside the geofence, m, at least."""
 
 
 @dataclass(frozen=True)
@@ -58,18 +56,35 @@ class Helm:
         shield: the one shield.
         links: of the boats this process commands, by name.
         clock: of all times.
+        water: what does not move around the boats; None: the file's geofence.
     """
 
-    def __init__(self, fleet: FleetFile, shield: Shield, links: Mapping[str, Link], clock: Clock) -> None:
+    def __init__(
+        self,
+        fleet: FleetFile,
+        shield: Shield,
+        links: Mapping[str, Link],
+        clock: Clock,
+        water: Water | None = None,
+    ) -> None:
         self._file = fleet
         self._shield = shield
         self._links = links
         self._clock = clock
+        self._water = Water(fleet) if water is None else water
         self._responders = {name: Responder(fleet.platform_of[name], fleet.geofence) for name in links}
         self._fresh = True
         self._failure = ("", -math.inf)
 
-    def steer(self, roster: Roster, answer: Commands | None, verdict: Verdict, mates: Collection[str] = ()) -> Steered:
+    def steer(
+        self,
+        roster: Roster,
+        answer: Commands | None,
+        verdict: Verdict,
+        mates: Collection[str] = (),
+        game: GameState | None = None,
+        game_age_s: float = math.inf,
+    ) -> Steered:
         """Decide and send for all boats of this process.
 
         Args:
@@ -77,6 +92,8 @@ class Helm:
             answer: the policy's absolute commands, all boats of the file; used for boats without a response due.
             verdict: responses due, boats whose state is unknown, boats that do not obey.
             mates: team-mates another process commands behind a shield of their own.
+            game: the referee's state of the game; None: none.
+            game_age_s: its age, s.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
@@ -86,7 +103,7 @@ class Helm:
             if fleet is None or not commanded:
                 return self._finish(so_far, verdict)
             wanted = self._wanted(fleet, commanded, answer, verdict)
-            so_far = Steered(fleet, wanted, water_of(self._file, fleet))
+            so_far = Steered(fleet, wanted, self._water.around(fleet, game, game_age_s))
             reset = self._reset_if_due()
             decisions = self._shield.decide(fleet, wanted, so_far.surroundings)
         except Exception as error:  # whatever broke, no boat may go on with an old command
@@ -154,24 +171,3 @@ class Helm:
             else:
                 sent[name] = self._links[name].stop()
         return replace(steered, sent=sent)
-
-
-def water_of(file: FleetFile, fleet: Fleet) -> Surroundings:
-    """The geofence, wider where a boat of ours is outside: it needs room to turn back, and a wall has none behind it.
-
-    It grows in whole steps of `ROOM_M`, so that the shield packs few of them.
-    """
-    xmin, ymin, xmax, ymax = file.geofence.box
-    own = fleet.position_m[fleet.controlled]
-    if len(own) == 0:
-        return file.surroundings
-    (left, low), (right, high) = own.min(axis=0), own.max(axis=0)
-    grown = (_beyond(xmin - left), _beyond(ymin - low), _beyond(right - xmax), _beyond(high - ymax))
-    if not any(grown):
-        return file.surroundings
-    return Surroundings(field=(xmin - grown[0], ymin - grown[1], xmax + grown[2], ymax + grown[3]))
-
-
-def _beyond(outside_m: float) -> float:
-    """By how much an edge gives way to a boat that far outside, m."""
-    return ROOM_M * (math.ceil(outside_m / ROOM_M) + 1) if outside_m > 0.0 else 0.0

@@ -26,6 +26,7 @@ from .retaking import Retaking
 from .roster import Roster
 from .tick import Action, Tick
 from .wanted import Snapshot, WantedSource
+from .water import Water
 
 __all__ = ["Loop", "Parts", "contact_of"]
 
@@ -60,7 +61,7 @@ class Loop:
         self.roster = Roster(fleet, parts.links)
         chosen = Shield(fleet.shield_config, fleet.surroundings) if shield is None else shield
         self.delays = Delays({name: fleet.platform_of[name] for name in parts.links}, fleet.shield_config)
-        self._helm = Helm(fleet, chosen, parts.links, clock)
+        self._helm = Helm(fleet, chosen, parts.links, clock, Water(fleet, parts.grounds))
         self._watch = PolicyWatch(fleet, tuple(parts.links))
         self._has_referee = fleet.feed is not None and fleet.feed.referee is not None
         self._mates = _mates(fleet, parts.links)
@@ -150,7 +151,7 @@ class Loop:
         self._watch.update(began, answer, policy_age, fault)
         game, game_age = self._game()
         verdict = judge(self.fleet, self.roster, self._seen(began, readings, game, game_age))
-        steered = self._steer(answer, verdict)
+        steered = self._steer(answer, verdict, game, game_age)
         self.roster.sent(began, steered.sent)
         self.delays.update(readings, steered.sent)
         tick = Tick(
@@ -181,7 +182,7 @@ class Loop:
         self.parts.policy.offer(Snapshot(tick.number, began, seen_now(self.roster), tick.game, game_age))
         return tick
 
-    def _steer(self, answer: Commands | None, verdict: Verdict) -> Steered:
+    def _steer(self, answer: Commands | None, verdict: Verdict, game: GameState | None, game_age_s: float) -> Steered:
         if self._ending:
             verdict.actions.append(Action("all", "end", "stop", f"the run ends: {self._ending}"))
         if self.operator.stopped or self._ending:
@@ -190,7 +191,7 @@ class Loop:
             return Steered(sent=self._helm.stop_all(tuple(self.parts.links)))
         limit = self.fleet.limits.contact.max_age_s
         mates = {name for name in self._mates if self.roster.contact_age_s(name) <= limit}
-        return self._helm.steer(self.roster, answer, verdict, mates)
+        return self._helm.steer(self.roster, answer, verdict, mates, game, game_age_s)
 
     def _seen(
         self, now_s: float, readings: Mapping[str, BoatReading], game: GameState | None, game_age_s: float

@@ -8,16 +8,31 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..surroundings import OPEN_WATER, Surroundings
 from .contact import Contact, ContactSource
 from .link import BoatReading, Link
 from .tick import TickSink
 from .wanted import WantedSource
 
 
+class Flag(Protocol):
+    """One team's flag."""
+
+    @property
+    def taken(self) -> bool:
+        """Whether an opponent carries it."""
+
+
 class GameState(Protocol):
     """The state of the game as a referee sent it."""
 
-    over: bool
+    @property
+    def over(self) -> bool:
+        """Whether the game has ended."""
+
+    @property
+    def flags(self) -> Sequence[Flag]:
+        """The blue flag and the red one."""
 
     def as_dict(self) -> dict[str, Any]:
         """As the feed has it."""
@@ -42,6 +57,7 @@ class Parts:
         ears: links that are only listened to, of boats somebody else commands.
         contacts: other sources of positions.
         game: the referee's state of the game; None: none.
+        grounds: fixed things of the game: obstacles, and the own flag's circle as ``stops``, see `water.Water`.
         policy: where wanted commands come from.
         sinks: get every tick; the black box among them.
     """
@@ -51,6 +67,7 @@ class Parts:
     ears: Mapping[str, Link] = field(default_factory=dict)
     contacts: Sequence[ContactSource] = ()
     game: GameSource | None = None
+    grounds: Surroundings = OPEN_WATER
     sinks: Sequence[TickSink] = ()
 
 

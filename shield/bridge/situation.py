@@ -11,22 +11,31 @@ from ..commands import Commands
 from ..exceptions import SteerclearError
 from ..platforms import layout as L
 from ..shield import Shield
+from ..surroundings import OPEN_WATER, Surroundings
 from .assemble import assemble, seen_now
 from .fleet_file import FleetFile
 from .freshness import words
 from .preflight.result import CheckResult
 from .roster import Roster
+from .water import Water
 
 NEAR_MARGIN_M = 1e5
 """Margins beyond this mean that nobody is near."""
 
 
-def check_situation(name: str, fleet: FleetFile, roster: Roster) -> CheckResult:
-    """One of `SITUATION`, of a roster that has just been updated."""
-    return SITUATION[name](fleet, roster)
+def check_situation(name: str, fleet: FleetFile, roster: Roster, grounds: Surroundings = OPEN_WATER) -> CheckResult:
+    """One of `SITUATION`, of a roster that has just been updated.
+
+    Args:
+        name: of the check.
+        fleet: the file.
+        roster: what is known of all boats.
+        grounds: fixed things of the game, see `water.Water`.
+    """
+    return SITUATION[name](fleet, roster, Water(fleet, grounds))
 
 
-def check_known(fleet: FleetFile, roster: Roster) -> CheckResult:
+def check_known(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
     """Every boat of the file has been seen, and lately."""
     limits, missing, ages = fleet.limits, [], []
     for name in fleet.names:
@@ -43,7 +52,7 @@ def check_known(fleet: FleetFile, roster: Roster) -> CheckResult:
     return CheckResult("known", True, f"all {len(ages)} boats seen, oldest fix {oldest:.2f} s", {"oldest_s": oldest})
 
 
-def check_geofence(fleet: FleetFile, roster: Roster) -> CheckResult:
+def check_geofence(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
     """The geofence goes around all boats seen."""
     seen = seen_now(roster)
     inside = [_inside_m(fleet, row) for row in seen]
@@ -61,14 +70,14 @@ def check_geofence(fleet: FleetFile, roster: Roster) -> CheckResult:
     return CheckResult("geofence", True, f"all boats at least {min(known):.1f} m inside", figures)
 
 
-def check_certificate(fleet: FleetFile, roster: Roster) -> CheckResult:
+def check_certificate(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
     """Each boat of ours has an escape now: its certificate is not negative when told to stop."""
     try:
         given = assemble(roster, roster.commanded)
         if given is None:
             return CheckResult("certificate", False, "no boat seen; check telemetry and feed")
         stop = np.column_stack([np.zeros(len(given)), given.heading_rad])
-        answer = Shield(fleet.shield_config, fleet.surroundings).decide(given, Commands.absolute_rad(stop))
+        answer = Shield(fleet.shield_config, water.around(given)).decide(given, Commands.absolute_rad(stop))
     except SteerclearError as error:
         return CheckResult("certificate", False, f"the shield cannot decide: {error}")
     own = np.flatnonzero(given.controlled)
@@ -98,7 +107,7 @@ def _nearest_m(state: np.ndarray, i: int) -> float:
     return float(np.hypot(*(others - state[i, [L.X, L.Y]]).T).min()) if len(others) else math.inf
 
 
-SITUATION: Mapping[str, Callable[[FleetFile, Roster], CheckResult]] = {
+SITUATION: Mapping[str, Callable[[FleetFile, Roster, Water], CheckResult]] = {
     "known": check_known,
     "geofence": check_geofence,
     "certificate": check_certificate,

@@ -20,6 +20,7 @@ from steerclear.experiments.deploy.approach import approaches
 from steerclear.experiments.deploy.braille import Canvas
 from steerclear.experiments.deploy.controls import Controls
 from steerclear.experiments.deploy.dashboard import Dashboard
+from steerclear.experiments.deploy.dashboard_map import FieldMap
 from steerclear.experiments.deploy.dashboard_view import Moment, View
 from steerclear.experiments.deploy.keys import Keyboard
 from steerclear.shield.bridge.clock import ManualClock
@@ -28,6 +29,7 @@ from steerclear.shield.bridge.operator import DISABLES, Operator
 from steerclear.shield.bridge.tick import Action, Tick
 from steerclear.shield.exceptions import BridgeError, ConfigError
 from steerclear.shield.fleet import Fleet
+from steerclear.shield.surroundings import Surroundings
 
 PATIENCE_S = 30.0
 
@@ -82,6 +84,18 @@ def test_every_boat_is_on_the_map_and_in_the_table(stream, columns, rows):
     assert "⚑" in text
     assert "SPACE or s STOP ALL" in lines[-1]
     assert "All within limits" in lines[1]
+
+
+def test_the_circle_our_boats_keep_out_of_is_on_the_map(stream):
+    tick = stream.tick(5.0)
+    drawing = FieldMap(stream.fleet)
+
+    def dots(tick):
+        return sum(letter > "\u2800" for line in drawing.draw(tick, 100, 30) for letter in line.plain)
+
+    home = Surroundings(tick.surroundings.field, stops=[(60.0, 30.0, 4.35)])
+    assert dots(dataclasses.replace(tick, surroundings=home)) > dots(tick) + 8
+    assert dots(dataclasses.replace(tick, surroundings=None)) == dots(tick)
 
 
 def test_a_row_says_wanted_sent_why_and_the_closest_approach(stream):

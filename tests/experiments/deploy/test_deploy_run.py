@@ -1,20 +1,27 @@
 """`steerclear preflight` and `deploy` on simulated boats behind real sockets, and what they refuse."""
 
+import contextlib
 import json
 import os
 import socket
 import stat
+import threading
 
 import pytest
+from steerclear.env.core import BatchedMctf
 from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.cli import app
+from steerclear.experiments.deploy.grounds import grounds_of
 from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
 from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
 from steerclear.experiments.deploy.preflighting import preflight
+from steerclear.experiments.deploy.replaying import prove
+from steerclear.experiments.deploy.rules import game_config, player_names, state_of
 from steerclear.experiments.deploy.run import deploy
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.experiments.keys import KEYS, undocumented
 from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import CheckResult
@@ -79,18 +86,43 @@ BUSY = ("latency", "rates", "spread", "course", "response")
 """Checks that a busy machine may fail on boats that live five times as fast."""
 
 
+@contextlib.contextmanager
+def referee(fleet):
+    """Says all the time that both flags are home."""
+    state, done = state_of(BatchedMctf(game_config(fleet)), player_names(fleet)), threading.Event()
+
+    def tell():
+        with FeedSender("referee", fleet.feed_listeners()) as sender:
+            while not done.wait(0.02):
+                sender.send_game(state)
+
+    thread = threading.Thread(target=tell)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
 def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, entry):
     seen = []
     first = preflight(orders_of(fleet_file, accept=BUSY), Surface(seen.append))
     assert [result.text for result in first.refused] == []
     assert {"disk", "known", "geofence", "certificate", "course:blue_1", "response:blue_1"} <= {r.name for r in seen}
-    outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
+    fleet = load_fleet(fleet_file)
+    with referee(fleet):
+        outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
     assert outcome.refused == []
     assert outcome.ended.startswith("ran for")
     assert outcome.figures["decided"] > 10
     assert "HOLD" in outcome.left[0]
     with LogReader(outcome.log) as log:
         ticks = list(log.ticks())
+        proof = prove(log.header, ticks)
+    assert proof.same == proof.decisions > 10
+    heard = [tick for tick in ticks if tick.game and tick.surroundings is not None]
+    assert any(tick.surroundings.stops == grounds_of(fleet).stops != () for tick in heard), "the own flag is home"
     assert len(ticks) == outcome.figures["ticks"]
     assert any(tick.sent["blue_1"].speed_mps > 0.5 for tick in ticks)
     assert ticks[0].shield_reset
@@ -193,13 +225,18 @@ def test_a_port_that_is_taken_is_one_line_and_exit_2(fleet_file, kind, command):
     assert "in use" in line
 
 
-@pytest.mark.parametrize("name", ["unknown key", "key file readable by all", "no geofence"])
+SENT_BY = ["unknown key", "two boats with one id", "missing platform", "no geofence", "key file readable by all"]
+
+
+@pytest.mark.parametrize("name", [*SENT_BY, "port taken"])
 def test_with_a_bad_file_nothing_is_sent_to_any_boat(fleet_file, boats, name):
-    old, new, _ = BAD[name]
+    old, new, _ = BAD.get(name, ("", "", ""))
+    address = load_fleet(fleet_file).boats[0].link.address
     (fleet_file.parent / "my.key").write_text("ab" * 32)
     os.chmod(fleet_file.parent / "my.key", 0o644)
-    fleet_file.write_text(fleet_file.read_text().replace(old, new, 1))
-    one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
+    fleet_file.write_text(fleet_file.read_text().replace(old, new.replace("ADDRESS", address), 1))
+    with taken(fleet_file, "feed") if name == "port taken" else contextlib.nullcontext():
+        one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
     counts = boats.boats["blue_1"].autopilot.counts
     assert counts["taken"] == counts["ignored"] == counts["refused"] == 0
 

@@ -24,7 +24,10 @@ class OddEncounter(Encounter):
         return dataclasses.replace(super().fleet(number), **ages)
 
     def fixed(self, number):
-        return Surroundings(FIELD.field, circles=[(40.0 + 0.01 * number, 30.0, 1.0)]) if number % 3 else None
+        stops = [(42.0, 20.0, 4.35)] if number // 50 % 2 else []  # the own flag is home now and then
+        return (
+            Surroundings(FIELD.field, circles=[(40.0 + 0.01 * number, 30.0, 1.0)], stops=stops) if number % 3 else None
+        )
 
     def resets(self, number):
         return number % 40 == 0

@@ -8,6 +8,7 @@ import numpy as np
 from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.feed import FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.link import BoatReading, Sent
 from steerclear.shield.bridge.loop import Loop
@@ -16,6 +17,7 @@ from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.exceptions import BridgeError, LinkError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.surroundings import OPEN_WATER
 from steerclear.shield.tracks import thrust_at
 
 DT_S = 0.1
@@ -193,6 +195,29 @@ class FakePolicy:
         pass
 
 
+class FakeGame:
+    """A referee who says at each tick what ``told(number of the question)`` gives: a `GameState`, or None."""
+
+    def __init__(self, told, age_s=0.0):
+        self.told = told
+        self.age_s = age_s
+        self.asked = 0
+
+    def game(self):
+        state = self.told(self.asked)
+        self.asked += 1
+        return state
+
+    def game_age_s(self):
+        return self.age_s
+
+
+def game_of(blue_taken=False, red_taken=False, over=False):
+    """A state of the game in which only the flags matter."""
+    flags = (FlagStatus(10.0, 20.0, blue_taken), FlagStatus(70.0, 20.0, red_taken))
+    return GameState(time_s=1.0, boats={}, flags=flags, over=over)
+
+
 class FakeSink:
     """Keeps ticks; full when told so."""
 
@@ -212,7 +237,7 @@ class FakeSink:
 class World:
     """Own boats and others, one loop, one clock."""
 
-    def __init__(self, fleet, starts, rule, others=(), shield=None):
+    def __init__(self, fleet, starts, rule, others=(), shield=None, game=None, grounds=OPEN_WATER):
         self.fleet = fleet
         self.clock = ManualClock(1000.0)
         names = [boat.name for boat in fleet.ours]
@@ -226,7 +251,9 @@ class World:
         self.policy = FakePolicy(self.clock, rule)
         self.sink = FakeSink()
         self.operator = Operator()
-        parts = Parts(self.links, self.policy, contacts=(self.contacts,), sinks=(self.sink,))
+        parts = Parts(
+            self.links, self.policy, contacts=(self.contacts,), game=game, grounds=grounds, sinks=(self.sink,)
+        )
         self.loop = Loop(fleet, parts, self.operator, self.clock, shield)
         self.closest_m = math.inf
 

@@ -10,10 +10,9 @@ from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.freshness import Verdict
-from steerclear.shield.bridge.helm import Helm, water_of
+from steerclear.shield.bridge.helm import Helm
 from steerclear.shield.bridge.roster import Roster
 from steerclear.shield.exceptions import LinkError
-from steerclear.shield.platforms import layout as L
 
 
 def test_a_safe_command_of_the_policy_leaves_bit_for_bit():
@@ -66,19 +65,6 @@ def test_team_mates_behind_a_shield_of_their_own_are_taken_to_give_way_too():
     assert list(steered.sent) == ["blue_1"]
     alone = Helm(fleet, Shield(fleet.shield_config, fleet.surroundings), {"blue_1": link}, clock)
     assert alone.steer(roster, wanted, Verdict()).fleet.controlled.tolist() == [True, False]
-
-
-def test_the_water_grows_only_where_a_boat_of_ours_is_outside():
-    world = World(fleet_of(blue=2, red=0), [(0.0, 0.0, 0.0, 0.0), (50.0, 20.0, 0.0, 0.0)], straight(0.0, 0.0))
-    world.run(0.1)
-    fleet, file = world.last.fleet, world.fleet
-    assert water_of(file, fleet) is file.surroundings
-    fleet.state[1, L.Y] = 64.0
-    assert water_of(file, fleet).field == (-20.0, -20.0, 100.0, 80.0)
-    fleet.state[1, L.X] = -21.0
-    assert water_of(file, fleet).field == (-40.0, -20.0, 100.0, 80.0)
-    fleet.controlled[:] = False
-    assert water_of(file, fleet) is file.surroundings
 
 
 def test_the_shield_is_reset_once_at_the_start():

@@ -4,15 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from bridge_fakes import DT_S, World, fleet_of
-from steerclear.shield import Commands, Fleet, Shield
+from bridge_fakes import DT_S, FakeGame, World, fleet_of, game_of
+from steerclear.shield import Commands, Fleet, Shield, Surroundings
 from steerclear.shield.bridge.wanted import Snapshot
 from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.surroundings import OPEN_WATER
 
 OWN = [(20.0, 10.0, 0.0, 0.0), (20.4, 30.0, -180.0, 0.0), (40.0, 20.2, -90.0, 0.0)]
 OTHERS = [("red_1", 10.0, 20.0, 90.0, 2.0), ("red_2", 30.0, 38.0, 180.0, 2.0), ("red_3", 60.0, 20.0, -90.0, 0.0)]
 STEPS = 350
+GROUNDS = Surroundings(circles=[(45.0, 32.0, 1.0)], stops=[(23.0, 18.0, 4.35)])
+"""Where the boats are sent: a rock, and the circle of their own flag."""
 
 
 def wanted_at(k):
@@ -26,7 +29,12 @@ def told(k):
     return [(2.0, 90.0 + 20.0 * (k // 100)), (2.0, 180.0 - 30.0 * (k // 120)), (1.5, -90.0)]
 
 
-def simulate(fleet):
+def told_of_flags(k):
+    """What the referee says at step k: our flag is home, is taken, is home again."""
+    return game_of(blue_taken=100 <= k < 220)
+
+
+def simulate(fleet, grounds=OPEN_WATER):
     """The simulator's step with the shield in it: full states in, commands out, boats moved."""
     params = get_platform("heron").pack()
     world = World(fleet, OWN, lambda s: None, OTHERS)  # only for its starting states
@@ -39,7 +47,9 @@ def simulate(fleet):
         seen = state.copy()
         seen[3:, L.HEADING] = [_through_radians(heading) for heading in seen[3:, L.HEADING]]
         now = Fleet(seen, np.array([0, 0, 0, 1, 1, 1]), ("heron",) * 6, np.arange(6) < 3, fleet.names)
-        answer = shield.decide(now, Commands.absolute_rad(wanted_at(k)))
+        stops = () if told_of_flags(k).flags[0].taken else grounds.stops
+        around = Surroundings(fleet.geofence.box, grounds.circles, grounds.polygons, stops=stops)
+        answer = shield.decide(now, Commands.absolute_rad(wanted_at(k)), around)
         changed += answer.count_intervened
         own = [answer.sent.absolute(i, now.heading_rad[i]) for i in range(3)]
         sent.append(own)
@@ -58,9 +68,10 @@ def _through_radians(heading_deg):
     return (math.degrees(math.radians(heading_deg)) + 180.0) % 360.0 - 180.0
 
 
-def run_loop(fleet, late_steps):
+def run_loop(fleet, late_steps, grounds=OPEN_WATER):
     """The loop on links whose boats obey ``late_steps`` late."""
-    world = World(fleet, OWN, lambda snapshot: wanted_at(snapshot.number + 1), OTHERS)
+    game = FakeGame(told_of_flags)
+    world = World(fleet, OWN, lambda snapshot: wanted_at(snapshot.number + 1), OTHERS, game=game, grounds=grounds)
     world.policy.offer(Snapshot(-1, world.clock.now_s(), np.full((6, 4), np.nan)))
     for link in world.links.values():
         _delay(link, late_steps)
@@ -87,10 +98,11 @@ def _delay(link, steps):
 
 
 @pytest.mark.parametrize("late_steps", [0, 2])
-def test_the_same_states_give_the_same_commands_bit_for_bit(late_steps):
+@pytest.mark.parametrize("grounds", [OPEN_WATER, GROUNDS], ids=["open water", "flag and rock"])
+def test_the_same_states_give_the_same_commands_bit_for_bit(late_steps, grounds):
     fleet = fleet_of(blue=3, red=3, more=f"shield: {{delay_s: {0.1 * late_steps}, track_error_mps: 0.0}}")
-    expected, changed = simulate(fleet)
-    world = run_loop(fleet, late_steps)
+    expected, changed = simulate(fleet, grounds)
+    world = run_loop(fleet, late_steps, grounds)
     decided = [
         [tick.decisions.sent.absolute(i, tick.fleet.heading_rad[i]) for i in range(3)] for tick in world.sink.ticks
     ]

@@ -101,6 +101,7 @@ def ticks(draw):
         circles=draw(st.lists(st.tuples(metres, metres, st.floats(0.0, 9.0)), max_size=2)),
         polygons=draw(st.lists(st.lists(st.tuples(metres, metres), min_size=3, max_size=4), max_size=2)),
         keep_out=[(1.0, 2.0, 3.0)],
+        stops=draw(st.lists(st.tuples(metres, metres, st.floats(0.0, 9.0)), max_size=1)),
     )
     reading = BoatReading(
         "blue_1", draw(floats), (draw(floats), draw(floats)), heading_rad=draw(floats), texts=(draw(words),),

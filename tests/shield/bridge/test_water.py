@@ -1,0 +1,139 @@
+"""What does not move around the boats: the geofence, obstacles, and the own flag's circle while the flag is home."""
+
+import math
+
+import numpy as np
+import pytest
+from bridge_fakes import FakeGame, World, fleet_of, game_of, straight
+from steerclear.shield import Fleet, Surroundings
+from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.water import Water
+from steerclear.shield.platforms import layout as L
+
+CIRCLE = (10.0, 20.0, 4.35)
+ROCK = (40.0, 10.0, 2.0)
+PIER = ((50.0, 0.0), (52.0, 0.0), (51.0, 5.0))
+GROUNDS = Surroundings((0.0, 0.0, 80.0, 40.0), circles=[ROCK], polygons=[PIER], stops=[CIRCLE])
+
+
+def fleet_at(*places, controlled=True):
+    state = np.zeros((len(places), L.N_STATE))
+    state[:, [L.X, L.Y]] = places
+    n = len(places)
+    names = tuple(f"boat_{i}" for i in range(n))
+    return Fleet(state, np.zeros(n, dtype=np.int64), ("heron",) * n, np.full(n, controlled), names)
+
+
+@pytest.fixture
+def file():
+    return fleet_of(blue=2, red=0)
+
+
+def test_the_geofence_takes_the_place_of_the_games_edge_and_obstacles_are_always_there(file):
+    around = Water(file, GROUNDS).around(fleet_at((0.0, 0.0)))
+    assert around.field == file.geofence.box
+    assert around.circles == (ROCK,)
+    assert around.polygons == (PIER,)
+    assert around.stops == ()
+
+
+@pytest.mark.parametrize(
+    ("game", "age_s", "is_there"),
+    [
+        (game_of(), 0.0, True),
+        (game_of(), 2.0, True),
+        (game_of(), 2.001, False),
+        (game_of(), math.nan, False),
+        (game_of(blue_taken=True), 0.0, False),
+        (game_of(red_taken=True), 0.0, True),
+        (game_of(over=True), 0.0, False),
+        (None, math.inf, False),
+    ],
+    ids=["home", "just fresh", "silent", "no age", "taken", "the other taken", "over", "no referee"],
+)
+def test_the_own_flags_circle_is_there_while_a_referee_says_that_the_flag_is_home(file, game, age_s, is_there):
+    stops = Water(file, GROUNDS).around(fleet_at((0.0, 0.0)), game, age_s).stops
+    assert stops == ((CIRCLE,) if is_there else ())
+
+
+def test_it_is_our_flag_that_counts(file):
+    red = file.model_copy(update={"team": "red"})
+    water, boats = Water(red, GROUNDS), fleet_at((0.0, 0.0))
+    assert water.around(boats, game_of(blue_taken=True), 0.0).stops == (CIRCLE,)
+    assert water.around(boats, game_of(red_taken=True), 0.0).stops == ()
+
+
+def test_the_water_grows_only_where_a_boat_of_ours_is_outside(file):
+    water = Water(file, GROUNDS)
+    assert water.around(fleet_at((0.0, 0.0), (50.0, 20.0)), game_of(), 0.0).field == file.geofence.box
+    out = water.around(fleet_at((0.0, 0.0), (50.0, 64.0)), game_of(), 0.0)
+    assert out.field == (-20.0, -20.0, 100.0, 80.0)
+    assert (out.circles, out.polygons, out.stops) == ((ROCK,), (PIER,), (CIRCLE,))
+    assert water.around(fleet_at((0.0, 0.0), (-21.0, 64.0))).field == (-40.0, -20.0, 100.0, 80.0)
+    assert water.around(fleet_at((0.0, 0.0), (-21.0, 64.0), controlled=False)).field == file.geofence.box
+
+
+def test_the_shield_packs_the_same_water_once(file):
+    water = Water(file, GROUNDS)
+    boats = fleet_at((0.0, 0.0))
+    assert water.around(boats, game_of(), 0.0) is water.around(boats, game_of(), 0.1)
+    assert len({water.around(fleet_at((0.0, 64.0 + 0.5 * k))) for k in range(5)}) == 1
+
+
+def test_a_boat_told_to_cross_its_own_flag_stays_out_of_the_circle_until_the_flag_is_taken():
+    """And goes on through it from then on; the tick holds what the shield was given."""
+
+    def told(number):
+        return game_of(blue_taken=number >= 120)
+
+    def world_of(game):
+        return World(
+            fleet_of(blue=1, red=0),
+            [(10.0, -5.0, 0.0, 2.0)],
+            straight(0.0),
+            game=game,
+            grounds=GROUNDS,
+        )
+
+    nearest = {True: math.inf, False: math.inf}
+
+    def look(world):
+        is_home = len(world.sink.ticks) < 120
+        at = world.links["blue_1"].row[:2]
+        nearest[is_home] = min(nearest[is_home], float(np.hypot(*(at - CIRCLE[:2]))))
+
+    world = world_of(FakeGame(told)).run(30.0, look)
+    assert nearest[True] >= CIRCLE[2]
+    assert nearest[False] < CIRCLE[2]
+    assert {tick.surroundings.stops for tick in world.sink.ticks[:120]} == {(CIRCLE,)}
+    assert {tick.surroundings.stops for tick in world.sink.ticks[120:]} == {()}
+    nearest[True] = math.inf
+    world_of(None).run(12.0, look)
+    assert nearest[True] < 2.0, "without a referee nothing is in the way"
+
+
+def test_a_referee_who_falls_silent_lifts_the_circle_and_the_next_word_sets_it_again():
+    game = FakeGame(lambda number: game_of())
+    world = World(fleet_of(blue=1, red=0), [(40.0, 30.0, 0.0, 0.0)], straight(0.0, 0.0), game=game, grounds=GROUNDS)
+    seen = []
+    for age_s in (0.0, 3.0, 0.1):
+        game.age_s = age_s
+        world.run(0.2)
+        seen.append(world.last.surroundings.stops)
+    assert seen == [(CIRCLE,), (), (CIRCLE,)]
+
+
+def test_the_files_own_limit_says_when_a_referee_is_silent():
+    file = parse_fleet(
+        """
+version: 1
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
+geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
+team: blue
+boats: [{name: a, team: blue, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:1", system_id: 1}}]
+limits: {game: {max_age_s: 0.5, then: stop}}
+"""
+    )
+    water, boats = Water(file, GROUNDS), fleet_at((0.0, 0.0))
+    assert water.around(boats, game_of(), 0.5).stops == (CIRCLE,)
+    assert water.around(boats, game_of(), 0.6).stops == ()
