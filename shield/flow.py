@@ -70,6 +70,30 @@ def finish(
     commit(state, ours, memory, work, plan)
 
 
+PASSES, TO_SOLVE, TO_ESCAPE = range(3)
+
+
+@lean_kernel
+def begin(
+    state: Array,
+    wanted: Array,
+    margin_m: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> int:
+    """Screen the wanted commands: `PASSES` and all is done, `TO_SOLVE` the program, or `TO_ESCAPE` without it."""
+    if screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan):
+        finish(True, 0, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        return PASSES
+    return TO_ESCAPE if lost(ours, memory, work) else TO_SOLVE
+
+
 @lean_kernel
 def decide_compiled(
     state: Array,
@@ -85,11 +109,11 @@ def decide_compiled(
     plan: Plan,
 ) -> None:
     """The whole decision for one game; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
-    safe = screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
-    count = 0
-    for _ in range(0 if lost(ours, memory, work) else ROUNDS):
-        if safe:
-            break
+    todo = begin(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+    if todo == PASSES:
+        return
+    safe, count = False, 0
+    for _ in range(ROUNDS if todo == TO_SOLVE else 0):
         count = pick_movers(ours, work, plan)
         rows = build(count, state, ours, boats, fixed, tuning, work, plan)
         if rows < 0 or not solve_compiled(count, rows, plan):
@@ -97,4 +121,6 @@ def decide_compiled(
         if not take_answer(plan.z, count, state, boats, tuning, plan):
             break
         safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        if safe:
+            break
     finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)

@@ -155,6 +155,8 @@ class Work(NamedTuple):
         ways_later: (n, 3, 5) places opponents may be at by then.
         nobody: (n,) False.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
+        first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
+        first_manner: (n, n) how it is followed first.
     """
 
     next_state: Array
@@ -182,6 +184,8 @@ class Work(NamedTuple):
     ways_later: Array
     nobody: BoolArray
     searched: IntArray
+    first_hunter: IntArray
+    first_manner: IntArray
 
 
 def new_memory(*shape: int) -> Memory:
@@ -218,4 +222,6 @@ def new_work(boats: int, samples: int) -> Work:
         ways_later=np.zeros((boats, 3, 5)),
         nobody=np.zeros(boats, np.bool_),
         searched=np.full(boats, -1, np.int64),
+        first_hunter=np.zeros(boats, np.int64),
+        first_manner=np.zeros((boats, boats), np.int64),
     )

@@ -15,14 +15,13 @@ from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
-from .flow import ROUNDS, finish
+from .flow import PASSES, ROUNDS, TO_SOLVE, begin, finish
 from .jit import Array, BoolArray
 from .linearised import add_slack, build, check, pick_movers, take_answer
 from .plan import NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .scene import Boats, Fixed, Memory, Work, new_memory, new_work
-from .screening import lost, screen
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
@@ -151,17 +150,19 @@ class Shield:
         """The stages of `flow` with the QP backend in between."""
         tuning, plans = self._tuning, self._plans
         memory, work, plan = seat.memory, seat.work, seat.plan
-        safe = screen(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
-        count = 0
-        for _ in range(0 if lost(ours, memory, work) else ROUNDS):
-            if safe:
-                break
+        todo = begin(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
+        if todo == PASSES:
+            return
+        safe, count = False, 0
+        for _ in range(ROUNDS if todo == TO_SOLVE else 0):
             count = pick_movers(ours, work, plan)
             rows = build(count, state, ours, boats, fixed, tuning, work, plan)
             z = self._solve(count, rows, plan) if rows >= 0 else None
             if z is None or not take_answer(z, count, state, boats, tuning, plan):
                 break
             safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+            if safe:
+                break
         finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:

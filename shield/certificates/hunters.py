@@ -47,7 +47,8 @@ def clear_of_hunter(
 ) -> None:
     """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
 
-    The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently.
+    The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently. The one that
+    came below its floor last is looked at first.
     """
     sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
@@ -55,7 +56,9 @@ def clear_of_hunter(
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
-    for manner in range(manners):
+    first = min(work.first_manner[i, j], manners - 1)
+    for turn_to in range(manners):
+        manner = _first_then_rest(first, turn_to)
         share = RUDDERS[manner // 2]
         clear_of_pursuer(
             path,
@@ -83,7 +86,16 @@ def clear_of_hunter(
         if work.spare[MARGIN] < work.out[MARGIN]:
             copy_row(work.out, work.spare)
             if work.out[MARGIN] < floor_m:
+                work.first_manner[i, j] = manner
                 return
+
+
+@lean_kernel
+def _first_then_rest(first: int, number: int) -> int:
+    """Entry ``number`` of the list 0, 1, 2, ... with ``first`` moved to its front."""
+    if number == 0:
+        return first
+    return number if number > first else number - 1
 
 
 @lean_kernel
@@ -105,11 +117,16 @@ def worst_hunter(
 ) -> None:
     """Lower the clearance in ``slot`` to that from hunting opponents where it is worse.
 
+    Once below the floor the search stops: who came there last is looked at first, so that of many manoeuvres those
+    that fail cost little.
+
     ``work.sealed[slot]`` says whether a table had the last word on where the boat is one step on: then no other
     manoeuvre changes it.
     """
     clear = work.clear[slot]
-    for j in range(state.shape[0]):
+    first = work.first_hunter[i]
+    for number in range(state.shape[0]):
+        j = _first_then_rest(first, number)
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
             continue
         if work.breach[i, j]:
@@ -120,6 +137,7 @@ def worst_hunter(
                 clear[MARGIN] = margin
                 work.bound[slot] = j
                 if margin < floor_m:
+                    work.first_hunter[i] = j
                     work.sealed[slot] = not work.beset[i]
                     return
             continue
@@ -129,4 +147,5 @@ def worst_hunter(
             copy_row(clear, work.out)
             work.bound[slot] = j
             if clear[MARGIN] < floor_m:
+                work.first_hunter[i] = j
                 return

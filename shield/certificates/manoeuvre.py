@@ -64,6 +64,8 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for i in range(n):
         work.hunted[i] = False
+        work.first_hunter[i] = 0
+        work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
         ux, uy = math.sin(heading), math.cos(heading)
         way = state[i, L.SPEED] * tuning.dt_s
