@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 
 from . import rules as R
 from .arrays import Games, Rules
@@ -15,7 +15,7 @@ CHUNK = 64
 """Games handled together, rule by rule."""
 
 
-@kernel
+@lean_kernel
 def first_unusable(commands: Array) -> int:
     """Flat number ``b * n + i`` of the first command (B, n, 2) that is not finite, or -1."""
     for b in range(commands.shape[0]):
@@ -25,7 +25,7 @@ def first_unusable(commands: Array) -> int:
     return -1
 
 
-@kernel
+@lean_kernel
 def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
     for b in range(first, last):
         games.time_s[b] += rules.dt_s
@@ -38,7 +38,7 @@ def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
     check_collisions(rules, games, first, last)
 
 
-@kernel
+@lean_kernel
 def advance_games(rules: Rules, games: Games, commands: Array) -> None:
     """Move all boats under ``commands`` (B, n, 2), speed m/s and relative heading deg, and apply the rules.
 
@@ -53,7 +53,7 @@ def advance_games(rules: Rules, games: Games, commands: Array) -> None:
         _after_the_move(rules, games, first, last)
 
 
-@kernel
+@lean_kernel
 def follow_games(rules: Rules, games: Games, seen: Array) -> None:
     """Apply the rules to boats that moved by themselves to ``seen`` (B, n, 4), see `motion.place_boats`."""
     n_games = games.state.shape[0]

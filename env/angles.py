@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import lean_kernel
 
 
-@kernel
+@lean_kernel
 def wrap_bearing(angle_deg: float) -> float:
     """Angle within one turn of zero brought into (-180, 180]: straight astern is +180, as the reference has it."""
     if angle_deg > 180.0:
@@ -17,7 +17,7 @@ def wrap_bearing(angle_deg: float) -> float:
     return angle_deg
 
 
-@kernel
+@lean_kernel
 def heading_to(dx: float, dy: float) -> float:
     """Heading of the vector (dx, dy), deg in [-180, 180]; the zero vector points east, as in the reference."""
     if dx == 0.0 and dy == 0.0:

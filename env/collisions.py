@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
+from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .arrays import Games, Rules
 
 
-@kernel
+@lean_kernel
 def _new_in_game(state: Array, radius: Array, touching: BoolArray, new: IntArray) -> None:
     """Count each boat's entries in one game into ``new`` (n,) and update ``touching`` (n, n)."""
     n_boats = state.shape[0]
@@ -28,7 +28,7 @@ def _new_in_game(state: Array, radius: Array, touching: BoolArray, new: IntArray
             touching[j, i] = near
 
 
-@kernel
+@lean_kernel
 def check_collisions(rules: Rules, games: Games, first: int, last: int) -> None:
     """Count the pairs of the games first..last-1 that came within touch in this step."""
     for b in range(first, last):

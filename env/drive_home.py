@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
@@ -18,7 +18,7 @@ from .detour import heading_past_obstacles
 from .obstacles import touches_obstacle
 
 
-@kernel
+@lean_kernel
 def heading_into_field(size: Array, x: float, y: float) -> float:
     """Heading perpendicular to the edge nearest to (x, y), pointing inwards, deg."""
     over_x = max(0.0, -x, x - size[0])
@@ -37,7 +37,7 @@ def heading_into_field(size: Array, x: float, y: float) -> float:
     return 90.0
 
 
-@kernel
+@lean_kernel
 def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
     """Command of a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
     x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
@@ -54,7 +54,7 @@ def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
     command[1] = wrap_bearing(heading - games.state[b, i, L.HEADING])
 
 
-@kernel
+@lean_kernel
 def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array) -> int:
     """What every boat will obey; fills ``commands`` and ``games.driven``.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .angles import wrap_bearing
@@ -79,7 +79,7 @@ def global_state_bounds(config: GameConfig, field: FieldGeometry, max_speed_mps:
     return np.array(low), np.array(high)
 
 
-@kernel
+@lean_kernel
 def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> None:
     state = games.state[b, i]
     x, y, heading = state[L.X], state[L.Y], state[L.HEADING]
@@ -99,7 +99,7 @@ def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> No
         out[N_BOAT + 2 * k + 1] = wrap_bearing(towards - heading)
 
 
-@kernel
+@lean_kernel
 def describe_game(rules: Rules, games: Games, b: int, out: Array) -> None:
     """Raw global state of game ``b`` into ``out`` (n_global,)."""
     width = N_BOAT + 2 * rules.obstacles.bounds.shape[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to
@@ -14,7 +14,7 @@ BUFFER_M = 0.1
 """A boat that entered the circle is put this far outside of it."""
 
 
-@kernel
+@lean_kernel
 def _solve_along_x(
     x: float, y: float, slope: float, centre: Array, radius: float, forward: bool
 ) -> tuple[float, float]:
@@ -33,7 +33,7 @@ def _solve_along_x(
     return x, slope * x + intercept
 
 
-@kernel
+@lean_kernel
 def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> tuple[float, float]:
     """Where the ray from ``inside`` through ``before`` leaves a circle, m.
 
@@ -54,7 +54,7 @@ def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> t
     return _solve_along_x(x, y, (to_y - y) / (to_x - x), centre, radius, to_x > x)
 
 
-@kernel
+@lean_kernel
 def keep_out(state: Array, before: Array, centre: Array, radius: float) -> None:
     """Put a boat that got inside the circle back onto it, keeping only the tangential part of its velocity.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
@@ -15,7 +15,7 @@ from .keepout import keep_out
 from .obstacles import touches_obstacle
 
 
-@kernel
+@lean_kernel
 def is_on_side(line: Array, side_sign: float, x: float, y: float) -> bool:
     """Whether (x, y) lies on a team's side of the dividing line (2, 2), or on the line itself."""
     along_x, along_y = line[1, 0] - line[0, 0], line[1, 1] - line[0, 1]
@@ -23,14 +23,14 @@ def is_on_side(line: Array, side_sign: float, x: float, y: float) -> bool:
     return cross * side_sign >= 0.0
 
 
-@kernel
+@lean_kernel
 def is_within(state: Array, place: Array, radius_m: float) -> bool:
     """Whether a boat (its state row) is closer to a place (x, y) than ``radius_m``."""
     dx, dy = state[L.X] - place[0], state[L.Y] - place[1]
     return math.sqrt(dx * dx + dy * dy) < radius_m
 
 
-@kernel
+@lean_kernel
 def send_flag_home(rules: Rules, games: Games, b: int, flag: int) -> None:
     """Put a team's flag back to its home."""
     games.flag_taken[b, flag] = False
@@ -38,7 +38,7 @@ def send_flag_home(rules: Rules, games: Games, b: int, flag: int) -> None:
     games.flag_position[b, flag, 1] = rules.flag_home[flag, 1]
 
 
-@kernel
+@lean_kernel
 def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
     """Boat ``i`` loses the flag it may carry, which goes home."""
     if games.has_flag[b, i]:
@@ -46,7 +46,7 @@ def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
         send_flag_home(rules, games, b, 1 - rules.team[i])
 
 
-@kernel
+@lean_kernel
 def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
     """What hitting an obstacle costs boat ``i``: the flag, and by the rules perhaps a tag."""
     if rules.tag_on_collision:
@@ -54,7 +54,7 @@ def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
     drop_flag(rules, games, b, i)
 
 
-@kernel
+@lean_kernel
 def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
     """A boat that hit an obstacle goes back, turned round and stopped, and loses the flag; its autopilot remembers."""
     state = games.state[b, i]
@@ -70,7 +70,7 @@ def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
     state[L.TURN_RATE] = 0.0
 
 
-@kernel
+@lean_kernel
 def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, command: Array, dt_s: float) -> bool:
     """Advance a boat by one step under a command (speed m/s, relative heading deg).
 
@@ -91,7 +91,7 @@ def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, comma
     return was_float32
 
 
-@kernel
+@lean_kernel
 def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: int) -> None:
     """Every boat's turn in a step, in boat order, in the games first..last-1.
 
@@ -124,7 +124,7 @@ def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: in
                 games.flag_position[b, 1 - team, 1] = state[L.Y]
 
 
-@kernel
+@lean_kernel
 def see_boat(state: Array, seen: Array) -> None:
     """Put what is seen of a boat, ``seen`` (4,) x m, y m, heading deg, speed m/s, into its state row."""
     state[L.X], state[L.Y] = seen[0], seen[1]
@@ -132,7 +132,7 @@ def see_boat(state: Array, seen: Array) -> None:
     state[L.SPEED] = seen[3]
 
 
-@kernel
+@lean_kernel
 def place_boats(rules: Rules, games: Games, seen: Array, first: int, last: int) -> None:
     """`move_boats` for boats that something else moves: same order, same bookkeeping, but nothing is moved.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
+from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
@@ -18,7 +18,7 @@ from .obstacles import Obstacles, distance_and_heading
 from .sight import sight_of_line, sight_of_point
 
 
-@kernel
+@lean_kernel
 def _see_field(raw: Array, i: int, state: Array, lines: Array, homes: Array, team: int) -> None:
     """Flag homes, walls and the dividing line (packed ``lines`` (5, 7)) as seen by boat ``i``."""
     x, y, heading = state[i, L.X], state[i, L.Y], state[i, L.HEADING]
@@ -29,7 +29,7 @@ def _see_field(raw: Array, i: int, state: Array, lines: Array, homes: Array, tea
     raw[i, 14] = state[i, L.SPEED]
 
 
-@kernel
+@lean_kernel
 def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -> None:
     """Where boats ``i`` and ``j`` (rows of ``state``) see one another: one arc tangent for both."""
     dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
@@ -49,7 +49,7 @@ def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -
     raw[j, at + 3] = state[i, L.SPEED]
 
 
-@kernel
+@lean_kernel
 def _see_status(
     raw: Array, i: int, slots: IntArray, has_flag: BoolArray, on_side: BoolArray, cooldown: Array, is_tagged: BoolArray
 ) -> None:
@@ -62,7 +62,7 @@ def _see_status(
         raw[j, at + 3] = is_tagged[i]
 
 
-@kernel
+@lean_kernel
 def _see_obstacles(row: Array, state: Array, obstacles: Obstacles, radius: float, at: int) -> None:
     """Distance (less the boat's radius) and bearing of every obstacle, from ``row[at]`` on."""
     for k in range(obstacles.bounds.shape[0]):
@@ -71,7 +71,7 @@ def _see_obstacles(row: Array, state: Array, obstacles: Obstacles, radius: float
         row[at + 2 * k + 1] = wrap_bearing(heading - state[L.HEADING])
 
 
-@kernel
+@lean_kernel
 def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -> None:
     """Raw observations of all boats of the games first..last-1 into ``raw`` (last - first, n, n_obs)."""
     n_boats = rules.n_boats
@@ -99,7 +99,7 @@ def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -
                 _see_obstacles(seen[i], state[i], rules.obstacles, rules.agent_radius[i], at)
 
 
-@kernel
+@lean_kernel
 def normalise(raw: Array, middle: Array, scale: Array, out: np.ndarray) -> None:
     """``out = clip((raw - middle) * scale, -1, 1)`` in float32; raw and out (n, n_obs)."""
     for i in range(raw.shape[0]):
@@ -107,7 +107,7 @@ def normalise(raw: Array, middle: Array, scale: Array, out: np.ndarray) -> None:
             out[i, k] = min(1.0, max(-1.0, (raw[i, k] - middle[k]) * scale[k]))
 
 
-@kernel
+@lean_kernel
 def observe_games(rules: Rules, games: Games, middle: Array, scale: Array, raw: Array, out: np.ndarray) -> None:
     """Normalised observations of every game into ``out`` (B, n, n_obs) float32; ``raw`` (k, n, n_obs) is scratch."""
     n_games = games.state.shape[0]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array, IntArray, kernel
+from steerclear.shield.jit import Array, IntArray, lean_kernel
 
 from .angles import heading_to
 
@@ -48,7 +48,7 @@ def pack_obstacles(obstacles: Mapping[str, Any] | None) -> Obstacles:
     )
 
 
-@kernel
+@lean_kernel
 def closest_on_segment(segment: Array, x: float, y: float) -> tuple[float, float]:
     """Point of a segment (2, 2) closest to (x, y), m."""
     ax, ay = segment[0, 0], segment[0, 1]
@@ -61,7 +61,7 @@ def closest_on_segment(segment: Array, x: float, y: float) -> tuple[float, float
     return ax + share * dx, ay + share * dy
 
 
-@kernel
+@lean_kernel
 def distance_and_heading(obstacles: Obstacles, number: int, x: float, y: float) -> tuple[float, float]:
     """Distance from (x, y) to an obstacle's edge, m (0 or less inside a circle), and heading to it, deg.
 
@@ -84,7 +84,7 @@ def distance_and_heading(obstacles: Obstacles, number: int, x: float, y: float) 
     return math.sqrt(nearest), heading_to(near_dx, near_dy)
 
 
-@kernel
+@lean_kernel
 def touches_obstacle(obstacles: Obstacles, x: float, y: float, radius: float) -> bool:
     """Whether a boat of this radius (m) at (x, y) touches any obstacle."""
     for number in range(obstacles.bounds.shape[0]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import lean_kernel
 
 
 def seed_states(seed: int | None, n_games: int) -> np.ndarray:
@@ -11,7 +11,7 @@ def seed_states(seed: int | None, n_games: int) -> np.ndarray:
     return np.random.SeedSequence(seed).generate_state(n_games, dtype=np.uint64)
 
 
-@kernel
+@lean_kernel
 def next_uniform(rng: np.ndarray, b: int) -> float:
     """Next number of game ``b`` in [0, 1), by the SplitMix64 generator; advances its state."""
     rng[b] += np.uint64(0x9E3779B97F4A7C15)

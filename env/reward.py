@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 
 from .arrays import Games, Rules
 
 
-@kernel
+@lean_kernel
 def reward_games(rules: Rules, games: Games, out: Array) -> None:
     """Rewards of the last step into ``out`` (B, n): weighted own events minus the opponents', minus own collisions."""
     for b in range(out.shape[0]):

@@ -5,14 +5,14 @@ Every kernel works on the games from number ``first`` up to, not including, ``la
 
 from __future__ import annotations
 
-from steerclear.shield.jit import Array, BoolArray, kernel
+from steerclear.shield.jit import Array, BoolArray, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .arrays import CAPTURE, GRAB, OUT, TAG, Games, Rules
 from .motion import drop_flag, is_within
 
 
-@kernel
+@lean_kernel
 def recharge(rules: Rules, games: Games, first: int, last: int) -> None:
     """Advance the time since each boat's last tag, up to the cool-down."""
     for b in range(first, last):
@@ -22,7 +22,7 @@ def recharge(rules: Rules, games: Games, first: int, last: int) -> None:
                 games.tagging_cooldown_s[b, i] = min(elapsed + rules.dt_s, rules.cooldown)
 
 
-@kernel
+@lean_kernel
 def check_bounds(rules: Rules, games: Games, first: int, last: int) -> None:
     """Mark boats on or beyond an edge; they are tagged (if the rules say so) and lose the flag."""
     for b in range(first, last):
@@ -38,7 +38,7 @@ def check_bounds(rules: Rules, games: Games, first: int, last: int) -> None:
             games.oob[b, i] = not inside
 
 
-@kernel
+@lean_kernel
 def check_grabs(rules: Rules, games: Games, first: int, last: int) -> None:
     """Untagged boats on the far side within reach of a flag that is home take it, first boat first."""
     for b in range(first, last):
@@ -56,7 +56,7 @@ def check_grabs(rules: Rules, games: Games, first: int, last: int) -> None:
                 games.events[b, team, GRAB] += 1
 
 
-@kernel
+@lean_kernel
 def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: int, first: int, reach_m: float) -> int:
     """The first untagged opponent of boat ``i`` on the wrong side within reach, -1 for none.
 
@@ -68,7 +68,7 @@ def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: i
     return -1
 
 
-@kernel
+@lean_kernel
 def check_tags(rules: Rules, games: Games, first: int, last: int) -> None:
     """Boats on their side, in bounds, untagged and recharged tag one opponent each, in boat order."""
     for b in range(first, last):
@@ -90,7 +90,7 @@ def check_tags(rules: Rules, games: Games, first: int, last: int) -> None:
             games.tagging_cooldown_s[b, i] = 0.0
 
 
-@kernel
+@lean_kernel
 def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
     """Carriers that reached their own side (or, by option, their own base) score; the flag goes home."""
     for b in range(first, last):
@@ -107,7 +107,7 @@ def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
                 games.events[b, team, CAPTURE] += 1
 
 
-@kernel
+@lean_kernel
 def check_untags(rules: Rules, games: Games, first: int, last: int) -> None:
     """Tagged boats within reach of their own flag's home are free again."""
     for b in range(first, last):
@@ -117,7 +117,7 @@ def check_untags(rules: Rules, games: Games, first: int, last: int) -> None:
                 games.is_tagged[b, i] = not is_within(games.state[b, i], home, rules.catch_radius)
 
 
-@kernel
+@lean_kernel
 def check_end(rules: Rules, games: Games, first: int, last: int) -> None:
     """End a game when a team has the top score, or when time is up (to the reference's tolerance)."""
     slack = 1e-8 + 1e-5 * rules.max_time_s

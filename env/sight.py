@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 
 from .angles import heading_to, wrap_bearing
 
@@ -23,14 +23,14 @@ def pack_lines(segments: Array) -> Array:
     return rows
 
 
-@kernel
+@lean_kernel
 def sight_of_point(x: float, y: float, heading: float, point_x: float, point_y: float) -> tuple[float, float]:
     """Bearing and distance of a point, from (x, y) under ``heading``."""
     dx, dy = point_x - x, point_y - y
     return wrap_bearing(heading_to(dx, dy) - heading), math.sqrt(dx * dx + dy * dy)
 
 
-@kernel
+@lean_kernel
 def sight_of_line(x: float, y: float, heading: float, lines: Array, k: int) -> tuple[float, float]:
     """Bearing and distance of the closest point of packed line ``k``.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .geometry import bearing_deg, boat_to_boat, is_turned, own_end_point, to_boat, unit
@@ -22,7 +22,7 @@ POINT_REACHED_M = 2.5
 HOME_REACHED_M = 6.0  # the own flag's keep-out circle is larger than POINT_REACHED_M
 
 
-@kernel
+@lean_kernel
 def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
     """Loop own base -> opponent's flag -> back at full speed; a tag restarts the loop.
 
@@ -42,7 +42,7 @@ def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
     return follow(game, boat, x, y)
 
 
-@kernel
+@lean_kernel
 def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tuple[float, float]:
     """Drawn to the flag (with it: to the own flag home), pushed off opponents and near walls, at full speed.
 
@@ -60,13 +60,13 @@ def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tu
     return game.limits[boat, MAX_SPEED], bearing_deg(right, forward)
 
 
-@kernel
+@lean_kernel
 def is_stalemate(right: float, forward: float, push_right: float, push_forward: float) -> bool:
     """Whether pull and push nearly cancel (compared in size per boat axis, as the reference opponents do)."""
     return abs(abs(right) - abs(push_right)) <= STALEMATE and abs(abs(forward) - abs(push_forward)) <= STALEMATE
 
 
-@kernel
+@lean_kernel
 def to_far_wall(game: Game, boat: int) -> tuple[float, float]:
     """Way out of a stalemate: the farther long wall, with a bias to one so that the choice sticks."""
     y, height = game.state[boat, L.Y], game.field[HEIGHT]
@@ -77,7 +77,7 @@ def to_far_wall(game: Game, boat: int) -> tuple[float, float]:
     return to_boat(game, boat, game.state[boat, L.X], y_wall)
 
 
-@kernel
+@lean_kernel
 def push(game: Game, boat: int, reach_m: float) -> tuple[float, float]:
     """Unit vector away from opponents (all of them, tagged or not) and walls ahead, each weighted by 1/distance."""
     right, forward = push_of_walls(game, boat, WALL_REACH_M, reach_m)
@@ -89,7 +89,7 @@ def push(game: Game, boat: int, reach_m: float) -> tuple[float, float]:
     return -right, -forward
 
 
-@kernel
+@lean_kernel
 def weighted(right: float, forward: float, reach_m: float) -> tuple[float, float]:
     """Direction to a thing to keep off, times reach / distance; zero beyond the reach."""
     distance = math.hypot(right, forward)
@@ -98,7 +98,7 @@ def weighted(right: float, forward: float, reach_m: float) -> tuple[float, float
     return right * reach_m / distance**2, forward * reach_m / distance**2
 
 
-@kernel
+@lean_kernel
 def push_of_walls(game: Game, boat: int, wall_reach_m: float, reach_m: float) -> tuple[float, float]:
     """Weighted sum of the nearest points of walls that are ahead and within ``wall_reach_m`` (one per axis)."""
     x, y = game.state[boat, L.X], game.state[boat, L.Y]
@@ -115,7 +115,7 @@ def push_of_walls(game: Game, boat: int, wall_reach_m: float, reach_m: float) ->
     return right + r, forward + f
 
 
-@kernel
+@lean_kernel
 def weighted_wall(
     game: Game, boat: int, x: float, y: float, wall_reach_m: float, reach_m: float
 ) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def weighted_wall(
     return weighted(right, forward, reach_m)
 
 
-@kernel
+@lean_kernel
 def team_has_flag(game: Game, team: int) -> bool:
     """Whether any boat of the team carries the flag."""
     for boat in range(game.team.size):  # noqa: SIM110 (numba compiles no generators in any())

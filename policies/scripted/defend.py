@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .attack import HARD_REACH_M, field_attack, push_of_walls, team_has_flag
@@ -19,7 +19,7 @@ WALL_REACH_M = 10.0
 THREAT_M = 30.0
 
 
-@kernel
+@lean_kernel
 def medium_defend(game: Game, boat: int) -> tuple[float, float]:
     """Chase a taken flag, else the nearest untagged opponent in the own half, else wait in front of the base."""
     team = game.team[boat]
@@ -37,7 +37,7 @@ def medium_defend(game: Game, boat: int) -> tuple[float, float]:
     return max_speed, bearing_deg(right, forward)
 
 
-@kernel
+@lean_kernel
 def hard_defend(game: Game, boat: int) -> tuple[float, float]:
     """Stay between the own flag and the nearest opponent, go for it inside the perimeter, chase a taken flag."""
     team = game.team[boat]
@@ -51,7 +51,7 @@ def hard_defend(game: Game, boat: int) -> tuple[float, float]:
     return game.limits[boat, MAX_SPEED], bearing_deg(right - wall_right, forward - wall_forward)
 
 
-@kernel
+@lean_kernel
 def hard(game: Game, boat: int) -> tuple[float, float]:
     """Both roles: attack, but defend while the own flag is taken or the opponents' centre comes near it."""
     team = game.team[boat]
@@ -61,7 +61,7 @@ def hard(game: Game, boat: int) -> tuple[float, float]:
     return field_attack(game, boat, HARD_REACH_M, True)
 
 
-@kernel
+@lean_kernel
 def is_threatened(game: Game, team: int) -> bool:
     """Whether the mean position of the opponents is within ``THREAT_M`` of the team's flag and one is untagged."""
     x = y = count = 0.0
@@ -74,7 +74,7 @@ def is_threatened(game: Game, team: int) -> bool:
     return untagged and math.hypot(x / count - flag_x, y / count - flag_y) < THREAT_M
 
 
-@kernel
+@lean_kernel
 def guard_point(game: Game, boat: int, flag_right: float, flag_forward: float) -> tuple[float, float]:
     """Where a hard defender wants to be, boat frame, m."""
     target = nearest_opponent(game, boat, False)
@@ -90,7 +90,7 @@ def guard_point(game: Game, boat: int, flag_right: float, flag_forward: float) -
     return flag_right + out_m * toward_right, flag_forward + out_m * toward_forward
 
 
-@kernel
+@lean_kernel
 def nearest_opponent(game: Game, boat: int, intruders_only: bool) -> int:
     """Nearest untagged opponent (or, if none and all count, the nearest of all); -1 when there is none."""
     best, best_m = -1, math.inf

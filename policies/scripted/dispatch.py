@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
+from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
 
 from .attack import HARD_REACH_M, easy_attack, field_attack
 from .defend import hard, hard_defend, medium_defend
@@ -19,7 +19,7 @@ HARD, HARD_ATTACK = int(Behaviour.HARD), int(Behaviour.HARD_ATTACK)
 HARD_DEFEND = int(Behaviour.HARD_DEFEND)
 
 
-@kernel
+@lean_kernel
 def command_boat(
     game: Game, boat: int, behaviour: int, memory: Array, given: Array, streams: np.ndarray, slot: int
 ) -> tuple[float, float]:
@@ -47,7 +47,7 @@ def command_boat(
     return 0.0, 0.0
 
 
-@kernel
+@lean_kernel
 def command_team(
     codes: IntArray,
     boats: IntArray,
@@ -91,7 +91,7 @@ def command_team(
         out[slot, 1] = heading
 
 
-@kernel
+@lean_kernel
 def command_batch(
     codes: IntArray,
     boats: IntArray,

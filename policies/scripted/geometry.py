@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .layout import HEIGHT, WIDTH, Game
@@ -20,7 +20,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _TO_UNIT = 1.0 / 9007199254740992.0  # 2**-53
 
 
-@kernel
+@lean_kernel
 def to_boat(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
     """Point of the field in the boat's frame: (right, forward), m."""
     heading = math.radians(game.state[boat, L.HEADING])
@@ -29,13 +29,13 @@ def to_boat(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float
     return east * cosine - north * sine, east * sine + north * cosine
 
 
-@kernel
+@lean_kernel
 def boat_to_boat(game: Game, boat: int, other: int) -> tuple[float, float]:
     """Another boat in the boat's frame: (right, forward), m."""
     return to_boat(game, boat, game.state[other, L.X], game.state[other, L.Y])
 
 
-@kernel
+@lean_kernel
 def unit(right: float, forward: float) -> tuple[float, float]:
     """The vector scaled to length 1; a zero vector stays zero."""
     length = math.hypot(right, forward)
@@ -44,19 +44,19 @@ def unit(right: float, forward: float) -> tuple[float, float]:
     return right / length, forward / length
 
 
-@kernel
+@lean_kernel
 def bearing_deg(right: float, forward: float) -> float:
     """Relative bearing of a vector in the boat's frame, deg clockwise, in (-180, 180]."""
     return math.degrees(math.atan2(right, forward))
 
 
-@kernel
+@lean_kernel
 def is_turned(game: Game, team: int) -> bool:
     """Whether the team's flag is on the right, so that its own-end frame is the field turned by 180 deg."""
     return game.flag_home[team, 0] > 0.5 * game.field[WIDTH]
 
 
-@kernel
+@lean_kernel
 def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[float, float]:
     """Point given as fractions of the field in the team's own-end frame, m in the field's frame."""
     if is_turned(game, team):
@@ -64,13 +64,13 @@ def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[f
     return along * game.field[WIDTH], across * game.field[HEIGHT]
 
 
-@kernel
+@lean_kernel
 def wrap_deg(angle: float) -> float:
     """The same angle in [-180, 180)."""
     return (angle + 180.0) % 360.0 - 180.0
 
 
-@kernel
+@lean_kernel
 def mix(word: np.uint64) -> np.uint64:
     """SplitMix64's output function: every bit of the result depends on every bit of ``word``."""
     word = (word ^ (word >> np.uint64(30))) * _MIX_1
@@ -78,14 +78,14 @@ def mix(word: np.uint64) -> np.uint64:
     return word ^ (word >> np.uint64(31))
 
 
-@kernel
+@lean_kernel
 def draw(streams: np.ndarray, slot: int) -> float:
     """Next number in [0, 1) of the slot's own stream, which advances in place."""
     streams[slot] += _GAMMA
     return float(mix(streams[slot]) >> np.uint64(11)) * _TO_UNIT
 
 
-@kernel
+@lean_kernel
 def seed_streams(seeds: np.ndarray, boats: np.ndarray, chosen: np.ndarray, streams: np.ndarray) -> None:
     """Start one independent stream per boat in the chosen games, in place.
 

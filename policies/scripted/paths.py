@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .geometry import bearing_deg, draw, own_end_point, to_boat, wrap_deg
@@ -35,7 +35,7 @@ WALL_MARGIN_M = 5.0
 HOLD_MIN_S, HOLD_MAX_S = 1.0, 5.0
 
 
-@kernel
+@lean_kernel
 def follow(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
     """Full speed to a point, stop within the boat's own radius of it."""
     right, forward = to_boat(game, boat, x_m, y_m)
@@ -43,7 +43,7 @@ def follow(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]
     return speed, bearing_deg(right, forward)
 
 
-@kernel
+@lean_kernel
 def easy_defend(game: Game, boat: int, memory: Array) -> tuple[float, float]:
     """Patrol between two points in front of the own base at full speed."""
     goal = int(memory[GOAL])
@@ -57,7 +57,7 @@ def easy_defend(game: Game, boat: int, memory: Array) -> tuple[float, float]:
     return follow(game, boat, x, y)
 
 
-@kernel
+@lean_kernel
 def waypoints(
     game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int
 ) -> tuple[float, float]:
@@ -77,7 +77,7 @@ def waypoints(
     return game.field[SPEED_FRACTION] * game.limits[boat, MAX_SPEED], bearing_deg(right, forward)
 
 
-@kernel
+@lean_kernel
 def next_waypoint(game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int) -> None:
     """Put the next waypoint into the memory row."""
     if given.shape[0] > 0:
@@ -89,7 +89,7 @@ def next_waypoint(game: Game, boat: int, memory: Array, given: Array, streams: n
     memory[TIME_LEFT] = WAYPOINT_TIMEOUT_S
 
 
-@kernel
+@lean_kernel
 def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple[float, float]:
     """Uniform in the field, off the walls, and outside the own flag's keep-out, which the boat cannot enter."""
     home = game.flag_home[game.team[boat]]
@@ -103,14 +103,14 @@ def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple
     return x, y
 
 
-@kernel
+@lean_kernel
 def spread(fraction: float, length_m: float) -> float:
     """``fraction`` of the way between the two wall margins; the middle of a field too narrow for margins."""
     margin = min(WALL_MARGIN_M, 0.5 * length_m)
     return margin + fraction * (length_m - 2.0 * margin)
 
 
-@kernel
+@lean_kernel
 def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> tuple[float, float]:
     """Draw one of the 17 discrete actions, hold its absolute heading and speed for 1 to 5 s, draw again.
 
@@ -122,7 +122,7 @@ def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot:
     return memory[HELD_SPEED], wrap_deg(memory[HELD_HEADING] - game.state[boat, L.HEADING])
 
 
-@kernel
+@lean_kernel
 def draw_course(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> None:
     """Put a new held course into the memory row."""
     hold_s = HOLD_MIN_S + (HOLD_MAX_S - HOLD_MIN_S) * draw(streams, slot)

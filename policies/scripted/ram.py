@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steerclear.shield.jit import kernel
+from steerclear.shield.jit import lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .geometry import bearing_deg, to_boat
@@ -13,7 +13,7 @@ from .layout import HEIGHT, HIT_TEAM_MATES, MAX_SPEED, RADIUS, SPEED_FRACTION, W
 LEAD_LIMIT_S = 30.0
 
 
-@kernel
+@lean_kernel
 def ram(game: Game, boat: int) -> tuple[float, float]:
     """Steer for the point where the nearest boat will be met; stop when there is nobody to meet."""
     target = nearest_target(game, boat)
@@ -32,7 +32,7 @@ def ram(game: Game, boat: int) -> tuple[float, float]:
     return speed, bearing_deg(*to_boat(game, boat, x, y))
 
 
-@kernel
+@lean_kernel
 def meeting_time_s(east_m: float, north_m: float, east_mps: float, north_mps: float, speed_mps: float) -> float:
     """Earliest time at which a boat at the origin, at ``speed_mps`` on a straight course, meets a straight mover.
 
@@ -64,7 +64,7 @@ def meeting_time_s(east_m: float, north_m: float, east_mps: float, north_mps: fl
     return time if time <= LEAD_LIMIT_S else guess
 
 
-@kernel
+@lean_kernel
 def nearest_target(game: Game, boat: int) -> int:
     """Nearest boat of the other team, or of any when told to; -1 when there is none."""
     best, best_m = -1, math.inf
@@ -79,7 +79,7 @@ def nearest_target(game: Game, boat: int) -> int:
     return best
 
 
-@kernel
+@lean_kernel
 def clamp(value: float, low: float, high: float) -> float:
     """``value`` limited to [low, high]."""
     return min(max(value, low), high)
