@@ -6,10 +6,13 @@ STEERCLEAR_STUDY_MINUTES says how long the first one plays (default 10).
 import json
 import logging
 import os
+import pty
 import re
+import select
 import signal
 import subprocess
 import sys
+import termios
 import time
 
 import numpy as np
@@ -18,6 +21,7 @@ from steerclear.env.record import load
 from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.boats.demo import demo_text
 from steerclear.experiments.deploy.demo import Demo
+from steerclear.experiments.deploy.replaying import prove
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.bridge.fleet_file import load_fleet
 from test_deploy_run import free_ports
@@ -106,6 +110,43 @@ def test_boats_stop_by_themselves_when_the_runner_is_killed(fleet_file):
     logger.warning("boats below 0.1 m/s %.1f s after the kill, %.1f m run; log lost %.2f s", stopped, run, lost_s)
     assert stopped < 8.0
     assert lost_s <= 1.0
+
+
+def test_the_readmes_one_command_plays_and_shows_the_dashboard(tmp_path):
+    """`steerclear deploy --demo --policy medium` on a terminal: boats, referee, picture, all ended in order."""
+    command = [*CLI, "deploy", "--demo", "--policy", "medium", "--minutes", "0.4"]
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (45, 150))
+    with subprocess.Popen(command, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs) as runner:
+        os.close(theirs)
+        shown = read_all(ours, 600.0)
+    os.close(ours)
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.decode("utf-8", "replace"))
+    assert runner.returncode == 0, text[-2000:]
+    for word in ("SPACE or s STOP ALL", "blue_3", "red_3", "turns missed", "blue_1: in HOLD"):
+        assert word in text
+    (path,) = tmp_path.rglob("*.mcap")
+    with LogReader(path) as log:
+        ticks = list(log.ticks())
+        proof = prove(log.header, ticks)
+    assert proof.same == proof.decisions > 200
+    assert any(tick.surroundings.stops for tick in ticks if tick.surroundings is not None), "the own flag is home"
+
+
+def read_all(descriptor, seconds):
+    """Everything until the other end is closed."""
+    data, end = b"", time.monotonic() + seconds
+    while time.monotonic() < end:
+        if not select.select([descriptor], [], [], 1.0)[0]:
+            continue
+        try:
+            more = os.read(descriptor, 65536)
+        except OSError:  # a terminal nobody holds any more
+            return data
+        if not more:
+            return data
+        data += more
+    raise AssertionError(f"it did not end within {seconds:g} s")
 
 
 def wait_for(done, seconds):
