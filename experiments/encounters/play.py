@@ -98,7 +98,7 @@ class _Stage:
         self.first_goal_s = np.full(shape, np.nan)
         self.error, self.seeds = np.zeros((*shape, 2)), scenes.noise_seed.copy()
         self.current = scenes.current * conditions.current_mps
-        delayed = round(conditions.delay_s / DT_S)
+        delayed = delay_steps(conditions)
         held = scenes.state[:, :, [L.SPEED, L.HEADING]]
         self.queue = np.tile(held, (delayed, 1, 1, 1)).reshape(delayed, *shape, 2)
 
@@ -127,9 +127,6 @@ def _check(sent: Array, step: int) -> None:
         raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {sent[b, i]}")
 
 
-def water_states(film: Film, game: int) -> Array:
-    """(T+1, n, N_STATE) of a game as seen from the water: the way of the current is taken off, distances stay."""
-    states = film.state[:, game].copy()
-    drift = film.scenes.current[game] * film.conditions.current_mps
-    states[:, :, :2] -= (np.arange(len(states)) * DT_S)[:, None, None] * drift
-    return states
+def delay_steps(conditions: Conditions) -> int:
+    """Steps from a command of an own boat to its effect."""
+    return round(conditions.delay_s / DT_S)

@@ -11,7 +11,7 @@ from steerclear.env.record import find_breaches
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-from .play import Film, water_states
+from .play import Film, delay_steps
 from .scenes import DT_S
 from .tally import Columns
 
@@ -36,11 +36,16 @@ def judge_game(film: Film, game: int) -> dict[str, float]:
         counts (the first avoidable one, else the first) ``last_preventable_s``, how long before it an own boat could
         still avoid it (NaN: never), and ``responsible``, the index in `SIDES`.
     """
-    states, team = water_states(film, game), film.scenes.team
+    states, team = film.state[:, game], film.scenes.team
     found = find_breaches(states[:, :, :2], film.conditions.radius_m)
     ours = [row for row in found if team[int(row[1])] == 0 or team[int(row[2])] == 0]
     params = np.array([get_platform(name).pack() for name in film.scenes.platforms])
-    judged = _oracle().judge_breaches(states, params, ours[:MOST_JUDGED], film.conditions.radius_m, DT_S)
+    oracle = _oracle()
+    current = film.scenes.current[game] * film.conditions.current_mps
+    delays = np.where(team == 0, delay_steps(film.conditions), 0)
+    motion = oracle.Motion(tuple(current.tolist()), tuple(delays.tolist()))
+    first = ours[:MOST_JUDGED]
+    judged = oracle.judge_breaches(states, params, first, film.conditions.radius_m, DT_S, motion=motion)
     entries = [_entry(verdict, team) for verdict in judged]
     counts = NO_VERDICT | {name: float(sum(entry[0] == name for entry in entries)) for name in COUNTS}
     counts["not_judged"] = float(len(ours) - len(judged))

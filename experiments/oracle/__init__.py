@@ -17,6 +17,7 @@ How to call it (all arrays float64, numpy)::
 - ``step``: index of the first state in which the pair is within ``radius_m`` (at exactly the radius is inside), as
   the first column of ``env.record.find_breaches``.
 - ``driven`` (T, n) bool or None: whether the game, not the policy or shield, drove the boat in step k -> k+1.
+- ``motion`` (`Motion`): the current that carried all boats and the steps from each boat's command to its effect.
 - ``verdict.outcome`` (`Outcome`), ``verdict.last_preventable_s`` (s before the breach, None if never),
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
@@ -24,14 +25,17 @@ How to call it (all arrays float64, numpy)::
 from .boat import N_STATE, Boat, boats_of_rows
 from .errors import OracleError
 from .judge import judge
+from .motion import AT_ONCE, Motion
 from .settings import Settings
 from .sides import judge_breach, judge_breaches
 from .verdict import BreachVerdict, Outcome, Plan, Responsible, Verdict
 
 __all__ = [
+    "AT_ONCE",
     "N_STATE",
     "Boat",
     "BreachVerdict",
+    "Motion",
     "OracleError",
     "Outcome",
     "Plan",

@@ -8,17 +8,22 @@ was apart in the record, and kept clear of from then on.
 
 Between two steps with no entry in between, whoever can still avoid from the later one can also avoid from the earlier
 one, by following the recorded track. So the latest such step is found by growing leads and bisection.
+
+Where commands take effect late, the states that they can change begin so much later; where a current carries the
+boats, all of this happens in the frame of the water (see `motion`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .boat import Array
-from .checks import checked
+from .checks import Case, checked
+from .motion import AT_ONCE, Motion
 from .question import ROUNDING_M, Question
 from .settings import Level, Settings
 from .verdict import Outcome, Verdict
@@ -35,6 +40,7 @@ def judge(
     dt_s: float = 0.1,
     other: int | None = None,
     settings: Settings = DEFAULT,
+    motion: Motion = AT_ONCE,
 ) -> Verdict:
     """Decide whether a boat could have avoided a breach.
 
@@ -47,6 +53,7 @@ def judge(
         dt_s: length of a step.
         other: the boat it came too close to; the nearest at ``step`` when left out.
         settings: how far to look and how finely to search.
+        motion: current and delay of the record.
 
     Raises:
         OracleError: the record, boats or numbers cannot be judged, or there is no breach at ``step``.
@@ -55,19 +62,30 @@ def judge(
     gaps = np.hypot(*np.moveaxis(case.tracks - case.states[:, None, own, :2], -1, 0))
     end = _end_of(gaps[:, case.partner], case.radius_m, step, settings, dt_s)
     first = max(0, step - round(settings.look_back_s / dt_s))
+    delay = motion.delay_of(own, case.states.shape[1])
+    changed = min(step, first + delay)  # the first state that the first command looked at changes
     inside = gaps <= case.radius_m + ROUNDING_M
-    asked = Question(
-        case.states[:, own], case.numbers, case.tracks, inside, end, case.radius_m, dt_s, case.top_mps, settings
-    )
+    asked = _question(case, own, inside, end, dt_s, settings, motion)
     facts = {"own": own, "other": case.other, "step": step, "radius_m": case.radius_m, "end_step": end}
     facts["looked_back_s"] = (step - first) * dt_s
     if inside[:step, case.partner].all():
         return Verdict(**facts, outcome=Outcome.STARTED_INSIDE, **_nothing(True, 0))
-    for low, high in reversed(_runs(inside[first:step], case.partner, first)):
+    for low, high in reversed(_runs(inside[changed:step], case.partner, changed)):
         latest, exhausted = _latest(asked, low, high)
         if latest is not None:
-            return _avoidable(asked, facts, latest, exhausted)
+            return _avoidable(asked, facts, latest, delay, exhausted, motion)
     return Verdict(**facts, outcome=Outcome.UNAVOIDABLE, **_nothing(asked.exhausted, asked.searches))
+
+
+def _question(
+    case: Case, own: int, inside: NDArray[np.bool_], end: int, dt_s: float, settings: Settings, motion: Motion
+) -> Question:
+    """Ask in the frame of the water."""
+    way = motion.way_m(len(case.states), dt_s)
+    rows = case.states[:, own].copy()
+    rows[:, :2] -= way
+    tracks = case.tracks - way[:, None]
+    return Question(rows, case.numbers, tracks, inside, end, case.radius_m, dt_s, case.top_mps, settings)
 
 
 def _latest(asked: Question, low: int, high: int) -> tuple[int | None, bool]:
@@ -123,13 +141,17 @@ def _bisect(asked: Question, best: int, failed: int, level: Level) -> tuple[int,
     return best, failed
 
 
-def _avoidable(asked: Question, facts: dict[str, Any], latest: int, exhausted: bool) -> Verdict:
+def _avoidable(
+    asked: Question, facts: dict[str, Any], latest: int, delay: int, exhausted: bool, motion: Motion
+) -> Verdict:
+    plan, last = asked.plans[latest], latest - delay
+    way = motion.way_m(latest + len(plan.path_m), asked.dt_s)[latest:]
     return Verdict(
         **facts,
         outcome=Outcome.AVOIDABLE,
-        last_step=latest,
-        last_preventable_s=(facts["step"] - latest) * asked.dt_s,
-        plan=asked.plans[latest],
+        last_step=last,
+        last_preventable_s=(facts["step"] - last) * asked.dt_s,
+        plan=replace(plan, path_m=plan.path_m + way),
         exhausted=exhausted,
         searches=asked.searches,
     )

@@ -2,7 +2,8 @@
 
 Responsible is who had the last clear chance: each boat is judged with the other's actual track held fixed, and the boat
 whose last preventable step is the later one let the last chance pass, by the command of that step. When both had their
-last chance within one step of each other, both are responsible. When the game itself drove that boat in that step (a
+last chance within one step of each other, both are responsible. Where commands take effect late, it is the moments at
+which they had to be given that are compared. When the game itself drove that boat in that step (a
 tagged boat on its way home), the game is. When neither could have avoided it, neither is; a pair that was inside when
 the record began is a matter of the start.
 """
@@ -18,6 +19,7 @@ from .boat import as_boats
 from .checks import check_states
 from .errors import OracleError
 from .judge import DEFAULT, judge
+from .motion import AT_ONCE, Motion
 from .settings import Settings
 from .verdict import BreachVerdict, Outcome, Responsible, Verdict
 
@@ -34,6 +36,7 @@ def judge_breach(
     dt_s: float = 0.1,
     driven: Any = None,
     settings: Settings = DEFAULT,
+    motion: Motion = AT_ONCE,
 ) -> BreachVerdict:
     """Judge a breach from both sides.
 
@@ -46,6 +49,7 @@ def judge_breach(
         dt_s: length of a step, s.
         driven: (T, n) bool, whether the game drove the boat in step k -> k+1; None when it never did.
         settings: see `judge`.
+        motion: see `judge`.
 
     Raises:
         OracleError: see `judge`, or ``driven`` has another shape.
@@ -55,7 +59,7 @@ def judge_breach(
     game = _driven(driven, table.shape)
     first, second = pair
     verdicts = [
-        judge(table, chosen, own, step, radius_m, dt_s, other, settings)
+        judge(table, chosen, own, step, radius_m, dt_s, other, settings, motion)
         for own, other in ((first, second), (second, first))
     ]
     return BreachVerdict(step, verdicts[0], verdicts[1], _responsible(verdicts[0], verdicts[1], game))
@@ -70,6 +74,7 @@ def judge_breaches(
     driven: Any = None,
     settings: Settings = DEFAULT,
     progress: Progress = lambda done, total: None,
+    motion: Motion = AT_ONCE,
 ) -> list[BreachVerdict]:
     """Judge many breaches of one record.
 
@@ -82,11 +87,12 @@ def judge_breaches(
         driven: see `judge_breach`.
         settings: see `judge`.
         progress: called after each breach with the number judged and the number of all.
+        motion: see `judge`.
     """
     rows = [tuple(int(value) for value in row[:3]) for row in breaches]
     verdicts = []
     for done, (step, a, b) in enumerate(rows, start=1):
-        verdicts.append(judge_breach(states, boats, (a, b), step, radius_m, dt_s, driven, settings))
+        verdicts.append(judge_breach(states, boats, (a, b), step, radius_m, dt_s, driven, settings, motion))
         progress(done, len(rows))
     return verdicts
 

@@ -40,7 +40,7 @@ class Plan:
     """Own commands that keep the radius, proved by replaying them with the full boat model.
 
     Attributes:
-        begin_step: index of the state the commands start from.
+        begin_step: index of the state from which the commands act.
         speed_mps: (S,) commanded speed of each step.
         heading_error_deg: (S,) commanded heading relative to the boat's at that step, in [-180, 180].
         heading_deg: (S,) the same command as an absolute heading, clockwise from north, in [-180, 180].
@@ -66,11 +66,12 @@ class Verdict:
         step: index of the first state inside the radius.
         radius_m: separation radius, m.
         outcome: see `Outcome`.
-        last_step: the latest state from which the breach could still be prevented; None where there is none.
+        last_step: the latest state at which a command could still prevent the breach; None where there is none.
         last_preventable_s: how long before the breach that was, s; None where there is none.
-        looked_back_s: how far back the search could begin, s: T, or less where the record is shorter.
+        looked_back_s: how far back commands could begin to differ, s: T, or less where the record is shorter.
         end_step: index of the last state up to which the radius had to be kept.
-        plan: commands from ``last_step`` on; None unless avoidable.
+        plan: commands given from ``last_step`` on, which act from there on or so much later as the boat's commands
+            come late; None unless avoidable.
         exhausted: whether the search that found nothing (one step after ``last_step``, or at all) kept every state it
             reached at its resolution; False when it had to drop some for lack of width.
         searches: how many searches this took.

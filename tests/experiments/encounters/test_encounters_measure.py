@@ -111,6 +111,18 @@ def test_a_current_does_not_change_the_verdict():
     assert SIDES[int(found["responsible"])] in ("own", "both", "opponent")
 
 
+def test_a_late_command_has_to_be_given_so_much_earlier():
+    scenes = draw("head_on", "heron", "heron", USUAL, 0, 0, 4)
+    found = {}
+    for delay_s in (0.0, 1.0):
+        film = dataclasses.replace(play(scenes, "none", USUAL), conditions=Conditions(delay_s=delay_s))
+        found[delay_s] = judge_game(film, int(tally(film)["closest_m"].argmin()))
+    assert found[0.0]["avoidable"] == found[1.0]["avoidable"] == 1.0
+    lead_s = found[1.0]["last_preventable_s"] - found[0.0]["last_preventable_s"]
+    assert lead_s == pytest.approx(1.0)
+    assert SIDES[int(found[1.0]["responsible"])] == "opponent"  # whose commands act at once
+
+
 def verdict(**counts):
     return verdicts.NO_VERDICT | counts
 

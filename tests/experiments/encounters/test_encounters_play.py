@@ -7,7 +7,6 @@ from steerclear.experiments.encounters import DT_S, Conditions, draw, play
 from steerclear.experiments.encounters import script as S
 from steerclear.experiments.encounters.guards import NoGuard, build_guard, check_guard, parse_guards, split_name
 from steerclear.experiments.encounters.motion import observe
-from steerclear.experiments.encounters.play import water_states
 from steerclear.experiments.encounters.steering import meeting_s, next_phase
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError, FleetError
@@ -96,7 +95,6 @@ def test_the_current_carries_every_boat_alike():
     bare = play(still, lambda *made: Recording(2, 6, 0.0, 0.0), USUAL)
     drift = film.state[-1, :, :, :2] - bare.state[-1, :, :, :2]
     np.testing.assert_allclose(drift, np.broadcast_to(0.4 * 6.0 * still.current[:, None], drift.shape), atol=1e-9)
-    np.testing.assert_allclose(water_states(film, 1), bare.state[:, 1], atol=1e-9)
 
 
 def test_position_errors_stay_within_the_bound_and_truth_is_untouched():
