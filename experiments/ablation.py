@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .conditions import CALM, Conditions
 from .score import DEFAULT_PENALTY
 from .spec import SIDES, MatchSpec
 from .statistics import count_interval, paired_ratio
@@ -44,6 +45,7 @@ class AblationSettings:
     fixed_start: bool = False
     penalty: float = DEFAULT_PENALTY
     judge: str = "shielded"
+    conditions: Conditions = CALM
 
     @property
     def separation_m(self) -> float:
@@ -79,6 +81,7 @@ class AblationSettings:
             penalty=self.penalty,
             radii_m=self.radii_m,
             judge=self.judge,
+            conditions=self.conditions,
         )
 
 

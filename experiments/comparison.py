@@ -9,6 +9,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
+from .conditions import words_of
 from .encounters.summary import upper_bound
 
 CONDITIONS = ("radius_m", "delay_s", "noise_m", "current_mps")
@@ -47,9 +48,8 @@ class Contest:
     def title(self) -> str:
         """Who meets whom, and how."""
         radius, delay, noise, current = self.conditions
-        named = ((delay, "s delay"), (noise, "m position noise"), (current, "m/s current"))
-        extras = [f"{value:g} {unit}" for value, unit in named if value > 0.0]
-        return ", ".join([f"{self.own} meets {self.other}, {radius:g} m", *extras])
+        extras = words_of({"delay_s": delay, "noise_m": noise, "current_mps": current})
+        return ", ".join(filter(None, [f"{self.own} meets {self.other}, {radius:g} m", extras]))
 
     @property
     def totals(self) -> dict[str, dict[str, Any]]:

@@ -10,6 +10,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from .bench.report import bench_tables
 from .comparison_page import STEM, write_comparison
+from .conditions import words_of
 from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, bars_table, table
@@ -90,8 +91,14 @@ def _page_of(content: Mapping[str, Any], folder: Path) -> Page:
     if command not in ("ablate", "evaluate"):
         raise ConfigError(f"no page can be made of results of {command!r}; give results of {SOURCES}")
     stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
+    stem += _apart(content["settings"].get("conditions") or {})
     plots = _plots(content, folder, stem) if command == "ablate" and content["pairings"] else []
     return f"{stem}.md", runs_page(content, plots), plots
+
+
+def _apart(conditions: Mapping[str, float]) -> str:
+    """What keeps the page of games under conditions apart from that of the others: ``_delay0.3_current0.5``."""
+    return "".join(f"_{name.split('_')[0]}{value:g}" for name, value in conditions.items() if value)
 
 
 def _plots(content: Mapping[str, Any], folder: Path, stem: str) -> list[Path]:
@@ -140,10 +147,12 @@ def keys_page() -> str:
 def _what_was_played(content: Mapping[str, Any]) -> str:
     settings = content["settings"]
     length = settings["rules"].get("max_time_s")
+    conditions = words_of(settings.get("conditions") or {})
     size = "the small version, " if content["quick"] else ""
     return (
         f"{size}{settings['games']} games per pairing and shield state"
         + (f" of {length:g} s" if length else "")
+        + (f" under {conditions}" if conditions else "")
         + f", seeds {content['seeds'][0]} to {content['seeds'][-1]}, steerclear {content['versions']['steerclear']}. "
         "Means per game with 95 % intervals (Poisson for counts, Wilson for shares, bootstrap for means)."
     )

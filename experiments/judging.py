@@ -13,7 +13,7 @@ import numpy as np
 from steerclear.env.core import BatchedMctf
 from steerclear.env.record import Record, read_meta
 from steerclear.experiments import oracle
-from steerclear.experiments.oracle import BreachVerdict, Outcome, Responsible, Verdict
+from steerclear.experiments.oracle import AT_ONCE, BreachVerdict, Motion, Outcome, Responsible, Verdict
 from steerclear.shield.exceptions import ConfigError
 
 JUDGE = ("all", "shielded", "none")
@@ -61,7 +61,9 @@ class StateLog:
         return np.array(self._driven, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
 
 
-def judge_game(log: StateLog, params: np.ndarray, record: Record, side: int) -> list[dict[str, Any]]:
+def judge_game(
+    log: StateLog, params: np.ndarray, record: Record, side: int, motion: Motion = AT_ONCE
+) -> list[dict[str, Any]]:
     """Judge the breaches of a game that a team's boats were in, at the record's separation radius.
 
     Args:
@@ -69,6 +71,7 @@ def judge_game(log: StateLog, params: np.ndarray, record: Record, side: int) -> 
         params: (n, N_PARAM) parameter rows of its boats.
         record: the game, with its ``breaches``.
         side: the team in question.
+        motion: the current that carried the boats, and how late their commands came.
 
     Returns:
         Per breach, in order of time, the entries that `keys.BREACH` describes.
@@ -78,9 +81,8 @@ def judge_game(log: StateLog, params: np.ndarray, record: Record, side: int) -> 
     found = [row for row in record["breaches"] if side in (team[int(row[1])], team[int(row[2])])]
     if not found:
         return []
-    verdicts = oracle.judge_breaches(
-        log.states, params, found[:MOST_JUDGED], float(meta["separation_m"]), float(meta["dt_s"]), log.driven
-    )
+    radius_m, dt_s = float(meta["separation_m"]), float(meta["dt_s"])
+    verdicts = oracle.judge_breaches(log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion)
     padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
     return [_entry(row, verdict, meta, team, side) for row, verdict in zip(found, padded, strict=True)]
 

@@ -127,7 +127,13 @@ class Match:
             shielded=self.shielding.agent_ids,
             seed=self.spec.seed,
             reason_names=self.shielding.reason_names,
+            title=self._title(),
         )
+
+    def _title(self) -> str:
+        """Who plays, under which conditions; the usual title where there are none."""
+        conditions = self.spec.conditions.words
+        return f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else ""
 
     def _note_commands(self, wanted: Array, sent: Array) -> None:
         heading_deg = self.env.core.state[0, :, L.HEADING]
@@ -191,7 +197,7 @@ class Match:
     def _verdict_columns(self, record: Record) -> dict[str, Any]:
         breaches = None
         if self._log is not None:
-            breaches = judge_game(self._log, self.env.core.params, record, self.spec.own_team)
+            breaches = judge_game(self._log, self.env.core.params, record, self.spec.own_team, self.shielding.motion)
         return {**verdict_columns(breaches, self.shielding.separation_m), "breaches": breaches}
 
     def _decision_columns(self) -> dict[str, float | None]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
+from .conditions import words_of
 from .page import as_text, report_page, template, write_page
 from .report_parts import bars_table, games_table, headlines, legend, pairing_tables, replay_links, values_table
 from .report_plots import closest_plot, figure_plot, reason_plot
@@ -105,7 +106,8 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
         )
     parts.append(f"{len(results['games'])} games, each start played without and with the shield")
     parts.append(f"separation {separation_m:g} m")
-    return " · ".join(parts)
+    parts.append(words_of(settings.get("conditions") or {}))
+    return " · ".join(filter(None, parts))
 
 
 def _plots(results: Mapping[str, Any], separation_m: float) -> str:

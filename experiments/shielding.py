@@ -15,6 +15,9 @@ from steerclear.shield import Reason, Shield, ShieldConfig
 from steerclear.shield.jit import Array
 from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 
+from .conditions import CALM, Conditions
+from .oracle import AT_ONCE, Motion
+from .sea import Sea
 from .spec import SIDES, MatchSpec
 from .tally import RADII_M
 
@@ -45,6 +48,8 @@ class Shielding:
         agent_ids: boats that a shield decides for.
         separation_m: radius the own shield keeps (the default's without one), m.
         reason_names: names of the reason codes, by code.
+        conditions: that the shields are told of.
+        sea: the conditions at work; None where there are none.
     """
 
     inner: MctfEnv
@@ -53,9 +58,19 @@ class Shielding:
     agent_ids: list[str] = field(default_factory=list)
     separation_m: float = RADII_M[0]
     reason_names: list[str] = field(default_factory=list)
+    conditions: Conditions = CALM
+    sea: Sea | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """What the oracle has to know of the conditions."""
+        return AT_ONCE if self.sea is None else self.sea.motion
 
     def listen(self, listener: Listener) -> None:
-        """Hear of every step's commands, before and after the shields; call once per game, after reset."""
+        """Hear of every step's commands, before and after the shields; call once per game, after reset.
+
+        The conditions come after that: commands are heard when they are given, however late they take effect.
+        """
         shields = self.inner.command_filter
 
         def through(core: BatchedMctf, commands: Array) -> Array:
@@ -65,6 +80,8 @@ class Shielding:
             return sent
 
         self.inner.command_filter = through
+        if self.sea is not None:
+            self.sea.surround()
 
     def read(self) -> Seen:
         """Collect what the shields decided last."""
@@ -85,12 +102,14 @@ class Shielding:
 
 
 def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
-    """Put the shields of a spec on a game.
+    """Put the shields of a spec on a game, told of its conditions where their settings do not say otherwise.
 
     Raises:
-        ConfigError: a setting of a shield is unknown or out of range.
+        ConfigError: a setting of a shield is unknown or out of range, or conditions that the game cannot have.
     """
-    shielding = Shielding(env, env)
+    shielding = Shielding(env, env, conditions=spec.conditions)
+    if not spec.conditions.calm:
+        shielding.sea = Sea(env, spec.conditions, spec.seed, spec.own_team)
     for side, settings in _settings_by_side(spec).items():
         if settings is not None:
             _add(shielding, side, settings, spec.shield_autopilot)
@@ -114,8 +133,10 @@ def check_shield(settings: Mapping[str, Any]) -> None:
 
 
 def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
-    config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, **settings})
-    wrapped = ShieldedParallelEnv(shielding.env, Shield(config), team=side, shield_autopilot=shield_autopilot)
+    dt_s = shielding.inner.config.dt_s
+    config = ShieldConfig.of(**{"dt_s": dt_s, **shielding.conditions.shield_settings(dt_s), **settings})
+    reader = None if shielding.sea is None else shielding.sea.reader()
+    wrapped = ShieldedParallelEnv(shielding.env, Shield(config), side, shield_autopilot, reader=reader)
     shielding.env = wrapped
     shielding.wrappers.append(wrapped)
     shielding.reason_names = [reason.name for reason in Reason]

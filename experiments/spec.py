@@ -10,6 +10,7 @@ from typing import Any
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
+from .conditions import CALM, Conditions
 from .judging import check_judge
 from .score import DEFAULT_PENALTY
 from .store import key_of
@@ -37,6 +38,7 @@ class MatchSpec:
         penalty: weight of a collision in the primary score.
         radii_m: radii at which breaches are counted.
         judge: whose breaches the oracle judges, see `judging.JUDGE`.
+        conditions: delay, position noise and current, the same with a shield and without.
     """
 
     preset: str
@@ -53,6 +55,7 @@ class MatchSpec:
     penalty: float = DEFAULT_PENALTY
     radii_m: tuple[float, ...] = RADII_M
     judge: str = "shielded"
+    conditions: Conditions = CALM
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -72,7 +75,8 @@ class MatchSpec:
     @property
     def key(self) -> str:
         """Short name that two specs share exactly when they describe the same game, however its breaches are judged."""
-        return key_of({name: value for name, value in asdict(self).items() if name != "judge"})
+        beside = {"judge", "conditions"} if self.conditions.calm else {"judge"}
+        return key_of({name: value for name, value in asdict(self).items() if name not in beside})
 
     @property
     def judged(self) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..ablation import AblationSettings
 from ..ablation import quick as small_version
+from ..conditions import Conditions
 from ..score import DEFAULT_PENALTY
 from ..store import write_json
 from . import options as o
@@ -38,6 +39,9 @@ def ablate(
     platform: o.Platform = None,
     rules: o.RuleSet = None,
     fixed_start: o.FixedStart = False,
+    delay: o.Delay = 0.0,
+    noise: o.Noise = 0.0,
+    current: o.Current = 0.0,
     judge: o.Judge = "shielded",
     check: o.Check = False,
     json_file: o.JsonFile = None,
@@ -57,6 +61,7 @@ def ablate(
         fixed_start=fixed_start,
         penalty=penalty,
         judge=judge,
+        conditions=Conditions(delay, noise, current),
     )
     if quick:
         settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)

@@ -9,6 +9,7 @@ import typer
 
 from ..ablation import AblationSettings
 from ..ablation import quick as small_version
+from ..conditions import Conditions
 from ..score import DEFAULT_PENALTY
 from . import options as o
 from .ablate import QUICK_GAMES, QUICK_TIME_S, end_run
@@ -41,6 +42,9 @@ def evaluate(
     platform: o.Platform = None,
     rules: o.RuleSet = None,
     fixed_start: o.FixedStart = False,
+    delay: o.Delay = 0.0,
+    noise: o.Noise = 0.0,
+    current: o.Current = 0.0,
     judge: o.Judge = "shielded",
     json_file: o.JsonFile = None,
 ) -> None:
@@ -60,6 +64,7 @@ def evaluate(
         fixed_start=fixed_start,
         penalty=penalty,
         judge=judge,
+        conditions=Conditions(delay, noise, current),
     )
     if quick:
         settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)

@@ -17,6 +17,7 @@ from ..judging import check_judge
 from ..pool import check_jobs
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
+from ..sea import check_current
 from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table, verdict_table
@@ -37,7 +38,7 @@ def check_settings(settings: AblationSettings) -> None:
     check_penalty(settings.penalty)
     check_judge(settings.judge)
     check_shield(settings.shield)
-    settings.specs()[0].config()
+    check_current(settings.conditions, settings.specs()[0].config())
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")

@@ -36,6 +36,21 @@ Judge = Annotated[
         metavar="WHO", help="Whose breaches the oracle judges: all, shielded (games with the shield) or none."
     ),
 ]
+Delay = Annotated[
+    float,
+    typer.Option(metavar="S", help="From an own boat's command to its effect, s; the shield's delay_s follows it."),
+]
+Noise = Annotated[
+    float,
+    typer.Option(
+        metavar="M",
+        help="Bound on the error of positions the shield sees, m; its position_error_m follows it. Policies see true.",
+    ),
+]
+Current = Annotated[
+    float,
+    typer.Option(metavar="M/S", help="Speed of a current on all boats; the shield is not told of it."),
+]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]

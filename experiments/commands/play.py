@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,9 +14,11 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield.exceptions import ConfigError
 
+from ..conditions import Conditions
 from ..match import MatchResult, Watcher, play_match
 from ..provenance import machine, versions
 from ..score import DEFAULT_PENALTY, check_penalty
+from ..sea import check_current
 from ..shielding import check_shield
 from ..spec import MatchSpec
 from ..store import write_json
@@ -62,6 +65,9 @@ def play(
     platform: o.Platform = None,
     rules: o.RuleSet = None,
     fixed_start: o.FixedStart = False,
+    delay: o.Delay = 0.0,
+    noise: o.Noise = 0.0,
+    current: o.Current = 0.0,
     json_file: o.JsonFile = None,
 ) -> None:
     """Play one game and show what happened.
@@ -79,6 +85,7 @@ def play(
         rules=o.game_settings(max_time, platform, rules),
         fixed_start=fixed_start,
         penalty=check_penalty(penalty),
+        conditions=Conditions(delay, noise, current),
     )
     if not 0.0 < speed < math.inf:
         raise ConfigError(f"--speed must be a number above 0; got {speed:g}")
@@ -96,6 +103,7 @@ def play(
 
 def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> MatchResult:
     check_endings(save)
+    check_current(spec.conditions, spec.config())
     if spec.shield is not None:
         check_shield(spec.shield)
     for name in (spec.own, spec.opponent):
@@ -125,10 +133,9 @@ def _reporter(notice: Any) -> Watcher:
 
 
 def _content(result: MatchResult, files: Sequence[Path], wall_s: float) -> dict[str, Any]:
-    settings = {name: getattr(result.spec, name) for name in result.spec.__dataclass_fields__}
     return {
         "command": "play",
-        "settings": settings,
+        "settings": asdict(result.spec),
         "versions": versions(),
         "machine": machine(),
         "wall_s": wall_s,

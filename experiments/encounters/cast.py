@@ -13,6 +13,7 @@ from steerclear.shield.platforms import fresh_state, get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracks import thrust_at
 
+from ..conditions import draw
 from . import script as S
 from .scenes import Conditions
 
@@ -50,9 +51,7 @@ class Cast:
 
     def settle(self) -> None:
         """Draw what is not a boat: the current's direction and the seed of the position errors."""
-        angle = self.uniform(-math.pi, math.pi)
-        self.current = math.cos(angle), math.sin(angle)
-        self.noise_seed = int(self.rng.integers(2**63))
+        self.current, self.noise_seed = draw(self.rng)
 
     def clear(self) -> None:
         """Take all boats out again."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, IntArray
 
+from ..conditions import MOST as MOST_CONDITIONS
+from ..conditions import check_values
+
 DT_S = 0.1
 RADIUS_M = 2.5
-MOST = {"radius_m": 20.0, "delay_s": 2.0, "noise_m": 5.0, "current_mps": 2.0}
+MOST = {"radius_m": 20.0, **MOST_CONDITIONS}
 
 
 @dataclass(frozen=True)
@@ -35,10 +38,7 @@ class Conditions:
     current_mps: float = 0.0
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value, most = getattr(self, entry.name), MOST[entry.name]
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
-                raise ConfigError(f"{entry.name} is {value!r}; give a number from 0 to {most:g}")
+        check_values(self.as_dict(), MOST)
         if not self.radius_m > 0.0:
             raise ConfigError(f"radius_m is {self.radius_m}; give a radius above 0")
 

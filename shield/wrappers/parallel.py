@@ -29,6 +29,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         team: "blue" or "red".
         shield_autopilot: also decide for boats the game drives (our env only).
         keep_out: keep clear of the own flag's circle while the flag is home.
+        reader: what reads the game, such as sensors that err; None: the env's own state, exact.
 
     Raises:
         ConfigError: the env cannot be read, or the team is unknown.
@@ -41,6 +42,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         team: str | int = "blue",
         shield_autopilot: bool = True,
         keep_out: bool = True,
+        reader: GameReader | None = None,
     ) -> None:
         super().__init__(env)
         self.shield = shield
@@ -48,7 +50,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self.shield_autopilot = shield_autopilot
         self.keep_out = keep_out
         self.decisions: Decisions | None = None
-        self._reader: GameReader = reader_of(env)
+        self._reader: GameReader = reader_of(env) if reader is None else reader
         if self._reader.filters_inside:
             base = env.unwrapped
             base.command_filter = self._after(base.command_filter)
