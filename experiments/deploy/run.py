@@ -7,7 +7,6 @@ import contextlib
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.intent import IntentPublisher
 from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
@@ -94,7 +93,6 @@ def _run(
             ears=station.ears,
             contacts=() if station.feed is None else (station.feed,),
             game=station.feed,
-            intents=station.feed,
             grounds=grounds_of(fleet),
             sinks=tuple(sinks),
         )
@@ -107,11 +105,7 @@ def _run(
 
 
 def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:
-    found: list[TickSink] = []
-    if fleet.feed is not None and fleet.feed.publish:
-        sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish)
-        found.append(PositionPublisher(sender, fleet.frame, fleet.shield_config.position_error_m))
-    mates = () if orders.boat is None else fleet.mates_listeners(orders.boat)
-    if mates:
-        found.append(IntentPublisher(FeedSender(f"intents_{orders.boat}", mates), fleet.frame))
-    return found
+    if fleet.feed is None or not fleet.feed.publish:
+        return []
+    sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish)
+    return [PositionPublisher(sender, fleet.frame, fleet.shield_config.position_error_m)]

@@ -1,4 +1,4 @@
-"""`FeedReceiver` hears positions, courses and the state of the game over UDP; `FeedSender` sends them.
+"""`FeedReceiver` hears positions and the state of the game over UDP; `FeedSender` sends them.
 
 What is in a packet: `feed_packets`; which packets count: `feed_order`.
 """
@@ -19,15 +19,13 @@ from ..exceptions import FeedError
 from .clock import Clock
 from .contact import Contact
 from .feed_order import Budget, Order
-from .feed_packets import MAX_BYTES, BoatStatus, Course, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
+from .feed_packets import MAX_BYTES, BoatStatus, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
 from .feed_sender import FeedSender
 from .feed_sockets import hearing_socket, is_among, network_of, socket_address
 from .frame import FieldFrame
-from .intent import Intent
 
 __all__ = [
     "BoatStatus",
-    "Course",
     "FeedReceiver",
     "FeedSender",
     "Fix",
@@ -82,7 +80,6 @@ class FeedReceiver:
         self._allowed = tuple(network_of(host) for host in allow)
         self._lock = threading.Lock()
         self._contacts: dict[str, Contact] = {}
-        self._intents: dict[str, Intent] = {}
         self._game: GameState | None = None
         self._game_s = -math.inf
         self._faults: Counter[str] = Counter()
@@ -101,11 +98,6 @@ class FeedReceiver:
         """The latest contact of each boat ever heard of."""
         with self._lock:
             return tuple(self._contacts.values())
-
-    def intents(self) -> dict[str, Intent]:
-        """What each boat was last said to have been told to do, by name."""
-        with self._lock:
-            return dict(self._intents)
 
     def game(self) -> GameState | None:
         """The latest state of the game; None: none yet."""
@@ -148,8 +140,6 @@ class FeedReceiver:
             self._take_game(packet.game, packet.sender, now_s)
         for fix in packet.fixes:
             self._take_fix(fix, packet.sender, now_s)
-        for course in packet.courses:
-            self._take_course(course, packet.sender, now_s)
 
     def close(self) -> None:
         """Give the socket back; may be called again."""
@@ -208,7 +198,9 @@ class FeedReceiver:
             self._game, self._game_s = game, now_s
 
     def _take_fix(self, fix: Fix, sender: str, now_s: float) -> None:
-        if not self._is_known(fix.boat, self._contacts, sender):
+        known_names = self._boats if self._boats is not None or len(self._contacts) < MAX_CONTACTS else self._contacts
+        if known_names is not None and fix.boat not in known_names:
+            self._refuse("unknown boat", f"{sender}: boat {fix.boat} is not of this fleet")
             return
         x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
         if not math.hypot(x_m, y_m) <= FAR_M:
@@ -228,24 +220,6 @@ class FeedReceiver:
             if known is not None and known.source != sender and known.fixed_s > contact.fixed_s:
                 return  # of two senders the fresher one counts
             self._contacts[fix.boat] = contact
-
-    def _take_course(self, course: Course, sender: str, now_s: float) -> None:
-        if not self._is_known(course.boat, self._intents, sender):
-            return
-        heading = self._frame.heading_to_field_rad(math.radians(course.heading_deg))
-        intent = Intent(course.boat, heading, course.speed_mps, now_s - course.age_s, sender)
-        with self._lock:
-            known = self._intents.get(course.boat)
-            if known is None or known.told_s <= intent.told_s:
-                self._intents[course.boat] = intent
-
-    def _is_known(self, boat: str, taken: Collection[str], sender: str) -> bool:
-        """Whether something said of a boat is kept: it is of the fleet, or there is room for strangers."""
-        names = self._boats if self._boats is not None or len(taken) < MAX_CONTACTS else taken
-        if names is None or boat in names:
-            return True
-        self._refuse("unknown boat", f"{sender}: boat {boat} is not of this fleet")
-        return False
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:
         with self._lock:

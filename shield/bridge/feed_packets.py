@@ -1,24 +1,21 @@
 """Packets of the position and game feed: one JSON object per UDP datagram, what is in them, and every check on it.
 
-A packet of kind "positions" says where boats are (`Fix`), one of kind "courses" what team-mates were told to do
-(`Course`), one of kind "game" how the game stands (`GameState`).
+A packet of kind "positions" says where boats are (`Fix`), one of kind "game" how the game stands (`GameState`).
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, NoReturn
 
 from ..exceptions import FeedError
-from .feed_values import count_of, mapping_of, name_of, number_of, pair_of, refuse_constant, short, truth_of
-
-_Entry = TypeVar("_Entry", "Fix", "Course")
 
 MAX_BYTES = 32768
 """Largest datagram taken."""
 MAX_BOATS = 64
+MAX_NAME = 64
 MAX_SPEED_MPS = 50.0
 MAX_AGE_S = 3600.0
 MAX_ERROR_M = 1000.0
@@ -45,23 +42,6 @@ class Fix:
     speed_mps: float
     age_s: float
     error_m: float
-
-
-@dataclass(frozen=True)
-class Course:
-    """What a boat was told to do, by the process that commands it: its command after the shield.
-
-    Attributes:
-        boat: its name.
-        heading_deg: true course, deg clockwise from north.
-        speed_mps: m/s.
-        age_s: how long ago, when it was sent, s.
-    """
-
-    boat: str
-    heading_deg: float
-    speed_mps: float
-    age_s: float
 
 
 @dataclass(frozen=True)
@@ -130,16 +110,14 @@ class Packet:
         run: number the sender drew when it started; 0 when it gives none.
         seq: counts the sender's packets.
         fixes: positions of a packet of kind "positions".
-        courses: of a packet of kind "courses".
         game: of a packet of kind "game".
-        refused: why single fixes or courses of the packet were left out, a line each.
+        refused: why single fixes of the packet were left out, a line each.
     """
 
     sender: str
     run: int
     seq: int
     fixes: tuple[Fix, ...] = ()
-    courses: tuple[Course, ...] = ()
     game: GameState | None = None
     refused: tuple[str, ...] = ()
 
@@ -152,8 +130,6 @@ class Packet:
         head = {"steerclear": 1, "sender": self.sender, "run": self.run, "seq": self.seq}
         if self.game is not None:
             body: dict[str, Any] = {"kind": "game", **self.game.as_dict()}
-        elif self.courses:
-            body = {"kind": "courses", "courses": [dict(vars(course)) for course in self.courses]}
         else:
             body = {"kind": "positions", "contacts": [dict(vars(fix)) for fix in self.fixes]}
         try:
@@ -166,7 +142,7 @@ class Packet:
 
 
 def parse_packet(data: bytes) -> Packet:
-    """The packet in a datagram. A fix or course that cannot be used is left out and named; any other fault refuses all.
+    """The packet in a datagram. A fix that cannot be used is left out and named; anything else wrong refuses it all.
 
     Raises:
         FeedError: it is too long, no JSON, of another version or kind, or a value is missing, not finite or absurd.
@@ -174,22 +150,19 @@ def parse_packet(data: bytes) -> Packet:
     if len(data) > MAX_BYTES:
         raise FeedError(f"packet of {len(data)} bytes; {MAX_BYTES} at most")
     try:
-        content = json.loads(data, parse_constant=refuse_constant)
+        content = json.loads(data, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise FeedError(f"packet is not JSON ({short(error)})") from None
+        raise FeedError(f"packet is not JSON ({_short(error)})") from None
     if not isinstance(content, dict) or content.get("steerclear") != 1 or isinstance(content["steerclear"], bool):
         raise FeedError('packet is not of this feed; begin it with {"steerclear": 1, ...')
-    sender, kind = name_of(content, "sender"), content.get("kind")
-    run, seq = count_of(content, "run", 0), count_of(content, "seq")
+    sender, kind = _name(content, "sender"), content.get("kind")
+    run, seq = _count(content, "run", 0), _count(content, "seq")
     if kind == "positions":
-        fixes, refused = _entries(content, "contacts", _fix)
+        fixes, refused = _fixes(content)
         return Packet(sender, run, seq, fixes=fixes, refused=refused)
-    if kind == "courses":
-        courses, refused = _entries(content, "courses", _course)
-        return Packet(sender, run, seq, courses=courses, refused=refused)
     if kind == "game":
         return Packet(sender, run, seq, game=game_state(content))
-    raise FeedError(f"packet of kind {short(kind)}; kinds are positions, courses and game")
+    raise FeedError(f"packet of kind {_short(kind)}; kinds are positions and game")
 
 
 def game_state(content: Mapping[str, Any]) -> GameState:
@@ -200,83 +173,119 @@ def game_state(content: Mapping[str, Any]) -> GameState:
     """
     boats = content.get("boats")
     if not isinstance(boats, Mapping) or len(boats) > MAX_BOATS:
-        raise FeedError(f"boats is {short(boats)}; give a dict by name, {MAX_BOATS} boats at most")
+        raise FeedError(f"boats is {_short(boats)}; give a dict by name, {MAX_BOATS} boats at most")
     flags = content.get("flags")
     if not isinstance(flags, (list, tuple)) or len(flags) != 2:
-        raise FeedError(f"flags is {short(flags)}; give blue's and red's")
+        raise FeedError(f"flags is {_short(flags)}; give blue's and red's")
     note = content.get("note", "")
     if not isinstance(note, str):
-        raise FeedError(f"note is {short(note)}; give a text")
+        raise FeedError(f"note is {_short(note)}; give a text")
     return GameState(
-        time_s=number_of(content, "time_s", 0.0, LARGEST),
-        boats={name_of({"boat": name}, "boat"): _boat_status(entry) for name, entry in boats.items()},
+        time_s=_number(content, "time_s", 0.0, LARGEST),
+        boats={_name({"boat": name}, "boat"): _boat_status(entry) for name, entry in boats.items()},
         flags=(_flag_status(flags[0]), _flag_status(flags[1])),
-        captures=pair_of(content, "captures"),
-        grabs=pair_of(content, "grabs"),
-        tags=pair_of(content, "tags"),
-        over=truth_of(content, "over"),
+        captures=_pair(content, "captures"),
+        grabs=_pair(content, "grabs"),
+        tags=_pair(content, "tags"),
+        over=_truth(content, "over"),
         note=note[:200],
     )
 
 
 def _boat_status(entry: Any) -> BoatStatus:
-    fields = mapping_of(entry, "a boat")
-    truths = {key: truth_of(fields, key) for key in ("tagged", "has_flag", "oob", "on_side", "driven")}
-    return BoatStatus(cooldown_s=number_of(fields, "cooldown_s", 0.0, LARGEST), **truths)
+    fields = _mapping(entry, "a boat")
+    truths = {key: _truth(fields, key) for key in ("tagged", "has_flag", "oob", "on_side", "driven")}
+    return BoatStatus(cooldown_s=_number(fields, "cooldown_s", 0.0, LARGEST), **truths)
 
 
 def _flag_status(entry: Any) -> FlagStatus:
-    fields = mapping_of(entry, "a flag")
-    x_m, y_m = (number_of(fields, key, -LARGEST, LARGEST) for key in ("x_m", "y_m"))
-    return FlagStatus(x_m, y_m, truth_of(fields, "taken"))
+    fields = _mapping(entry, "a flag")
+    x_m, y_m = (_number(fields, key, -LARGEST, LARGEST) for key in ("x_m", "y_m"))
+    return FlagStatus(x_m, y_m, _truth(fields, "taken"))
 
 
-def _entries(
-    content: Mapping[str, Any], key: str, read: Callable[[Mapping[str, Any]], _Entry]
-) -> tuple[tuple[_Entry, ...], tuple[str, ...]]:
-    """What a packet says of single boats, each once, and why others were left out."""
-    given = content.get(key)
-    if not isinstance(given, list) or len(given) > MAX_BOATS:
-        raise FeedError(f"{key} is {short(given)}; give a list, {MAX_BOATS} boats at most")
-    found: dict[str, _Entry] = {}
+def _fixes(content: Mapping[str, Any]) -> tuple[tuple[Fix, ...], tuple[str, ...]]:
+    contacts = content.get("contacts")
+    if not isinstance(contacts, list) or len(contacts) > MAX_BOATS:
+        raise FeedError(f"contacts is {_short(contacts)}; give a list, {MAX_BOATS} boats at most")
+    fixes: dict[str, Fix] = {}
     refused = []
-    for row in given:
+    for entry in contacts:
         try:
-            entry = read(mapping_of(row, f"one of {key}"))
+            fix = _fix(_mapping(entry, "a contact"))
         except FeedError as error:
             refused.append(str(error))
             continue
-        if entry.boat in found:
-            refused.append(f"boat {entry.boat} is given twice")
+        if fix.boat in fixes:
+            refused.append(f"boat {fix.boat} is given twice")
         else:
-            found[entry.boat] = entry
-    return tuple(found.values()), tuple(refused)
-
-
-def _course(entry: Mapping[str, Any]) -> Course:
-    boat = name_of(entry, "boat")
-    try:
-        return Course(
-            boat=boat,
-            heading_deg=number_of(entry, "heading_deg", -720.0, 720.0),
-            speed_mps=number_of(entry, "speed_mps", -MAX_SPEED_MPS, MAX_SPEED_MPS),
-            age_s=number_of(entry, "age_s", 0.0, MAX_AGE_S),
-        )
-    except FeedError as error:
-        raise FeedError(f"boat {boat}: {error}") from None
+            fixes[fix.boat] = fix
+    return tuple(fixes.values()), tuple(refused)
 
 
 def _fix(entry: Mapping[str, Any]) -> Fix:
-    boat = name_of(entry, "boat")
+    boat = _name(entry, "boat")
     try:
         return Fix(
             boat=boat,
-            latitude_deg=number_of(entry, "latitude_deg", -89.0, 89.0),
-            longitude_deg=number_of(entry, "longitude_deg", -180.0, 180.0),
-            heading_deg=number_of(entry, "heading_deg", -720.0, 720.0),
-            speed_mps=number_of(entry, "speed_mps", -MAX_SPEED_MPS, MAX_SPEED_MPS),
-            age_s=number_of(entry, "age_s", 0.0, MAX_AGE_S),
-            error_m=number_of(entry, "error_m", 0.0, MAX_ERROR_M),
+            latitude_deg=_number(entry, "latitude_deg", -89.0, 89.0),
+            longitude_deg=_number(entry, "longitude_deg", -180.0, 180.0),
+            heading_deg=_number(entry, "heading_deg", -720.0, 720.0),
+            speed_mps=_number(entry, "speed_mps", -MAX_SPEED_MPS, MAX_SPEED_MPS),
+            age_s=_number(entry, "age_s", 0.0, MAX_AGE_S),
+            error_m=_number(entry, "error_m", 0.0, MAX_ERROR_M),
         )
     except FeedError as error:
         raise FeedError(f"boat {boat}: {error}") from None
+
+
+def _mapping(entry: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(entry, Mapping):
+        raise FeedError(f"{what} is {_short(entry)}; give an object")
+    return entry
+
+
+def _number(entry: Mapping[str, Any], key: str, low: float, high: float) -> float:
+    value = entry.get(key)
+    usable = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not usable or not low <= value <= high:  # type: ignore[operator] # a number when usable
+        raise FeedError(f"{key} is {_short(value)}; give a number from {low:g} to {high:g}")
+    return float(value)  # type: ignore[arg-type] # checked above
+
+
+def _count(entry: Mapping[str, Any], key: str, default: int | None = None) -> int:
+    value = entry.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
+        raise FeedError(f"{key} is {_short(value)}; give a whole number >= 0")
+    return value
+
+
+def _pair(entry: Mapping[str, Any], key: str) -> tuple[int, int]:
+    value = entry.get(key)
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise FeedError(f"{key} is {_short(value)}; give blue's and red's count")
+    return _count({key: value[0]}, key), _count({key: value[1]}, key)
+
+
+def _truth(entry: Mapping[str, Any], key: str) -> bool:
+    value = entry.get(key)
+    if not isinstance(value, bool):
+        raise FeedError(f"{key} is {_short(value)}; give true or false")
+    return value
+
+
+def _name(entry: Mapping[str, Any], key: str) -> str:
+    value = entry.get(key)
+    if not isinstance(value, str) or not 0 < len(value) <= MAX_NAME or not value.isprintable():
+        raise FeedError(f"{key} is {_short(value)}; give a name of 1 to {MAX_NAME} characters")
+    return value
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise FeedError(f"{name} is no number of JSON")
+
+
+def _short(value: Any) -> str:
+    text = value if isinstance(value, str) else repr(value) if not isinstance(value, BaseException) else str(value)
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= 60 else text[:59] + "…"

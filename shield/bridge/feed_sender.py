@@ -1,4 +1,4 @@
-"""`FeedSender`: positions, courses and the state of the game out over UDP."""
+"""`FeedSender`: positions and the state of the game out over UDP."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from types import TracebackType
 from typing import Self
 
-from .feed_packets import Course, Fix, GameState, Packet
+from .feed_packets import Fix, GameState, Packet
 from .feed_sockets import ip_version, numeric_host, sending_socket, socket_address
 
 logger = logging.getLogger(__name__)
@@ -40,14 +40,6 @@ class FeedSender:
             FeedError: a value is not finite, or there are too many boats for one packet.
         """
         self._send(Packet(self.sender, self.run, self._seq, fixes=tuple(fixes)).encode())
-
-    def send_courses(self, courses: Sequence[Course]) -> None:
-        """Send what boats were told to do; at least one.
-
-        Raises:
-            FeedError: a value is not finite, or there are too many boats for one packet.
-        """
-        self._send(Packet(self.sender, self.run, self._seq, courses=tuple(courses)).encode())
 
     def send_game(self, game: GameState) -> None:
         """Send how the game stands.

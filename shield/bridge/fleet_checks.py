@@ -54,10 +54,7 @@ def platform_of(fleet: FleetSettings, name: str) -> Platform:
 
 
 def shield_config(fleet: FleetSettings) -> ShieldConfig:
-    """Settings of the shield with this file's step and ages.
-
-    A process decides for its boats, and for team-mates of other processes as it sees them, in one program: these are
-    given with what they were told, where the shield's own "per_boat" takes them to hold their courses.
+    """Settings of the shield with this file's step, coordination and ages.
 
     Raises:
         FleetFileError: a setting is unknown or contradicts the file's own key.
@@ -69,7 +66,6 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
         same = given == value or (isinstance(given, float) and isinstance(value, float) and math.isclose(given, value))
         if not same:
             raise FleetFileError(f"shield.{key} is {given!r} and {source} says {value!r}; leave shield.{key} out")
-    settings["coordination"] = "team"
     oldest = max(fleet.limits.contact.lost_after_s, fleet.limits.navigation.lost_after_s)
     settings.setdefault("max_track_age_s", oldest + dt_s)
     try:

@@ -37,7 +37,7 @@ class FleetFile(FleetSettings):
 
     @cached_property
     def shield_config(self) -> ShieldConfig:
-        """Settings of the shield: the file's, with the step from the file's own key."""
+        """Settings of the shield: the file's, with step and coordination from the file's own keys."""
         return shield_config(self)
 
     def with_shield(self, **settings: Any) -> FleetFile:
@@ -150,12 +150,6 @@ class FleetFile(FleetSettings):
         if self.coordination == "team":
             return (self.feed.listen,)
         return tuple(dict.fromkeys(b.feed_listen or self.feed.listen for b in self.ours))
-
-    def mates_listeners(self, boat: str) -> tuple[str, ...]:
-        """Every HOST:PORT at which another process of our team hears the feed; none when one commands all."""
-        if self.coordination == "team":
-            return ()
-        return tuple(address for address in self.feed_listeners() if address != self.feed_listen(boat))
 
     def position_listeners(self) -> tuple[str, ...]:
         """Every HOST:PORT positions go to: the runners' and the referee's."""

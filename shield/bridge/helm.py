@@ -22,7 +22,6 @@ from .clock import Clock
 from .fleet_file import FleetFile
 from .frame import TWO_PI
 from .freshness import Verdict
-from .intent import Intent
 from .link import Link, Sent
 from .parts import GameState
 from .responses import Responder
@@ -82,7 +81,7 @@ class Helm:
         roster: Roster,
         answer: Commands | None,
         verdict: Verdict,
-        mates: Mapping[str, Intent | None] | None = None,
+        mates: Collection[str] = (),
         game: GameState | None = None,
         game_age_s: float = math.inf,
     ) -> Steered:
@@ -92,12 +91,10 @@ class Helm:
             roster: what is known of all boats.
             answer: the policy's absolute commands, all boats of the file; used for boats without a response due.
             verdict: responses due, boats whose state is unknown, boats that do not obey.
-            mates: team-mates another process commands behind a shield of their own, and what they were told, as far as
-                it is known; the others are taken to hold their courses.
+            mates: team-mates another process commands behind a shield of their own.
             game: the referee's state of the game; None: none.
             game_age_s: its age, s.
         """
-        mates = {} if mates is None else mates
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
         try:
@@ -105,7 +102,7 @@ class Helm:
             so_far = Steered(fleet)
             if fleet is None or not commanded:
                 return self._finish(so_far, verdict)
-            wanted = self._wanted(fleet, commanded, answer, verdict, mates)
+            wanted = self._wanted(fleet, commanded, answer, verdict)
             so_far = Steered(fleet, wanted, self._water.around(fleet, game, game_age_s))
             reset = self._reset_if_due()
             decisions = self._shield.decide(fleet, wanted, so_far.surroundings)
@@ -126,21 +123,12 @@ class Helm:
         self._fresh = False
         return reset
 
-    def _wanted(
-        self,
-        fleet: Fleet,
-        commanded: Collection[str],
-        answer: Commands | None,
-        verdict: Verdict,
-        mates: Mapping[str, Intent | None],
-    ) -> Commands:
+    def _wanted(self, fleet: Fleet, commanded: Collection[str], answer: Commands | None, verdict: Verdict) -> Commands:
         values = np.full((len(fleet), 2), np.nan)
         for i, name in enumerate(fleet.names):
             if name in commanded:
                 values[i] = self._wanted_row(name, fleet.state[i], answer, verdict)
-            elif (intent := mates.get(name)) is not None:  # a team-mate that goes on as it was told last
-                values[i] = intent.speed_mps, intent.heading_rad
-            elif fleet.controlled[i]:  # one that tells nothing: taken to hold its course
+            elif fleet.controlled[i]:  # a team-mate with its own shield: taken to hold its course
                 values[i] = max(0.0, fleet.state[i, L.SPEED]), math.radians(fleet.state[i, L.HEADING]) % TWO_PI
         return Commands.absolute_rad(values)
 

@@ -15,7 +15,6 @@ from .fleet_file import FleetFile
 from .freshness import RIVAL_S, Seen, Verdict, judge
 from .handover import at_rest, nearing
 from .helm import Helm, Steered
-from .intent import fresh
 from .latency import Delays
 from .link import BoatReading, Link
 from .operator import Operator
@@ -191,9 +190,7 @@ class Loop:
         if self.operator.hard:
             return Steered(sent=self._helm.stop_all(tuple(self.parts.links)))
         limit = self.fleet.limits.contact.max_age_s
-        known = [name for name in self._mates if self.roster.contact_age_s(name) <= limit]
-        told = {} if self.parts.intents is None or not known else self.parts.intents.intents()
-        mates = {name: fresh(told.get(name), self.clock.now_s()) for name in known}
+        mates = {name for name in self._mates if self.roster.contact_age_s(name) <= limit}
         return self._helm.steer(self.roster, answer, verdict, mates, game, game_age_s)
 
     def _seen(

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..surroundings import OPEN_WATER, Surroundings
 from .contact import Contact, ContactSource
-from .intent import IntentSource
 from .link import BoatReading, Link
 from .tick import TickSink
 from .wanted import WantedSource
@@ -58,7 +57,6 @@ class Parts:
         ears: links that are only listened to, of boats somebody else commands.
         contacts: other sources of positions.
         game: the referee's state of the game; None: none.
-        intents: what team-mates of other processes were told; None: they are taken to hold their courses.
         grounds: fixed things of the game: obstacles, and the own flag's circle as ``stops``, see `water.Water`.
         policy: where wanted commands come from.
         sinks: get every tick; the black box among them.
@@ -69,7 +67,6 @@ class Parts:
     ears: Mapping[str, Link] = field(default_factory=dict)
     contacts: Sequence[ContactSource] = ()
     game: GameSource | None = None
-    intents: IntentSource | None = None
     grounds: Surroundings = OPEN_WATER
     sinks: Sequence[TickSink] = ()
 

@@ -50,15 +50,6 @@ def positions(*contacts, **changes):
     return json.dumps({**packet, **changes}).encode()
 
 
-def course(**changes):
-    return {"boat": "red_1", "heading_deg": 75.0, "speed_mps": 1.5, "age_s": 0.25, **changes}
-
-
-def courses(*given, **changes):
-    packet = {"steerclear": 1, "kind": "courses", "sender": "intents", "run": 1, "seq": 1, "courses": list(given)}
-    return json.dumps({**packet, **changes}).encode()
-
-
 def game(**changes):
     packet = {"steerclear": 1, "kind": "game", "sender": "referee", "run": 1, "seq": 1, **GAME.as_dict()}
     return json.dumps({**packet, **changes}).encode()
@@ -118,8 +109,6 @@ def test_nothing_heard_is_nothing_known(receiver):
         positions(run="1"),
         positions(contacts={}),
         positions(contacts=[contact()] * 65),
-        courses(courses={}),
-        courses(courses=[course()] * 65),
         b" " * (MAX_BYTES + 1),
         game(time_s=math.nan),
         game(time_s=-1.0),
@@ -144,42 +133,7 @@ def test_malformed_packets_are_refused_whole(receiver, data):
     receiver.take(data, LOCAL)
     assert receiver.faults() == {"malformed": 1}
     assert receiver.read() == ()
-    assert receiver.intents() == {}
     assert receiver.game() is None
-
-
-def test_a_course_becomes_an_intent_in_the_field(receiver):
-    receiver.take(courses(course()), LOCAL)
-    (found,) = receiver.intents().values()
-    assert found.heading_rad == pytest.approx(math.radians(45.0))
-    assert (found.boat, found.source, found.speed_mps, found.told_s) == ("red_1", "intents", 1.5, 99.75)
-    assert receiver.read() == (), "it says nothing of where the boat is"
-
-
-def test_of_two_courses_of_a_boat_the_later_one_counts(receiver):
-    receiver.take(courses(course(age_s=0.1, speed_mps=1.0)), LOCAL)
-    receiver.take(courses(course(age_s=0.2, speed_mps=2.0), sender="other"), LOCAL)
-    assert receiver.intents()["red_1"].speed_mps == 1.0
-    receiver.take(courses(course(age_s=0.0, speed_mps=0.5), sender="other", seq=2), LOCAL)
-    assert receiver.intents()["red_1"].speed_mps == 0.5
-
-
-@pytest.mark.parametrize(
-    "fault",
-    [
-        {"heading_deg": 721.0},
-        {"heading_deg": None},
-        {"speed_mps": 51.0},
-        {"age_s": -1.0},
-        {"boat": ""},
-        {"boat": "x"},
-    ],
-    ids=str,
-)
-def test_a_bad_course_does_not_cost_the_others_theirs(receiver, fault):
-    receiver.take(courses(course(**fault), course(boat="blue_1")), LOCAL)
-    assert set(receiver.intents()) == {"blue_1"}
-    assert sum(receiver.faults().values()) == 1
 
 
 BAD_FIXES = [
@@ -315,18 +269,14 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
     max_leaves=5,
 )
-KEYS = st.sampled_from(
-    [*contact(), "courses", *GAME.as_dict(), *vars(STATUS), "contacts", "kind", "sender", "seq", "run", "x_m"]
-)
+KEYS = st.sampled_from([*contact(), *GAME.as_dict(), *vars(STATUS), "contacts", "kind", "sender", "seq", "run", "x_m"])
 
 
 @settings(derandomize=True, deadline=None, max_examples=300)
-@given(st.sampled_from(["positions", "courses", "game"]), KEYS, JSON, st.integers(0, 400), st.integers(0, 255))
-def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(kind, key, value, at, byte):
-    kinds = {"game": game, "courses": lambda: courses(course(), course(boat="blue_1"))}
-    content = json.loads(kinds.get(kind, lambda: positions(contact(), contact(boat="blue_1")))())
-    rows = [row for name in ("contacts", "courses", "flags") for row in content.get(name, ())]
-    for place in (content, *rows, *content.get("boats", {}).values()):
+@given(st.booleans(), KEYS, JSON, st.integers(0, 400), st.integers(0, 255))
+def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(is_game, key, value, at, byte):
+    content = json.loads(game() if is_game else positions(contact(), contact(boat="blue_1")))
+    for place in (content, *content.get("contacts", ()), *content.get("boats", {}).values(), *content.get("flags", ())):
         if key in place:
             place[key] = value
     whole = json.dumps(content).encode()
@@ -339,9 +289,6 @@ def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(kind, key, val
     for found in receiver.read():
         assert all(map(math.isfinite, (*found.position_m, found.heading_rad, found.speed_mps, found.fixed_s)))
         assert found.fixed_s <= 100.0
-    for intent in receiver.intents().values():
-        assert all(map(math.isfinite, (intent.heading_rad, intent.speed_mps, intent.told_s)))
-        assert intent.told_s <= 100.0
     state = receiver.game()
     assert state is None or math.isfinite(state.time_s)
 

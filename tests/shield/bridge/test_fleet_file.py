@@ -114,12 +114,9 @@ def test_a_process_per_boat_names_its_boat():
     )
     fleet = parse_fleet(text)
     assert [boat.name for boat in fleet.commanded("blue_2")] == ["blue_2"]
-    assert fleet.shield_config.coordination == "team", "one program for its own boat and what mates are told"
+    assert fleet.shield_config.coordination == "per_boat"
     assert fleet.feed_listen("blue_2") == "127.0.0.1:14702"
     assert fleet.feed_listeners() == ("127.0.0.1:14700", "127.0.0.1:14702")
-    assert fleet.mates_listeners("blue_1") == ("127.0.0.1:14702",)
-    assert fleet.mates_listeners("blue_2") == ("127.0.0.1:14700",)
-    assert parse_fleet(GOOD).mates_listeners("blue_1") == ()
     with pytest.raises(FleetFileError, match="--boat"):
         fleet.commanded()
     with pytest.raises(FleetFileError, match="not ours"):

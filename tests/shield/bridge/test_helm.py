@@ -11,7 +11,6 @@ from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.freshness import Verdict
 from steerclear.shield.bridge.helm import Helm
-from steerclear.shield.bridge.intent import Intent
 from steerclear.shield.bridge.roster import Roster
 from steerclear.shield.exceptions import LinkError
 
@@ -51,7 +50,7 @@ def test_a_command_the_link_refuses_becomes_a_stop():
     assert world.last.sent["blue_1"].route == "stop"
 
 
-def test_team_mates_behind_a_shield_of_their_own_give_way_too_and_do_as_they_were_told():
+def test_team_mates_behind_a_shield_of_their_own_are_taken_to_give_way_too():
     fleet = parse_fleet(fleet_text(blue=2, red=0, more="coordination: per_boat"))
     clock = ManualClock(100.0)
     link = FakeLink("blue_1", clock, "heron", 0.0, 0.0, 0.0, 1.0)
@@ -60,11 +59,9 @@ def test_team_mates_behind_a_shield_of_their_own_give_way_too_and_do_as_they_wer
     roster.update(100.0, {"blue_1": link.read()}, [seen])
     helm = Helm(fleet, Shield(fleet.shield_config, fleet.surroundings), {"blue_1": link}, clock)
     wanted = Commands.absolute_rad([[2.0, 0.0], [math.nan, math.nan]])
-    steered = helm.steer(roster, wanted, Verdict(), mates={"blue_2": None})
+    steered = helm.steer(roster, wanted, Verdict(), mates={"blue_2"})
     assert steered.fleet.controlled.tolist() == [True, True]
-    assert steered.wanted.values[1] == pytest.approx([1.0, math.pi]), "nothing told: it holds its course"
-    told = helm.steer(roster, wanted, Verdict(), mates={"blue_2": Intent("blue_2", 2.5, 0.5, 100.0, "test")})
-    assert told.wanted.values[1].tolist() == [0.5, 2.5]
+    assert steered.wanted.values[1] == pytest.approx([1.0, math.pi])
     assert list(steered.sent) == ["blue_1"]
     alone = Helm(fleet, Shield(fleet.shield_config, fleet.surroundings), {"blue_1": link}, clock)
     assert alone.steer(roster, wanted, Verdict()).fleet.controlled.tolist() == [True, False]
