@@ -37,7 +37,8 @@ class ShieldConfig:
             and promises less, also near in time: hunters lead the boat by a share of it.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
-        position_error_m: bound on the error of every reported position, m; widens the separation twice.
+        position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
+            what is kept from the edge, obstacles and circles.
         track_error_mps: growth of a neighbour's position error with the age of its track, m/s.
         max_track_age_s: tracks older than this are refused, s.
         delay_s: time from decision to effect, s: boats are run on by it before deciding.

@@ -58,18 +58,20 @@ class Surroundings:
             raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 
     def pack(self, config: ShieldConfig) -> Fixed:
-        """Arrays for compiled code, widened by the distances of the settings."""
+        """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen."""
+        off_m = config.position_error_m
         edge = np.array([-np.inf, -np.inf, np.inf, np.inf])
         if self.field is not None and config.edge_m is not None:
-            edge = np.array(self.field) + config.edge_m * np.array([1.0, 1.0, -1.0, -1.0])
-        circles = [(x, y, r + config.hull_m) for x, y, r in self.circles] + list(self.stops)
+            edge = np.array(self.field) + (config.edge_m + off_m) * np.array([1.0, 1.0, -1.0, -1.0])
+        circles = [(x, y, r + config.hull_m + off_m) for x, y, r in self.circles]
+        circles += [(x, y, r + off_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return Fixed(
             field=edge.astype(np.float64),
-            keep_out=np.array(self.keep_out, dtype=np.float64).reshape(-1, 3),
+            keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
-            segment_m=config.hull_m,
+            segment_m=config.hull_m + off_m,
         )
 
 

@@ -68,3 +68,19 @@ def test_walls_of_a_polygon_close():
     ends = Surroundings(polygons=[TRIANGLE]).pack(ShieldConfig()).segments
     starts, stops = {tuple(row[:2]) for row in ends}, {tuple(row[2:]) for row in ends}
     assert starts == stops == set(TRIANGLE)
+
+
+def test_everything_fixed_is_kept_at_a_distance_for_what_positions_may_be_off():
+    around = Surroundings(
+        field=(0.0, 0.0, 80.0, 40.0),
+        circles=((20.0, 20.0, 2.0),),
+        polygons=(((30.0, 10.0), (34.0, 10.0), (32.0, 14.0)),),
+        keep_out=((50.0, 20.0, 3.0),),
+        stops=((70.0, 20.0, 4.0),),
+    )
+    exact, off = (around.pack(ShieldConfig(position_error_m=error_m)) for error_m in (0.0, 0.5))
+    np.testing.assert_allclose(off.field - exact.field, [0.5, 0.5, -0.5, -0.5])
+    np.testing.assert_allclose(off.circles[:, 2] - exact.circles[:, 2], 0.5)
+    np.testing.assert_allclose(off.keep_out[:, 2] - exact.keep_out[:, 2], 0.5)
+    assert off.segment_m - exact.segment_m == 0.5
+    np.testing.assert_array_equal(off.segments, exact.segments)
