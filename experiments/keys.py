@@ -170,11 +170,17 @@ _TIMES = {
     "p99_9_us": "99.9th percentile of them, us",
 }
 
+
+def _decided(part: str, about: str) -> dict[str, str]:
+    times = {f"{part}.{k}.{n}": f"{w}: {v}" for k, w in _DECIDED.items() for n, v in _TIMES.items()}
+    shares = {f"{part}.share_intervening": "share of them in which the shield changes a command"}
+    return {f"{part}.decisions": about, **shares, **times}
+
+
 BENCH = {
     **_PROVENANCE,
-    "decide.decisions": "states of real games, 3 boats and 3 opponents",
-    "decide.share_intervening": "share of them in which the shield changes a command",
-    **{f"decide.{k}.{n}": f"{w}: {v}" for k, w in _DECIDED.items() for n, v in _TIMES.items()},
+    **_decided("decide", "states of real games, 3 boats and 3 opponents"),
+    **_decided("decide_by_table", "the same of boats that look opponents up in value tables"),
     "solvers[].solver": "name in qpsolvers, or the compiled projection of the batch",
     **{f"solvers[].{name}": words for name, words in _TIMES.items()},
     "solvers[].ratio": "median against the default solver's",

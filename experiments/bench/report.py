@@ -20,16 +20,20 @@ class BenchTable:
 
 def bench_tables(content: Mapping[str, Any]) -> list[BenchTable]:
     """Lay out what `run.run_bench` measured."""
-    return [_decide(content), _solvers(content), _batch(content), _memory(content), _scaling(content)]
+    decisions = [
+        _decide(content, "decide", "3 boats and 3 opponents"),
+        _decide(content, "decide_by_table", "with value tables (surveyors)"),
+    ]
+    return [*decisions, _solvers(content), _batch(content), _memory(content), _scaling(content)]
 
 
-def _decide(content: Mapping[str, Any]) -> BenchTable:
-    decide = content["decide"]
+def _decide(content: Mapping[str, Any], key: str, about: str) -> BenchTable:
+    decide = content[key]
     share = decide["share_intervening"]
     names = {"all": "all", "passes": f"passes ({1 - share:.1%})", "intervenes": f"intervenes ({share:.1%})"}
     rows = [[words, *_quantiles(decide[name])] for name, words in names.items()]
     times = f"each timed {content['settings']['repeats']} times"
-    title = f"One decision, 3 boats and 3 opponents, us ({decide['decisions']:,} of real games, {times})"
+    title = f"One decision, {about}, us ({decide['decisions']:,} of real games, {times})"
     return BenchTable(title, ("", "p50", "p99", "p99.9"), rows)
 
 
