@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from steerclear.shield import Reason, Shield, ShieldConfig
 from steerclear.shield.jit import Array
 from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 
-from .conditions import CALM, Conditions
 from .oracle import AT_ONCE, Motion
 from .sea import Sea
 from .spec import SIDES, MatchSpec
@@ -48,7 +47,6 @@ class Shielding:
         agent_ids: boats that a shield decides for.
         separation_m: radius the own shield keeps (the default's without one), m.
         reason_names: names of the reason codes, by code.
-        conditions: that the shields are told of.
         sea: the conditions at work; None where there are none.
     """
 
@@ -58,7 +56,6 @@ class Shielding:
     agent_ids: list[str] = field(default_factory=list)
     separation_m: float = RADII_M[0]
     reason_names: list[str] = field(default_factory=list)
-    conditions: Conditions = CALM
     sea: Sea | None = None
 
     @property
@@ -104,15 +101,18 @@ class Shielding:
 def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
     """Put the shields of a spec on a game, told of its conditions where their settings do not say otherwise.
 
+    Only the own team's commands come late, so only its shield is told of the delay.
+
     Raises:
         ConfigError: a setting of a shield is unknown or out of range, or conditions that the game cannot have.
     """
-    shielding = Shielding(env, env, conditions=spec.conditions)
+    shielding = Shielding(env, env)
     if not spec.conditions.calm:
         shielding.sea = Sea(env, spec.conditions, spec.seed, spec.own_team)
     for side, settings in _settings_by_side(spec).items():
         if settings is not None:
-            _add(shielding, side, settings, spec.shield_autopilot)
+            told = spec.conditions if side == spec.side else replace(spec.conditions, delay_s=0.0)
+            _add(shielding, side, {**told.shield_settings(env.config.dt_s), **settings}, spec.shield_autopilot)
     if spec.shield is not None:
         shielding.separation_m = float(spec.shield.get("separation_m", RADII_M[0]))
     return shielding
@@ -133,8 +133,7 @@ def check_shield(settings: Mapping[str, Any]) -> None:
 
 
 def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
-    dt_s = shielding.inner.config.dt_s
-    config = ShieldConfig.of(**{"dt_s": dt_s, **shielding.conditions.shield_settings(dt_s), **settings})
+    config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, **settings})
     reader = None if shielding.sea is None else shielding.sea.reader()
     wrapped = ShieldedParallelEnv(shielding.env, Shield(config), side, shield_autopilot, reader=reader)
     shielding.env = wrapped

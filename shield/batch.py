@@ -87,7 +87,7 @@ class BatchedShield:
     """`Shield` for B games of the same fleet, with the exact compiled projection as its QP solver.
 
     Decisions are those of `Shield` to rounding: the stages are the same functions. Tracks are taken as fresh and
-    exact up to ``position_error_m``.
+    exact up to ``position_error_m``. It decides for one thread at a time, as `Shield` does.
 
     Args:
         config: settings; coordination must be "team".

@@ -23,6 +23,9 @@ from .screening import lost, screen
 ROUNDS = 2
 """Times the program is linearised and solved anew before the ladder takes over."""
 
+PASSES, TO_SOLVE, TO_ESCAPE = range(3)
+"""What is left to do once the wanted commands are screened: nothing, the program, or the ladder at once."""
+
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
 
@@ -70,9 +73,6 @@ def finish(
     commit(state, ours, memory, work, plan)
 
 
-PASSES, TO_SOLVE, TO_ESCAPE = range(3)
-
-
 @lean_kernel
 def begin(
     state: Array,
@@ -87,7 +87,7 @@ def begin(
     work: Work,
     plan: Plan,
 ) -> int:
-    """Screen the wanted commands: `PASSES` and all is done, `TO_SOLVE` the program, or `TO_ESCAPE` without it."""
+    """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_ESCAPE`."""
     if screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan):
         finish(True, 0, state, ours, boats, fixed, plans, tuning, memory, work, plan)
         return PASSES

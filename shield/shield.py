@@ -48,7 +48,8 @@ class Shield:
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
     with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
-    of each boat; the same sequence of inputs from `reset` on gives the same bits.
+    of each boat; the same sequence of inputs from `reset` on gives the same bits. It decides for one thread at a time:
+    compiled code works on its arrays without the GIL.
 
     Args:
         config: settings; None takes the defaults.

@@ -127,6 +127,14 @@ def test_a_shield_is_told_of_delay_and_noise_unless_its_settings_say_otherwise()
     assert (calm.delay_s, calm.position_error_m) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize("side", ["blue", "red"])
+def test_the_other_teams_shield_is_not_told_of_a_delay_its_boats_do_not_have(side):
+    match = Match(spec_of(ALL, side=side, shield={}, opponent_shield={}))
+    own, other = (wrapped.shield.config for wrapped in match.shielding.wrappers)
+    assert (own.delay_s, other.delay_s) == (pytest.approx(0.3), 0.0)
+    assert own.position_error_m == other.position_error_m == 0.5
+
+
 def test_the_oracle_is_told_of_the_same_physics(monkeypatch):
     told, ask = [], judging.oracle.judge_breaches
 
