@@ -57,7 +57,7 @@ class Shield:
         **settings: single settings by name, instead of ``config``.
 
     Raises:
-        ConfigError: a setting is unknown or out of range.
+        ConfigError: a setting is unknown or out of range, or leaves nothing of the field.
     """
 
     def __init__(
@@ -70,6 +70,7 @@ class Shield:
         self._tuning = tuning_of(self.config)
         self._plans = plans_of(self.config)
         self._packed: dict[Surroundings, Fixed] = {}
+        self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
         self._key: tuple[Any, ...] | None = None

@@ -14,6 +14,7 @@ import numpy as np
 
 from .config import ShieldConfig
 from .exceptions import ConfigError
+from .jit import Array
 from .scene import Fixed
 
 Point = tuple[float, float]
@@ -58,21 +59,35 @@ class Surroundings:
             raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 
     def pack(self, config: ShieldConfig) -> Fixed:
-        """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen."""
+        """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
+
+        Raises:
+            ConfigError: nothing of the field is left.
+        """
         off_m = config.position_error_m
-        edge = np.array([-np.inf, -np.inf, np.inf, np.inf])
-        if self.field is not None and config.edge_m is not None:
-            edge = np.array(self.field) + (config.edge_m + off_m) * np.array([1.0, 1.0, -1.0, -1.0])
         circles = [(x, y, r + config.hull_m + off_m) for x, y, r in self.circles]
         circles += [(x, y, r + off_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return Fixed(
-            field=edge.astype(np.float64),
+            field=self._edge(config),
             keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
             segment_m=config.hull_m + off_m,
         )
+
+    def _edge(self, config: ShieldConfig) -> Array:
+        """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""
+        if self.field is None or config.edge_m is None:
+            return np.array([-np.inf, -np.inf, np.inf, np.inf])
+        inside_m = config.edge_m + config.position_error_m
+        edge = np.array(self.field, np.float64) + inside_m * np.array([1.0, 1.0, -1.0, -1.0])
+        if not (edge[0] < edge[2] and edge[1] < edge[3]):
+            raise ConfigError(
+                f"field {self.field} is too small to keep {inside_m:g} m inside its edge; give a larger field, a smaller "
+                "edge_m or position_error_m, or edge_m None to leave the edge to the policy"
+            )
+        return edge
 
 
 def _numbers(name: str, row: Sequence[float], form: str) -> tuple[float, ...]:

@@ -57,7 +57,11 @@ class Water:
         return replace(fixed, field=_wider(fixed.field, grown))
 
     def _is_home(self, game: GameState | None, age_s: float) -> bool:
-        """Whether somebody keeps the game and says that our flag is home."""
+        """Whether somebody keeps the game and says that our flag is home.
+
+        A referee silent for too long counts as none: the circle is a rule of the game, and nothing on the water stops
+        a boat in it, so it must not press boats towards opponents on the word of nobody.
+        """
         if game is None or game.over or not age_s <= self._game_max_age_s:
             return False
         return not game.flags[self._team].taken

@@ -72,7 +72,7 @@ def choose_plan(
             _take(i, trial, merit, work)
         if exhaustive:
             continue
-        if merit >= PAIR_SAFE or (done == 1 and work.sealed[trial]):
+        if merit >= PAIR_SAFE or (done == 1 and work.sealed[trial] and kept_merit == merit):
             return
 
 

@@ -9,7 +9,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN
 from .pursuer import clear_of_pursuer
-from .values import looked_up, worst_by_table
+from .values import looked_up, margin_at_once, margin_later
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
@@ -120,11 +120,12 @@ def worst_hunter(
     Once below the floor the search stops: who came there last is looked at first, so that of many manoeuvres those
     that fail cost little.
 
-    ``work.sealed[slot]`` says whether a table had the last word on where the boat is one step on: then no other
-    manoeuvre changes it.
+    ``work.sealed[slot]`` says whether the boat is short of its target by what a table tells of where it is looked up
+    first. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
     clear = work.clear[slot]
     first = work.first_hunter[i]
+    sealed = False
     for number in range(state.shape[0]):
         j = _first_then_rest(first, number)
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
@@ -132,20 +133,20 @@ def worst_hunter(
         if work.breach[i, j]:
             continue
         if looked_up(i, j, slot, ours, boats, work):
-            margin = worst_by_table(i, j, slot, boats, work)
+            at_once = margin_at_once(i, j, slot, boats, work)
+            margin = min(at_once, margin_later(i, j, slot, boats, work))
             if margin < clear[MARGIN]:
                 clear[MARGIN] = margin
                 work.bound[slot] = j
-                if margin < floor_m:
-                    work.first_hunter[i] = j
-                    work.sealed[slot] = not work.beset[i]
-                    return
-            continue
-        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-        clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
-        if work.out[MARGIN] < clear[MARGIN]:
-            copy_row(clear, work.out)
-            work.bound[slot] = j
-            if clear[MARGIN] < floor_m:
-                work.first_hunter[i] = j
-                return
+                sealed = margin == at_once and margin < work.target[i]
+        else:
+            # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+            clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
+            if work.out[MARGIN] < clear[MARGIN]:
+                copy_row(clear, work.out)
+                work.bound[slot] = j
+                sealed = False
+        if clear[MARGIN] < floor_m:
+            work.first_hunter[i] = j
+            break
+    work.sealed[slot] = sealed

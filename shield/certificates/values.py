@@ -152,14 +152,19 @@ def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: 
 
 
 @lean_kernel
-def worst_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
-    """Margin of boat i on the manoeuvre in ``slot`` against the worst opponent j can do, m."""
-    margin = table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+def margin_at_once(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """Margin, m, of boat i where the manoeuvre in ``slot`` is looked up first, against the worst opponent j can do."""
+    return table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+
+
+@lean_kernel
+def margin_later(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """The same some time into the manoeuvre, of a boat that is beset; `FAR` for others."""
     if not work.beset[i]:
-        return margin
+        return FAR
     if work.later[slot, PLACE_USABLE] == 0.0:  # nothing is known of a boat that has let its thrust go by then
         return -work.radius[i, j]
-    return min(margin, table_margin(i, j, work.later[slot], work.ways_later[j], boats, work))
+    return table_margin(i, j, work.later[slot], work.ways_later[j], boats, work)
 
 
 @lean_kernel
@@ -168,7 +173,7 @@ def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work
     least = FAR
     for j in range(ours.shape[0]):
         if j != i and work.near[i, j] and looked_up(i, j, slot, ours, boats, work):
-            least = min(least, worst_by_table(i, j, slot, boats, work))
+            least = min(least, margin_at_once(i, j, slot, boats, work), margin_later(i, j, slot, boats, work))
     return least
 
 

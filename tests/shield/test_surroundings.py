@@ -84,3 +84,11 @@ def test_everything_fixed_is_kept_at_a_distance_for_what_positions_may_be_off():
     np.testing.assert_allclose(off.keep_out[:, 2] - exact.keep_out[:, 2], 0.5)
     assert off.segment_m - exact.segment_m == 0.5
     np.testing.assert_array_equal(off.segments, exact.segments)
+
+
+def test_a_field_of_which_nothing_is_left_is_refused_when_the_shield_is_built():
+    small = Surroundings(field=(0.0, 0.0, 40.0, 3.0))
+    Shield(ShieldConfig(edge_m=0.5, position_error_m=0.9), small)
+    with pytest.raises(ConfigError, match=r"too small to keep 1\.6 m inside its edge; give a larger field"):
+        Shield(ShieldConfig(edge_m=0.5, position_error_m=1.1), small)
+    Shield(ShieldConfig(edge_m=None, position_error_m=1.1), small)
