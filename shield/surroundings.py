@@ -84,8 +84,8 @@ class Surroundings:
         edge = np.array(self.field, np.float64) + inside_m * np.array([1.0, 1.0, -1.0, -1.0])
         if not (edge[0] < edge[2] and edge[1] < edge[3]):
             raise ConfigError(
-                f"field {self.field} is too small to keep {inside_m:g} m inside its edge; give a larger field, a smaller "
-                "edge_m or position_error_m, or edge_m None to leave the edge to the policy"
+                f"field {self.field} is too small to keep {inside_m:g} m inside its edge; give a larger field, "
+                "a smaller edge_m or position_error_m, or edge_m None to leave the edge to the policy"
             )
         return edge
 
