@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
@@ -78,7 +79,7 @@ def decide_games(
                 sent[b, i, 0] = plan.commands[i, 0]
                 sent[b, i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[b, i, L.HEADING]
             reason[b, i] = plan.reason[i]
-            clearance_m[b, i] = work.clear[i, 0] if ours[b, i] else np.inf
+            clearance_m[b, i] = told_margin(i, ahead, work) if ours[b, i] else np.inf
         if pending.shape[1] > 0:
             queue_commands(pending[b], ahead, plan.commands)
 

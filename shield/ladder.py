@@ -8,7 +8,7 @@ import numpy as np
 
 from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
-from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE
+from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, told_margin
 from .certificates.values import run_opponents
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check
@@ -47,13 +47,13 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
 
 
 @lean_kernel
-def mark_relaxed(count: int, work: Work, plan: Plan) -> None:
+def mark_relaxed(count: int, state: Array, work: Work, plan: Plan) -> None:
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
         i = plan.movers[m]
         if plan.reason[i] == PASSED or not unchanged(i, plan):
             plan.reason[i] = QP_RELAXED
-        plan.slack_m[i] = max(0.0, -min(work.clear[i, MARGIN], work.fixed[i, MARGIN]))
+        plan.slack_m[i] = max(0.0, -min(told_margin(i, state, work), work.fixed[i, MARGIN]))
 
 
 @lean_kernel
@@ -117,9 +117,9 @@ def ladder(
             copy_row(plan.commands[i], plan.answer[i])
             copy_row(plan.held[i], plan.answer_held[i])
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        mark_relaxed(count, work, plan)
+        mark_relaxed(count, state, work, plan)
         return
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
-        plan.slack_m[i] = max(0.0, -work.clear[i, MARGIN])
+        plan.slack_m[i] = max(0.0, -told_margin(i, state, work))

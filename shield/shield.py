@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -92,9 +93,14 @@ class Shield:
             One decision per boat, in the fleet's order.
 
         Raises:
-            FleetError: shapes do not fit, a state is not finite or a track too old.
+            FleetError: an argument is of another kind, shapes do not fit, a state is not finite or a track too old.
         """
         started = time.perf_counter()
+        if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
+            raise FleetError(
+                f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
+                "them with Fleet.of(...) and Commands.absolute_rad(...) or Commands.relative_deg(...)"
+            )
         if wanted.values.shape != (len(fleet), 2):
             raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
         boats = self._scene(fleet)
@@ -105,7 +111,7 @@ class Shield:
         if self.config.coordination == "team":
             seat = self._seats[0]
             self._run(seat, state, asked, margin, fleet.controlled, boats, fixed)
-            answer = _Answer(seat.plan, seat.work, len(fleet))
+            answer = _Answer(seat.plan, seat.work, state)
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
         return self._report(fleet, wanted, asked, turned, answer, started)
@@ -189,7 +195,7 @@ class Shield:
             asked[i] = wanted[i]
             seat = self._seats[i]
             self._run(seat, state, asked, margin, controlled, boats, fixed)
-            answer.take(int(i), seat.plan, seat.work)
+            answer.take(int(i), seat.plan, seat.work, state)
         return answer
 
     def _report(
@@ -224,11 +230,14 @@ def _less_turn(commands: Array, turned_deg: Array) -> Array:
 class _Answer:
     """Arrays of an answer, copied out of working memory."""
 
-    def __init__(self, plan: Plan, work: Work, n: int) -> None:
+    def __init__(self, plan: Plan, work: Work, state: Array) -> None:
+        n = len(state)
         self.commands = plan.commands.copy()
         self.reason = plan.reason.copy()
         self.slack = plan.slack_m.copy()
         self.margin = np.where(self.reason == NOT_COVERED, np.inf, work.clear[:n, 0])
+        for i in np.flatnonzero(work.breach.any(axis=1) & (self.reason != NOT_COVERED)):
+            self.margin[i] = told_margin(int(i), state, work)
         self.bound = work.bound[:n].copy()
 
     @classmethod
@@ -240,7 +249,7 @@ class _Answer:
         answer.margin = np.full(n, np.inf)
         return answer
 
-    def take(self, i: int, plan: Plan, work: Work) -> None:
+    def take(self, i: int, plan: Plan, work: Work, state: Array) -> None:
         """Take boat i's row of another decider's answer."""
         self.commands[i], self.reason[i], self.slack[i] = plan.commands[i], plan.reason[i], plan.slack_m[i]
-        self.margin[i], self.bound[i] = work.clear[i, 0], work.bound[i]
+        self.margin[i], self.bound[i] = told_margin(i, state, work), work.bound[i]

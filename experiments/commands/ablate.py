@@ -64,7 +64,7 @@ def ablate(
         conditions=Conditions(delay, noise, current),
     )
     if quick:
-        settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)
+        settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
     results = run_games("ablate", settings, out, jobs, resume, quick)
     end_run(results, check, json_file)

@@ -67,6 +67,6 @@ def evaluate(
         conditions=Conditions(delay, noise, current),
     )
     if quick:
-        settings = small_version(settings, max_time or QUICK_TIME_S, QUICK_GAMES)
+        settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
     end_run(run_games("evaluate", settings, out, jobs, resume, quick), False, json_file)

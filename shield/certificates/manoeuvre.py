@@ -141,6 +141,21 @@ def _rank_recovery(
 
 
 @lean_kernel
+def told_margin(i: int, state: Array, work: Work) -> float:
+    """Certificate of boat i as it is told, m; of a boat in breach how far it is inside the radius now (negative).
+
+    In breach the clearance of a manoeuvre is a rank, see `_rank_recovery`, and no distance.
+    """
+    least, in_breach = FAR, False
+    for j in range(state.shape[0]):
+        if j != i and work.near[i, j] and work.breach[i, j]:
+            in_breach = True
+            gap = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
+            least = min(least, gap - work.radius[i, j])
+    return least if in_breach else work.clear[i, MARGIN]
+
+
+@lean_kernel
 def clear_of_boat(
     i: int,
     j: int,

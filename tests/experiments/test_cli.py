@@ -200,6 +200,8 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --separation -1", "separation_m is -1.0"),
         ("ablate --separation nan", "give a number"),
         ("ablate --max-time 0", "max_time_s is 0.0"),
+        ("ablate --quick --max-time 0", "max_time_s is 0.0"),
+        ("evaluate medium --quick --max-time 0", "max_time_s is 0.0"),
         ("ablate --penalty -1", "--penalty must be"),
         ("ablate --games 0", "--games must be at least 1"),
         ("ablate --jobs 0", "--jobs must be at least 1"),
