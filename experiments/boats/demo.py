@@ -7,7 +7,7 @@ from pathlib import Path
 
 from steerclear.shield.bridge.fleet_file import FleetFile, parse_fleet
 
-NAME = "FLEET.yaml"
+NAME = "demo_fleet.yaml"
 
 
 def demo_text() -> str:
