@@ -346,13 +346,15 @@ def test_without_a_terminal_there_are_no_keys():
     os.close(write)
 
 
-def test_a_terminal_that_goes_away_ends_the_keys_only(terminal, caplog):
+def test_a_terminal_that_goes_away_ends_the_keys_only(terminal):
     outer, inner = terminal
-    keyboard = Keyboard(pytest.fail, inner)
+    pressed = []
+    keyboard = Keyboard(pressed.append, inner)
     wait_for(lambda: not termios.tcgetattr(inner)[3] & termios.ICANON)
     os.close(outer)
     wait_for(lambda: not keyboard._thread.is_alive())
     keyboard.close()
+    assert pressed == []
 
 
 @pytest.fixture
@@ -380,9 +382,10 @@ def test_the_stop_key_is_obeyed_and_shown_within_one_refresh(dash, stream):
     os.write(outer, b" ")
     wait_for(lambda: operator.stopped)
     wait_for(lambda: "STOP ALL by keyboard" in drawn.getvalue())
+    assert operator.stopped
 
 
-def test_keys_work_when_the_picture_fails(dash, stream, monkeypatch):
+def test_keys_work_when_the_picture_fails(dash, stream, monkeypatch, caplog):
     def fail(*_):
         raise ZeroDivisionError("no picture")
 
@@ -390,11 +393,14 @@ def test_keys_work_when_the_picture_fails(dash, stream, monkeypatch):
     monkeypatch.setattr(built._view, "of", fail)
     wait_for(lambda: not built._thread.is_alive())
     built.take(stream.tick(5.0))
+    assert "cannot be drawn" in caplog.text
+    assert not operator.stopped
     os.write(outer, b"s")
     wait_for(lambda: operator.stopped)
+    assert operator.stopped
 
 
-def test_a_keys_failure_is_logged_and_the_next_key_works(dash, monkeypatch):
+def test_a_keys_failure_is_logged_and_the_next_key_works(dash, monkeypatch, caplog):
     _, operator, _, outer = dash()
 
     def fail(*_):
@@ -403,6 +409,7 @@ def test_a_keys_failure_is_logged_and_the_next_key_works(dash, monkeypatch):
     monkeypatch.setattr(operator, "end", fail)
     os.write(outer, b"qs")
     wait_for(lambda: operator.stopped)
+    assert "cannot end" in caplog.text
 
 
 def test_the_log_is_shown_and_repeated_when_the_screen_is_given_back(dash):

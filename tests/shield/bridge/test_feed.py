@@ -376,6 +376,7 @@ def test_a_flood_is_dropped_and_afterwards_packets_are_fresh_again():
             thread.join()
         with FeedSender("hub2", [receiver.address]) as sender:
             wait_for(lambda: sender.send_positions([fresh()]) or receiver.read()[0].source == "hub2", 20.0)
+        assert receiver.read()[0].source == "hub2"
 
 
 def fresh():
