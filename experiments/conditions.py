@@ -23,7 +23,7 @@ class Conditions:
     Attributes:
         delay_s: time from a command of an own boat to its effect, s; a game rounds it up to whole steps.
         noise_m: bound on the error of every position that a shield sees, m. Policies observe what the game shows.
-        current_mps: speed of the current, m/s; each game draws its direction. No shield is told of it.
+        current_mps: speed of the current, m/s; each game draws its direction, of which no shield is told.
 
     Raises:
         ConfigError: a value that is not finite, negative or beyond `MOST`.
@@ -52,7 +52,11 @@ class Conditions:
 
     def shield_settings(self, dt_s: float) -> dict[str, float]:
         """What a shield is told of them, as settings; nothing where there is nothing to tell."""
-        told = {"delay_s": self.delay_steps(dt_s) * dt_s, "position_error_m": self.noise_m}
+        told = {
+            "delay_s": self.delay_steps(dt_s) * dt_s,
+            "position_error_m": self.noise_m,
+            "current_mps": self.current_mps,
+        }
         return {name: value for name, value in told.items() if value > 0.0}
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
+from steerclear.shield import Shield, ShieldConfig
 
 from . import oracle
 from .match import play_match
@@ -44,7 +44,7 @@ def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
 def compile_part(part: WarmUp) -> None:
     """Compile one part."""
     if part.shield is not None:
-        compile_shield(part.shield)
+        Shield(ShieldConfig.of(**part.shield)).warm_up()
     if part.game is not None:
         play_match(part.game)
     if part.judge:
@@ -57,20 +57,6 @@ def compile_oracle() -> None:
     states = np.zeros((40, 2, oracle.N_STATE))
     states[:, 0, 1], states[:, 0, 3], states[:, 1, 1] = 0.2 * np.arange(40), 2.0, 5.0
     oracle.judge(states, [boat, boat], own=0, step=13, radius_m=2.5)
-
-
-def compile_shield(settings: dict[str, Any]) -> None:
-    """Let a shield decide in a tight spot, so that every stage runs once."""
-    shield = Shield(ShieldConfig.of(**settings))
-    fleet = Fleet.of(
-        position_m=[[0.0, 0.0], [0.0, 6.0], [3.0, 3.0]],
-        heading_rad=[0.0, np.pi, -np.pi / 2],
-        speed_mps=[1.5, 1.5, 1.5],
-        team=[0, 0, 1],
-        platforms="heron",
-    )
-    around = Surroundings(field=(-5.0, -5.0, 5.0, 8.0), keep_out=((0.0, -4.0, 1.0),))
-    shield.decide(fleet, Commands.relative_deg(np.array([[2.0, 0.0]] * 3)), around)
 
 
 def _short(spec: MatchSpec) -> MatchSpec:

@@ -51,7 +51,7 @@ def decide_games(
     """
     n = state.shape[1]
     circles = fixed.circles.copy()
-    standing = Fixed(fixed.field, fixed.keep_out, circles, fixed.segments, fixed.segment_m)
+    standing = Fixed(fixed.field, fixed.keep_out, circles, fixed.segments, fixed.segment_m, fixed.current_mps)
     first = circles.shape[0] - lifted.shape[1]
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):

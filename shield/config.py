@@ -39,6 +39,8 @@ class ShieldConfig:
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
         position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
             what is kept from the edge, obstacles and circles.
+        current_mps: bound on the speed of a current or of drift by wind, m/s, whose direction is not known; widens what
+            is kept from the edge, obstacles and circles, the more the later. Boats near each other drift alike.
         track_error_mps: growth of a neighbour's position error with the age of its track, m/s.
         max_track_age_s: tracks older than this are refused, s.
         delay_s: time from decision to effect, s: boats are run on by it before deciding.
@@ -66,6 +68,7 @@ class ShieldConfig:
     hysteresis_m: float = 0.3
     speed_weight: float = 0.1
     position_error_m: float = 0.0
+    current_mps: float = 0.0
     track_error_mps: float = 0.5
     max_track_age_s: float = 2.0
     delay_s: float = 0.0

@@ -77,6 +77,7 @@ class Fixed(NamedTuple):
         circles: (c, 3) the same of obstacles.
         segments: (s, 4): ends x0, y0, x1, y1, m.
         segment_m: distance to keep from segments, m.
+        current_mps: bound on the speed of a current whose direction is not known, m/s.
     """
 
     field: Array
@@ -84,6 +85,7 @@ class Fixed(NamedTuple):
     circles: Array
     segments: Array
     segment_m: float
+    current_mps: float
 
 
 class Tuning(NamedTuple):

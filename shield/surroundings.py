@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .certificates.fixed_things import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
 from .jit import Array
@@ -61,10 +62,12 @@ class Surroundings:
     def pack(self, config: ShieldConfig) -> Fixed:
         """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
 
+        That is also how far a current carries it until a command has acted, and a little longer.
+
         Raises:
             ConfigError: nothing of the field is left.
         """
-        off_m = config.position_error_m
+        off_m = _off_m(config)
         circles = [(x, y, r + config.hull_m + off_m) for x, y, r in self.circles]
         circles += [(x, y, r + off_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
@@ -74,20 +77,26 @@ class Surroundings:
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
             segment_m=config.hull_m + off_m,
+            current_mps=float(config.current_mps),
         )
 
     def _edge(self, config: ShieldConfig) -> Array:
         """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""
         if self.field is None or config.edge_m is None:
             return np.array([-np.inf, -np.inf, np.inf, np.inf])
-        inside_m = config.edge_m + config.position_error_m
+        inside_m = config.edge_m + _off_m(config)
         edge = np.array(self.field, np.float64) + inside_m * np.array([1.0, 1.0, -1.0, -1.0])
         if not (edge[0] < edge[2] and edge[1] < edge[3]):
             raise ConfigError(
                 f"field {self.field} is too small to keep {inside_m:g} m inside its edge; give a larger field, "
-                "a smaller edge_m or position_error_m, or edge_m None to leave the edge to the policy"
+                "a smaller edge_m, position_error_m or current_mps, or edge_m None to leave the edge to the policy"
             )
         return edge
+
+
+def _off_m(config: ShieldConfig) -> float:
+    """How far off a boat may be a step on, m, with room to turn about; what drifts later is added to paths."""
+    return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
 
 
 def _numbers(name: str, row: Sequence[float], form: str) -> tuple[float, ...]:

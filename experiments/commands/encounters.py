@@ -34,7 +34,7 @@ GuardNames = Annotated[
 Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.")]
 Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]
 Noise = Annotated[float, typer.Option(metavar="M", help="Bound on the error of positions seen, m.")]
-Current = Annotated[float, typer.Option(metavar="M/S", help="Speed of a current that the guard is not told of.")]
+Current = Annotated[float, typer.Option(metavar="M/S", help="Speed of a current; the guard is told it, not where to.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
 NoJudge = Annotated[bool, typer.Option("--no-judge", help="Do not ask the oracle about breaches.")]
 SceneFiles = Annotated[

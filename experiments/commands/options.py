@@ -49,7 +49,7 @@ Noise = Annotated[
 ]
 Current = Annotated[
     float,
-    typer.Option(metavar="M/S", help="Speed of a current on all boats; the shield is not told of it."),
+    typer.Option(metavar="M/S", help="Speed of a current on all boats; the shield is told it, not where to."),
 ]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]

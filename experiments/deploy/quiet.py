@@ -9,12 +9,12 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from steerclear.experiments.warming import compile_shield
+from steerclear.shield import Shield
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import fresh_state, step_boat
@@ -32,7 +32,7 @@ SWITCH_S = 0.0001
 
 def warm_up(fleet: FleetFile) -> None:
     """Compile all that the loop runs, so that its first turn is as quick as any."""
-    compile_shield(asdict(fleet.shield_config))
+    Shield(fleet.shield_config).warm_up()
     for platform in set(fleet.platform_of.values()):
         step_boat(platform.pack(), fresh_state(0.0, 0.0, 0.0), 1.0, 0.0, fleet.dt_s)
 

@@ -17,7 +17,13 @@ from steerclear.shield.surroundings import OPEN_WATER, Surroundings
 from .scenes import DT_S, Conditions, Scenes
 
 NONE, SHIELD, REACH = "none", "shield", "reach"
-GIVEN = {"separation_m": "--radius", "position_error_m": "--noise", "delay_s": "--delay", "dt_s": "no option"}
+GIVEN = {
+    "separation_m": "--radius",
+    "position_error_m": "--noise",
+    "delay_s": "--delay",
+    "current_mps": "--current",
+    "dt_s": "no option",
+}
 """Settings that the conditions of a run decide."""
 
 
@@ -120,7 +126,7 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
     Args:
         guard: a name, or what makes one.
         scenes: games, fleet and field.
-        conditions: become settings: radius, position error, delay.
+        conditions: become settings: radius, position error, delay, speed of the current.
 
     Raises:
         ConfigError: an unknown name, or a guard that cannot honour the conditions.
@@ -132,6 +138,7 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
         separation_m=conditions.radius_m,
         position_error_m=conditions.noise_m,
         delay_s=conditions.delay_s,
+        current_mps=conditions.current_mps,
         dt_s=DT_S,
         **settings,
     )

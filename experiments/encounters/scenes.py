@@ -26,7 +26,7 @@ class Conditions:
         radius_m: separation to keep, m.
         delay_s: time from a command of an own boat to its effect, s.
         noise_m: bound on the error of every position that the own team sees, m.
-        current_mps: speed of the current, m/s; each encounter draws its direction. The guard is not told of it.
+        current_mps: speed of the current, m/s; each encounter draws its direction, of which no guard is told.
 
     Raises:
         ConfigError: a value that is not finite, negative or beyond `MOST`.

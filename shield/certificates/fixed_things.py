@@ -6,17 +6,32 @@ before what hunters may do. Later ones leave time for another manoeuvre, and cou
 
 from __future__ import annotations
 
+import math
+
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Work
 from .clearance import MARGIN
 from .surroundings import clear_of_obstacles, clear_of_rules, first_touch
 
+LEAVE_S = 0.5
+"""Time constant with which a boat too near to an obstacle has to come away from it, s."""
+
 
 @lean_kernel
 def way_per_sample(i: int, state: Array, boats: Boats) -> float:
-    """Most boat i moves from sample to sample of a path, m."""
+    """Most boat i moves through the water from sample to sample of a path, m."""
     return max(boats.fastest_mps[i], state[i, L.SPEED]) * boats.sample_s
+
+
+@lean_kernel
+def grace(boats: Boats, fixed: Fixed) -> float:
+    """Factor per sample on what a boat too near to an obstacle is excused.
+
+    Where there may be a current that is less than 1: asked only to come no nearer than it is, a boat would be carried
+    in a little in every step.
+    """
+    return math.exp(-boats.sample_s / LEAVE_S) if fixed.current_mps > 0.0 else 1.0
 
 
 @lean_kernel
@@ -26,8 +41,20 @@ def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, 
     ``work.spare2`` is overwritten.
     """
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
-    clear_of_rules(path, boats.static_samples[i], last, fixed.field, fixed.keep_out, way_m, out)
-    clear_of_obstacles(state[i], path, last, way_m, fixed.circles, fixed.segments, fixed.segment_m, work.spare2)
+    drift_m = fixed.current_mps * boats.sample_s
+    clear_of_rules(path, boats.static_samples[i], last, fixed.field, fixed.keep_out, way_m, drift_m, out)
+    clear_of_obstacles(
+        state[i],
+        path,
+        last,
+        way_m,
+        drift_m,
+        grace(boats, fixed),
+        fixed.circles,
+        fixed.segments,
+        fixed.segment_m,
+        work.spare2,
+    )
     if work.spare2[MARGIN] < out[MARGIN]:
         copy_row(out, work.spare2)
 
@@ -42,6 +69,8 @@ def clear_of_near_obstacles(
         work.path[slot],
         boats.static_samples[i],
         way_per_sample(i, state, boats),
+        fixed.current_mps * boats.sample_s,
+        grace(boats, fixed),
         fixed.circles,
         fixed.segments,
         fixed.segment_m,
@@ -54,5 +83,9 @@ def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fix
     """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
     last = boats.static_samples[i]
     way_m = way_per_sample(i, state, boats)
-    first = first_touch(state[i], work.path[slot], last, way_m, fixed.circles, fixed.segments, fixed.segment_m)
+    drift_m = fixed.current_mps * boats.sample_s
+    path = work.path[slot]
+    first = first_touch(
+        state[i], path, last, way_m, drift_m, grace(boats, fixed), fixed.circles, fixed.segments, fixed.segment_m
+    )
     return first / (last + 1.0)

@@ -1,7 +1,8 @@
 """Things that do not move: obstacles, which stop a boat, and field edge and keep-out circles, which are rules.
 
 Samples of a path that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times
-the way the boat goes from sample to sample.
+the way the boat goes from sample to sample, its drift included. What a current of unknown direction may do to a boat is
+a distance that grows with time: a clearance that is to hold is that much larger.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ def _lower(out: Array, margin: float, k: int, nx: float, ny: float) -> None:
 
 
 @lean_kernel
-def _edges(x: float, y: float, k: int, field: Array, out: Array) -> None:
-    """Distance inside a rectangle (xmin, ymin, xmax, ymax); infinite sides are none."""
-    _lower(out, x - field[0], k, 1.0, 0.0)
-    _lower(out, y - field[1], k, 0.0, 1.0)
-    _lower(out, field[2] - x, k, -1.0, 0.0)
-    _lower(out, field[3] - y, k, 0.0, -1.0)
+def _edges(x: float, y: float, k: int, drift_m: float, field: Array, out: Array) -> None:
+    """Distance inside a rectangle (xmin, ymin, xmax, ymax), less k drifts; infinite sides are none."""
+    off = k * drift_m
+    _lower(out, x - field[0] - off, k, 1.0, 0.0)
+    _lower(out, y - field[1] - off, k, 0.0, 1.0)
+    _lower(out, field[2] - x - off, k, -1.0, 0.0)
+    _lower(out, field[3] - y - off, k, 0.0, -1.0)
 
 
 @lean_kernel
@@ -64,7 +66,14 @@ def _to_obstacle(
 
 @lean_kernel
 def clear_of_rules(
-    path: Array, near_samples: int, samples: int, field: Array, keep_out: Array, way_m: float, out: Array
+    path: Array,
+    near_samples: int,
+    samples: int,
+    field: Array,
+    keep_out: Array,
+    way_m: float,
+    drift_m: float,
+    out: Array,
 ) -> None:
     """Least clearance, m, of a path from the field edge and from circles kept by rule.
 
@@ -76,33 +85,47 @@ def clear_of_rules(
         samples: last sample.
         field: (xmin, ymin, xmax, ymax), m.
         keep_out: shape (k, 3): centre x, y and radius, m.
-        way_m: most the boat moves from sample to sample, m.
+        way_m: most the boat moves through the water from sample to sample, m.
+        drift_m: most a current carries it meanwhile, m.
         out: clearance row.
     """
     out[MARGIN] = FAR
     for k in range(near_samples + 1):
-        _edges(path[k, 0], path[k, 1], k, field, out)
+        _edges(path[k, 0], path[k, 1], k, drift_m, field, out)
     for c in range(keep_out.shape[0]):
         k = 0
         while k <= samples:
             margin, nx, ny = _to_circle(path[k, 0], path[k, 1], keep_out[c])
+            margin -= k * drift_m
             _lower(out, margin, k, nx, ny)
-            k += max(1, int((margin - out[MARGIN]) / way_m))
+            k += max(1, int((margin - out[MARGIN]) / (way_m + drift_m)))
 
 
 @lean_kernel
 def clear_of_obstacles(
-    here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float, out: Array
+    here: Array,
+    path: Array,
+    samples: int,
+    way_m: float,
+    drift_m: float,
+    grace: float,
+    circles: Array,
+    segments: Array,
+    hull_m: float,
+    out: Array,
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
 
-    A boat that is already too near to one only has to come no nearer: its clearance there counts from where it is.
+    A boat that is already too near to one has to come no nearer: its clearance there counts from where it is. With
+    ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
 
     Args:
         here: where the boat is now, m, shape (>= 2,).
         path: positions from the next step on, m, shape (>= samples + 1, 2).
         samples: last sample.
-        way_m: most the boat moves from sample to sample, m.
+        way_m: most the boat moves through the water from sample to sample, m.
+        drift_m: most a current carries it meanwhile, m.
+        grace: factor per sample on what is excused.
         circles: shape (c, 3): centre x, y and radius, m.
         segments: shape (s, 4): ends x0, y0, x1, y1, m.
         hull_m: distance the boat's centre keeps from segments, m.
@@ -111,26 +134,37 @@ def clear_of_obstacles(
     out[MARGIN] = FAR
     for o in range(circles.shape[0] + segments.shape[0]):
         excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        fall_m = way_m + drift_m - excused * (1.0 - grace)
         k = 0
         while k <= samples:
             margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)
-            margin -= excused
+            margin -= excused * grace**k + k * drift_m
             _lower(out, margin, k, nx, ny)
-            k += max(1, int((margin - out[MARGIN]) / way_m))
+            k += max(1, int((margin - out[MARGIN]) / fall_m))
 
 
 @lean_kernel
 def first_touch(
-    here: Array, path: Array, samples: int, way_m: float, circles: Array, segments: Array, hull_m: float
+    here: Array,
+    path: Array,
+    samples: int,
+    way_m: float,
+    drift_m: float,
+    grace: float,
+    circles: Array,
+    segments: Array,
+    hull_m: float,
 ) -> int:
     """First sample of a path that is too near to an obstacle, ``samples + 1`` for none; arguments as above."""
     first = samples + 1
     for o in range(circles.shape[0] + segments.shape[0]):
         excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        fall_m = way_m + drift_m - excused * (1.0 - grace)
         k = 0
         while k < first:
-            margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0] - excused
+            margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0]
+            margin -= excused * grace**k + k * drift_m
             if margin < 0.0:
                 first = k
-            k += max(1, int(margin / way_m))
+            k += max(1, int(margin / fall_m))
     return first

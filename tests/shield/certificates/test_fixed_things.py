@@ -28,27 +28,26 @@ def distances_to(path, wall):
     return np.linalg.norm(path - start - parts[:, None] * way, axis=1)
 
 
-def excused(margins):
-    return (margins - min(0.0, margins[0])).min()
-
-
 @settings(max_examples=150, deadline=None)
-@given(wandering_paths(), st.integers(0, 10_000))
-def test_no_sample_that_counts_is_skipped(path, seed):
+@given(wandering_paths(), st.integers(0, 10_000), st.sampled_from([(0.0, 1.0), (0.06, 0.6), (0.5, 0.9)]))
+def test_no_sample_that_counts_is_skipped(path, seed, current):
+    drift_m, grace = current
     random = np.random.default_rng(seed)
     circles = np.column_stack([random.uniform(-20, 20, (3, 2)), random.uniform(0.0, 8.0, 3)])
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
     out = np.zeros(N_CLEARANCE)
-    clear_of_obstacles(path[0], path, last, 1.0, circles, walls, 0.7, out)
+    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, circles, walls, 0.7, out)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     margins += [distances_to(path, wall) - 0.7 for wall in walls]
-    assert out[MARGIN] == pytest.approx(min(excused(each) for each in margins), abs=1e-9)
-    touched = np.any([each - min(0.0, each[0]) < 0.0 for each in margins], axis=0)
+    drift = drift_m * np.arange(last + 1)  # no less than any current of that speed can do
+    left = [each - min(0.0, each[0]) * grace ** np.arange(last + 1) - drift for each in margins]
+    assert out[MARGIN] == pytest.approx(min(each.min() for each in left), abs=1e-9)
+    touched = np.any([each < 0.0 for each in left], axis=0)
     first = np.argmax(touched) if touched.any() else last + 1
-    assert first_touch(path[0], path, last, 1.0, circles, walls, 0.7) == first
-    clear_of_rules(path, last, last, NO_EDGE, circles, 1.0, out)
-    assert out[MARGIN] == pytest.approx(min(each.min() for each in margins[:3]), abs=1e-9)
+    assert first_touch(path[0], path, last, 1.0, drift_m, grace, circles, walls, 0.7) == first
+    clear_of_rules(path, last, last, NO_EDGE, circles, 1.0, drift_m, out)
+    assert out[MARGIN] == pytest.approx(min((each - drift).min() for each in margins[:3]), abs=1e-9)
     at = path[int(out[SAMPLE])]
     nearest = min(circles, key=lambda circle: np.linalg.norm(at - circle[:2]) - circle[2])
     away = (at - nearest[:2]) / np.linalg.norm(at - nearest[:2])
@@ -58,31 +57,33 @@ def test_no_sample_that_counts_is_skipped(path, seed):
 def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
     out, circle = np.zeros(N_CLEARANCE), np.array([[0.0, 0.0, 5.0]])
     outwards = np.column_stack([np.linspace(4.0, 9.0, 20), np.zeros(20)])
-    clear_of_obstacles(outwards[0], outwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(outwards[0], outwards, 19, 1.0, 0.0, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == 0.0
-    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, 0.0, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == 0.0
     inwards = np.column_stack([np.linspace(4.0, 1.0, 20), np.zeros(20)])
-    clear_of_obstacles(inwards[0], inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(inwards[0], inwards, 19, 1.0, 0.0, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == pytest.approx(-3.0)
-    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, circle, NO_WALL, 0.0, out)
+    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, 0.0, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == pytest.approx(-4.0)  # outside so far: there is nothing to excuse
 
 
 def test_the_edge_counts_only_as_long_as_it_is_looked_at():
     path = np.column_stack([np.zeros(20), np.arange(20.0)])
     out, field = np.zeros(N_CLEARANCE), np.array([-50.0, -50.0, 50.0, 10.0])
-    clear_of_rules(path, 5, 19, field, NONE, 1.0, out)
+    clear_of_rules(path, 5, 19, field, NONE, 1.0, 0.0, out)
     assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
-    clear_of_rules(path, 19, 19, field, NONE, 1.0, out)
+    clear_of_rules(path, 19, 19, field, NONE, 1.0, 0.0, out)
     assert out[MARGIN] == -9.0
+    clear_of_rules(path, 5, 19, field, NONE, 1.0, 0.5, out)
+    assert (out[MARGIN], out[SAMPLE]) == (2.5, 5.0)
 
 
 def test_nothing_there_is_far_away():
     out = np.zeros(N_CLEARANCE)
     path = np.zeros((5, 2))
-    clear_of_obstacles(path[0], path, 4, 1.0, NONE, NO_WALL, 1.0, out)
+    clear_of_obstacles(path[0], path, 4, 1.0, 0.3, 1.0, NONE, NO_WALL, 1.0, out)
     assert out[MARGIN] == FAR
-    clear_of_rules(path, 4, 4, np.array([-1e9, -1e9, 1e9, 1e9]), NONE, 1.0, out)
+    clear_of_rules(path, 4, 4, np.array([-1e9, -1e9, 1e9, 1e9]), NONE, 1.0, 0.3, out)
     assert out[MARGIN] == FAR
-    assert first_touch(path[0], path, 4, 1.0, NONE, NO_WALL, 1.0) == 5
+    assert first_touch(path[0], path, 4, 1.0, 0.3, 1.0, NONE, NO_WALL, 1.0) == 5

@@ -1,0 +1,61 @@
+"""Everything is compiled before the first decision, and nothing is remembered of it."""
+
+import math
+
+import numpy as np
+import pytest
+from steerclear.shield import Commands, Fleet, Reason, Shield, shield, warming
+from steerclear.shield.exceptions import PlatformError
+
+
+def head_on(platform="heron", speed_mps=2.0):
+    fleet = Fleet.of(
+        position_m=[[0, 0], [0, 5.5]],
+        heading_rad=[0, math.pi],
+        speed_mps=[speed_mps] * 2,
+        team=[0, 1],
+        platforms=platform,
+    )
+    return fleet, Commands.relative_deg(np.array([[speed_mps, 0.0]] * 2))
+
+
+def test_what_is_run_needs_every_stage(monkeypatch):
+    seen = []
+    for name in ("begin", "build", "solve", "take_answer", "check", "finish"):
+        stage = getattr(shield, name)
+        monkeypatch.setattr(
+            shield, name, lambda *values, name=name, stage=stage: (seen.append(name), stage(*values))[1]
+        )
+    fleet, wanted, around = warming.tight_spot()
+    decisions = Shield().decide(fleet, wanted, around)
+    assert set(seen) == {"begin", "build", "solve", "take_answer", "check", "finish"}
+    assert {Reason(reason) for reason in decisions.reason} & {Reason.ESCAPE, Reason.BEST_EFFORT, Reason.QP_RELAXED}
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_decisions_are_the_same_with_and_without(coordination):
+    told = []
+    for warm in (False, True):
+        guard = Shield(coordination=coordination, delay_s=0.2)
+        fleet, wanted = head_on()
+        before = [guard.decide(fleet, wanted).sent.values]
+        if warm:
+            guard.warm_up(fleet)
+        before += [guard.decide(fleet, wanted).sent.values for _ in range(3)]
+        told.append(np.array(before))
+    np.testing.assert_array_equal(*told)
+
+
+def test_a_fleets_tables_are_read(monkeypatch):
+    read = []
+    boats_of = shield.boats_of
+    monkeypatch.setattr(shield, "boats_of", lambda *values: (read.append(values[1]), boats_of(*values))[1])
+    fleet, _ = head_on("surveyor", 3.0)
+    Shield().warm_up(fleet)
+    assert fleet.platforms in read
+
+
+def test_a_fleet_of_unknown_boats_is_refused():
+    fleet, _ = head_on("raft")
+    with pytest.raises(PlatformError, match="raft"):
+        Shield().warm_up(fleet)
