@@ -152,7 +152,7 @@ def _pair_row(
     clear_of_boat(i, j, work.path[i], state, ours, boats, tuning, work, -FAR, FAR)
     if hunts(i, j, ours, boats) and not work.breach[i, j] and not looked_up(i, j, i, ours, boats, work):
         copy_row(work.spare2, work.out)
-        clear_of_hunter(i, j, work.path[i], state, boats, tuning, work, -FAR, tuning.margin_cap_m)
+        clear_of_hunter(i, j, i, state, ours, boats, tuning, work, -FAR, tuning.margin_cap_m)
         if work.out[MARGIN] > work.spare2[MARGIN]:
             copy_row(work.out, work.spare2)
     k, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]

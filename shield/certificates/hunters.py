@@ -7,9 +7,10 @@ import math
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Tuning, Work
-from .clearance import FAR, MARGIN
+from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from .paths import READY_SAMPLE
 from .pursuer import clear_of_pursuer
-from .values import looked_up, margin_at_once, margin_later
+from .values import looked_up, margin_at_once, margin_later, margin_when_ready, tabled
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
@@ -37,19 +38,24 @@ def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float
 def clear_of_hunter(
     i: int,
     j: int,
-    path: Array,
+    slot: int,
     state: Array,
+    ours: BoolArray,
     boats: Boats,
     tuning: Tuning,
     work: Work,
     floor_m: float,
     cap_m: float,
 ) -> None:
-    """Clearance of boat i on ``path`` from opponent j using the turn and thrust granted to it against the boat.
+    """Clearance of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
     The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently. The one that
-    came below its floor last is looked at first.
+    came below its floor last is looked at first. Where a table is for the pair they are followed until the boat's
+    thrust is full; what they can do from there on the table tells.
     """
+    path, ready = work.path[slot], work.ready[slot]
+    till_ready = ready[READY_SAMPLE] >= 0.0 and tabled(i, j, ours, boats, work)
+    samples = min(boats.hunt_samples[i], int(ready[READY_SAMPLE])) if till_ready else boats.hunt_samples[i]
     sample_s = boats.sample_s
     speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
     course = work.course[j]
@@ -60,7 +66,7 @@ def clear_of_hunter(
     for turn_to in range(manners):
         manner = _first_then_rest(first, turn_to)
         share = RUDDERS[manner // 2]
-        clear_of_pursuer(
+        weight = clear_of_pursuer(
             path,
             course[0],
             course[1],
@@ -75,19 +81,39 @@ def clear_of_hunter(
             manner % 2 == 1,
             LEAD_SHARE * boats.hunt_samples[i],
             sample_s,
-            boats.hunt_samples[i],
+            samples,
             closing(i, j, state, boats, tuning),
             work.radius[i, j],
             boats.fade[i],
             floor_m,
             cap_m,
+            till_ready,
+            work.hunter,
             work.spare,
         )
+        if till_ready and work.spare[MARGIN] >= floor_m:
+            _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
             copy_row(work.out, work.spare)
             if work.out[MARGIN] < floor_m:
                 work.first_manner[i, j] = manner
                 return
+
+
+@lean_kernel
+def _look_up_end(i: int, j: int, slot: int, weight: float, boats: Boats, work: Work) -> None:
+    """Lower the clearance in ``work.spare`` to the value where the boat's thrust is full and the hunter's run ends."""
+    path, ready, hunter = work.path[slot], work.ready[slot], work.hunter
+    margin = margin_when_ready(i, j, path, ready, hunter[0], hunter[1], hunter[2], hunter[3], hunter[4], boats, work)
+    if margin < 0.0:
+        margin *= weight
+    if margin < work.spare[MARGIN]:
+        k = int(ready[READY_SAMPLE])
+        dx, dy = path[k, 0] - hunter[0], path[k, 1] - hunter[1]
+        distance = math.sqrt(dx * dx + dy * dy)
+        work.spare[MARGIN], work.spare[SAMPLE] = margin, k
+        if distance > 1e-9:
+            work.spare[NORMAL_X], work.spare[NORMAL_Y] = dx / distance, dy / distance
 
 
 @lean_kernel
@@ -141,7 +167,7 @@ def worst_hunter(
                 sealed = margin == at_once and margin < work.target[i]
         else:
             # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-            clear_of_hunter(i, j, work.path[slot], state, boats, tuning, work, floor_m, tuning.margin_cap_m)
+            clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
             if work.out[MARGIN] < clear[MARGIN]:
                 copy_row(clear, work.out)
                 work.bound[slot] = j

@@ -6,20 +6,26 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..scene import Boats, Tuning, Work
 from .manoeuvre import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
 from .paths import trace_path
-from .values import looked_up, set_place, worst_by_tables
+from .values import looked_up, set_place, tabled, worst_by_tables
+
+NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
+"""How far hunters are run through: not at all, until thrust is full and tables answer, or to the end."""
 
 
 @lean_kernel
-def runs_hunters(i: int, slot: int, boats: Boats, work: Work) -> bool:
-    """Whether some opponent near boat i is to be run through as a hunter, which takes the long path."""
+def hunters_run(i: int, slot: int, boats: Boats, work: Work) -> int:
+    """How far opponents near boat i are to be run through as hunters, which takes a longer path."""
     if not work.hunted[i] or boats.look[i] == 0:
-        return work.hunted[i]
+        return HUNTERS if work.hunted[i] else NO_HUNTERS
+    how = NO_HUNTERS
     for j in range(work.near.shape[0]):
-        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j]:
+        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j] or boats.granted_turn_dps[j] == 0.0:
             continue
-        if boats.granted_turn_dps[j] > 0.0 and not looked_up(i, j, slot, work.nobody, boats, work):
-            return True
-    return False
+        if not tabled(i, j, work.nobody, boats, work):
+            return HUNTERS
+        if not looked_up(i, j, slot, work.nobody, boats, work):
+            how = HUNTERS_TILL_READY
+    return how
 
 
 @lean_kernel
@@ -50,11 +56,26 @@ def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> 
 @lean_kernel
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
-    samples = boats.hunt_samples[i] if runs_hunters(i, slot, boats, work) else boats.samples[i]
+    how = hunters_run(i, slot, boats, work)
+    samples = boats.samples[i] if how == NO_HUNTERS else boats.hunt_samples[i]
+    least = boats.samples[i] if how == HUNTERS_TILL_READY else samples
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
-    path = work.path[slot]
-    trace_path(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s, done, boats.stride, samples, path)
+    trace_path(
+        boats.params[i],
+        work.row,
+        side,
+        togo_deg,
+        speed_mps,
+        tuning.dt_s,
+        done,
+        boats.stride,
+        samples,
+        least,
+        0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride,
+        work.path[slot],
+        work.ready[slot],
+    )
 
 
 @lean_kernel

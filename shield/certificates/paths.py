@@ -18,6 +18,12 @@ from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 SAG_M = 0.022
 """Most a straight line between two samples may cut off the arc sailed between them, m."""
 
+FULL_THRUST = 0.9
+"""Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
+
+READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
+"""What is noted of a path where its thrust is full at last: sample (-1: never), heading rad, speed m/s."""
+
 STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
 
@@ -46,6 +52,15 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 
 @lean_kernel
+def _note_ready(
+    params: Array, k: int, earliest: int, thrust: float, heading_rad: float, speed_mps: float, ready: Array
+) -> None:
+    """Note the first sample, from the earliest that counts, at which thrust is full."""
+    if ready[READY_SAMPLE] < 0.0 and k >= earliest and thrust >= FULL_THRUST * params[L.MAX_THRUST]:
+        ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, heading_rad, speed_mps
+
+
+@lean_kernel
 def trace_path(
     params: Array,
     row: Array,
@@ -56,7 +71,10 @@ def trace_path(
     done: int,
     stride: int,
     samples: int,
+    least: int,
+    earliest: int,
     path: Array,
+    ready: Array,
 ) -> None:
     """Fill ``path[: samples + 1]`` with positions, m, along an escape manoeuvre.
 
@@ -70,21 +88,27 @@ def trace_path(
         done: 1 when ``row`` is the state one step from now, 0 when it is the present one.
         stride: model steps between samples.
         samples: number of samples after sample 0.
+        least: number of them after which the path may end where thrust is full.
+        earliest: first sample at which that counts.
         path: shape (>= samples + 1, 2), float64.
+        ready: shape (3,), where thrust is full first, see `READY_SAMPLE`.
     """
+    ready[READY_SAMPLE] = -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
-        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, path)
+        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, least, earliest, path, ready)
         return
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
     path[0, 0], path[0, 1] = row[L.X], row[L.Y]
+    _note_ready(params, 0, earliest, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
     k = 1
     step = 0
-    while k <= samples:
+    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0):
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
         if step % stride == 0:
             path[k, 0], path[k, 1] = row[L.X], row[L.Y]
+            _note_ready(params, k, earliest, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
             k += 1
 
 
@@ -99,7 +123,10 @@ def _trace_usv(
     done: int,
     stride: int,
     samples: int,
+    least: int,
+    earliest: int,
     path: Array,
+    ready: Array,
 ) -> None:
     """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
 
@@ -117,8 +144,9 @@ def _trace_usv(
     k, step = 0, done - 1
     if done == 1:
         path[0, 0], path[0, 1] = x, y
+        _note_ready(params, 0, earliest, thrust, heading, v, ready)
         k, step = 1, 0
-    while k <= samples:
+    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0
@@ -146,6 +174,8 @@ def _trace_usv(
         step += 1
         if step % stride == 0:
             path[k, 0], path[k, 1] = x, y
+            if ready[READY_SAMPLE] < 0.0:
+                _note_ready(params, k, earliest, thrust, math.atan2(ux, uy), v, ready)
             k += 1
         if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and k > 0:
             _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, samples, path)

@@ -99,8 +99,10 @@ def clear_of_pursuer(
     fade: float,
     floor_m: float,
     cap_m: float,
+    to_end: bool,
+    end: Array,
     out: Array,
-) -> None:
+) -> float:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
 
     Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
@@ -127,7 +129,12 @@ def clear_of_pursuer(
         fade: factor of negative margins per sample, 0 to 1.
         floor_m: margin below which the search stops, m.
         cap_m: margin above which nothing is looked at closely, m.
+        to_end: follow it to the last sample also when it comes near no more.
+        end: where it is then, shape (5,): x, y, m, heading as a unit vector, speed m/s.
         out: the result row.
+
+    Returns:
+        The factor that negative margins have faded by at the end.
     """
     root = radius_m + cap_m
     fastest_mps = max(top_speed_mps, speed_mps)
@@ -143,9 +150,9 @@ def clear_of_pursuer(
         square = x0 * x0 + y0 * y0
         if square > worth:
             stride = int((math.sqrt(square) - root) / closing_m)
-            if stride >= samples - k:
+            if stride >= samples - k and not to_end:
                 break
-            stride = min(stride, LONGEST_STRIDE)
+            stride = min(stride, LONGEST_STRIDE, samples - k)
         c, s = c1, s1
         for _ in range(stride - 1):
             c, s = c * c1 - s * s1, s * c1 + c * s1
@@ -180,5 +187,7 @@ def clear_of_pursuer(
             weight *= fade
         worst = _note_faded(out, worst, weight, radius_m, x0, y0, x1, y1, k, stride)
         if worst < floor_m:
-            return
+            return weight
         x0, y0 = x1, y1
+    end[0], end[1], end[2], end[3], end[4] = x, y, ux, uy, speed_mps
+    return weight

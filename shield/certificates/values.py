@@ -20,13 +20,10 @@ from ..scene import Boats, Tuning, Work
 from ..tables.grid import CAP
 from ..tables.lookup import Gradient, table_gradient, table_value
 from .clearance import FAR
-from .paths import sail
+from .paths import FULL_THRUST, READY_HEADING, READY_SAMPLE, READY_SPEED, sail
 
 WAYS = 3
 """Ways an opponent may move: straight on, hard to port, hard to starboard."""
-
-FULL_THRUST = 0.9
-"""Share of its full thrust from which a boat can do what the table says: the table is for full thrust."""
 
 ROOM_M = 0.5
 """A table is looked into when it tells distances at least this much beyond the radius, m."""
@@ -120,12 +117,49 @@ def set_place(
 
 
 @lean_kernel
-def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
-    """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
+def tabled(i: int, j: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
+    """Whether a table is for boat i and opponent j, and tells enough of them."""
     table = boats.table[i, j]
-    if table < 0 or ours[j] or work.breach[i, j] or work.place[slot, PLACE_USABLE] == 0.0:
+    if table < 0 or ours[j] or work.breach[i, j]:
         return False
     return work.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
+
+
+@lean_kernel
+def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
+    """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
+    return work.place[slot, PLACE_USABLE] != 0.0 and tabled(i, j, ours, boats, work)
+
+
+@lean_kernel
+def margin_when_ready(
+    i: int,
+    j: int,
+    path: Array,
+    ready: Array,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    speed_mps: float,
+    boats: Boats,
+    work: Work,
+) -> float:
+    """Margin, m, of boat i where its thrust is full at last, opponent j being at (x, y) heading (ux, uy) then."""
+    table, k = boats.table[i, j], int(ready[READY_SAMPLE])
+    value = table_value(
+        boats.tables,
+        table,
+        x - path[k, 0],
+        y - path[k, 1],
+        ready[READY_HEADING],
+        math.atan2(ux, uy),
+        ready[READY_SPEED],
+        speed_mps,
+    )
+    if value >= boats.tables.axes[table, CAP] - 1e-9:
+        return FAR
+    return value - work.radius[i, j] - boats.table_margin_m
 
 
 @lean_kernel

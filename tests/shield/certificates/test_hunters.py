@@ -58,7 +58,7 @@ def modelled(name, own, hunter, side, turn_deg):
     look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
     top = get_platform(name).max_speed_mps
     lay_path(0, 0, side, turn_deg, top, 0, at.state, at.boats, at.tuning, at.work)
-    clear_of_hunter(0, 1, at.work.path[0], at.state, at.boats, at.tuning, at.work, -1e6, 50.0)
+    clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
     return at.work.out[MARGIN], int(at.boats.hunt_samples[0]) * at.boats.stride
 
 
