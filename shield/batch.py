@@ -70,6 +70,7 @@ def decide_games(
             memory.target_deg[b],
             memory.speed_mps[b],
             memory.margin_m[b],
+            memory.threat_m[b],
             memory.escaping[b],
         )
         decide_compiled(ahead, asked, margin_m, ours[b], boats, standing, plans, tuning, own, work, plan)

@@ -47,6 +47,7 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
             )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
+        memory.threat_m[i] = work.threat[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
 
 

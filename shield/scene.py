@@ -119,6 +119,7 @@ class Memory(NamedTuple):
         target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
+        threat_m: the same against hunting opponents alone.
         escaping: whether the boat was carrying it out at the last decision.
     """
 
@@ -127,6 +128,7 @@ class Memory(NamedTuple):
     target_deg: Array
     speed_mps: Array
     margin_m: Array
+    threat_m: Array
     escaping: BoolArray
 
 
@@ -142,7 +144,9 @@ class Work(NamedTuple):
         fixed: (n + 1, N_CLEARANCE) worst clearance from fixed things.
         out, spare, spare2: (N_CLEARANCE,).
         merit: (n,) merit of the plan held.
+        threat: (n + 1,) margin against hunting opponents alone, m.
         target: (n,) margin the boat must keep, m.
+        threat_target: (n,) margin it must keep against hunting opponents, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
@@ -173,7 +177,9 @@ class Work(NamedTuple):
     spare: Array
     spare2: Array
     merit: Array
+    threat: Array
     target: Array
+    threat_target: Array
     bound: IntArray
     near: BoolArray
     hunted: BoolArray
@@ -197,7 +203,7 @@ class Work(NamedTuple):
 def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
     kept, escaping = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    return Memory(kept, np.ones(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), escaping)
+    return Memory(kept, np.ones(shape), *(np.zeros(shape) for _ in range(4)), escaping)
 
 
 def new_work(boats: int, samples: int) -> Work:
@@ -213,7 +219,9 @@ def new_work(boats: int, samples: int) -> Work:
         spare=np.zeros(N_CLEARANCE),
         spare2=np.zeros(N_CLEARANCE),
         merit=np.zeros(boats),
+        threat=np.zeros(boats + 1),
         target=np.zeros(boats),
+        threat_target=np.zeros(boats),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),

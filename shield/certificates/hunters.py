@@ -141,7 +141,7 @@ def worst_hunter(
     work: Work,
     floor_m: float,
 ) -> None:
-    """Lower the clearance in ``slot`` to that from hunting opponents where it is worse.
+    """Clearance from hunting opponents, in ``work.threat[slot]``; that in ``slot`` is lowered where it is worse.
 
     Once below the floor the search stops: who came there last is looked at first, so that of many manoeuvres those
     that fail cost little.
@@ -152,6 +152,7 @@ def worst_hunter(
     clear = work.clear[slot]
     first = work.first_hunter[i]
     sealed = False
+    threat = FAR
     for number in range(state.shape[0]):
         j = _first_then_rest(first, number)
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
@@ -161,18 +162,23 @@ def worst_hunter(
         if looked_up(i, j, slot, ours, boats, work):
             at_once = margin_at_once(i, j, slot, boats, work)
             margin = min(at_once, margin_later(i, j, slot, boats, work))
+            if margin < threat:
+                threat = margin
+                sealed = margin == at_once and margin < work.threat_target[i]
             if margin < clear[MARGIN]:
                 clear[MARGIN] = margin
                 work.bound[slot] = j
-                sealed = margin == at_once and margin < work.target[i]
         else:
             # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+            if work.out[MARGIN] < threat:
+                threat = work.out[MARGIN]
+                sealed = False
             if work.out[MARGIN] < clear[MARGIN]:
                 copy_row(clear, work.out)
                 work.bound[slot] = j
-                sealed = False
-        if clear[MARGIN] < floor_m:
+        if threat < floor_m:
             work.first_hunter[i] = j
             break
     work.sealed[slot] = sealed
+    work.threat[slot] = threat

@@ -243,29 +243,34 @@ def rate_path(
     spare. Of a manoeuvre that fails at the first the merit is the margin itself, m. The clearance told is from all
     boats, whatever the merit hangs on.
     """
-    target = work.target[i]
     clear = work.clear[slot]
     work.sealed[slot] = False
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
+    work.threat[slot] = clear[MARGIN]
     if clear[MARGIN] < 0.0:
         return clear[MARGIN]
+    short = clear[MARGIN] < work.target[i]
+    sure = clear[MARGIN]
     share = share_before_touch(i, slot, state, boats, fixed, work)
     floor = -FAR
     if share == 1.0 and best >= FIXED_LOST:
-        floor = target
+        floor = work.threat_target[i]
     elif share == 1.0 and best >= STRAIGHT_SAFE:
-        floor = min(target, best - STRAIGHT_BASE)
+        floor = min(work.threat_target[i], best - STRAIGHT_BASE)
     if share < 1.0 and OBSTACLE_BASE * share <= best:
         return OBSTACLE_BASE * share
-    if clear[MARGIN] >= floor:
-        worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
+    if short and share == 1.0 and STRAIGHT_BASE + sure <= best:
+        return STRAIGHT_BASE + sure
+    worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if share < 1.0:
         work.bound[slot] = FIXED_THING
         return OBSTACLE_BASE * share
-    if clear[MARGIN] < target:
-        return max(STRAIGHT_SAFE, STRAIGHT_BASE + clear[MARGIN])
+    threat = work.threat[slot]
+    if short or threat < work.threat_target[i]:
+        least = min(sure, threat) if short else threat
+        return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
     clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
     if work.fixed[slot, MARGIN] < 0.0:
         work.bound[slot] = FIXED_THING
