@@ -157,7 +157,8 @@ class Work(NamedTuple):
         place: (n + 1, 5) place at which the boat itself is looked up.
         sealed: (n + 1,) whether a table alone made the plan fail.
         beset: (n,) boats that several opponents can come near to, see `certificates.values`.
-        ready: (n + 1, 3) where a plan's thrust is full first, see `certificates.paths`.
+        ready: (n + 1, 4) what is noted of a plan's path, see `certificates.paths`.
+        decided: (n + 1,) sample at which the merit of a plan that fails was decided; infinite where it hangs on more.
         hunter: (5,) where a hunter is at the end of its run: x, y, m, heading as a unit vector, speed m/s.
         later: (n + 1, 5) place at which such a boat is looked up.
         ways_later: (n, 3, 5) places opponents may be at by then.
@@ -191,6 +192,7 @@ class Work(NamedTuple):
     sealed: BoolArray
     beset: BoolArray
     ready: Array
+    decided: Array
     hunter: Array
     later: Array
     ways_later: Array
@@ -232,7 +234,8 @@ def new_work(boats: int, samples: int) -> Work:
         place=np.zeros((boats + 1, 5)),
         sealed=np.zeros(boats + 1, np.bool_),
         beset=np.zeros(boats, np.bool_),
-        ready=np.full((boats + 1, 3), -1.0),
+        ready=np.full((boats + 1, 4), -1.0),
+        decided=np.full(boats + 1, np.inf),
         hunter=np.zeros(5),
         later=np.zeros((boats + 1, 5)),
         ways_later=np.zeros((boats, 3, 5)),

@@ -9,10 +9,10 @@ import numpy as np
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
-from .candidates import DONE_DEG, candidate, kept_turn, preference, remembered
+from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
 from .laying import lay_path, most_merit, run_out, set_out
 from .manoeuvre import PAIR_SAFE, STRAIGHT_SAFE, rate_path
-from .paths import angle_to_go
+from .paths import TURNING_SAMPLE, angle_to_go
 
 SWEEPS = 3
 
@@ -54,20 +54,32 @@ def choose_plan(
     The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept; with a
     table the choice is made anew at every step, so that is asked of the other side only. What a table refuses one step
     on it refuses for every manoeuvre: then the first that keeps clear of all else will do.
+
+    A hard turn that fails while the boat still turns says the same of every longer one to that side: until then they
+    are one and the same, and longer ones are worth no more.
     """
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
+    no_more_port, no_more_starboard = np.inf, np.inf
     compared = boats.look[i] > 0 and (done == 0 or work.beset[i])  # else the tables say the same of all manoeuvres
     for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
+        hard = p > 0 and hard_turn(plans[p - 1])
+        if hard and togo >= (no_more_starboard if side > 0.0 else no_more_port):
+            continue
         set_out(i, trial, side, togo, speed, done, state, boats, tuning, work)
         if compared and most_merit(i, trial, ours, boats, work) <= best:
             continue
         run_out(i, trial, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
+        if hard and work.decided[trial] <= work.ready[trial, TURNING_SAMPLE]:
+            if side > 0.0:
+                no_more_starboard = togo
+            else:
+                no_more_port = togo
         kept_merit = merit + preference(i, p, side, togo, merit, boats, tuning, memory)
         if kept_merit > best:
             best = kept_merit

@@ -52,6 +52,12 @@ def candidate(
 
 
 @lean_kernel
+def hard_turn(row: Array) -> bool:
+    """Whether a manoeuvre of the family turns with full rudder at full speed."""
+    return abs(row[0]) == 1.0 and row[1] > 0.0 and row[2] == 1.0
+
+
+@lean_kernel
 def hysteresis(merit: float, tuning: Tuning) -> float:
     """Merit by which another manoeuvre must beat the one under way, in the units of its level."""
     return tuning.hysteresis_m if merit < FIXED_LOST else 1e-3 * tuning.hysteresis_m

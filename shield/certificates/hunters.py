@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Tuning, Work
@@ -153,6 +155,7 @@ def worst_hunter(
     first = work.first_hunter[i]
     sealed = False
     threat = FAR
+    decided = np.inf
     for number in range(state.shape[0]):
         j = _first_then_rest(first, number)
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
@@ -164,6 +167,7 @@ def worst_hunter(
             margin = min(at_once, margin_later(i, j, slot, boats, work))
             if margin < threat:
                 threat = margin
+                decided = math.ceil(boats.joint_look / boats.stride)
                 sealed = margin == at_once and margin < work.threat_target[i]
             if margin < clear[MARGIN]:
                 clear[MARGIN] = margin
@@ -173,6 +177,7 @@ def worst_hunter(
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
             if work.out[MARGIN] < threat:
                 threat = work.out[MARGIN]
+                decided = work.out[SAMPLE]
                 sealed = False
             if work.out[MARGIN] < clear[MARGIN]:
                 copy_row(clear, work.out)
@@ -182,3 +187,4 @@ def worst_hunter(
             break
     work.sealed[slot] = sealed
     work.threat[slot] = threat
+    work.decided[slot] = decided

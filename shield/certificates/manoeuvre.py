@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
-from .clearance import FAR, MARGIN, clear_of_course
+from .clearance import FAR, MARGIN, SAMPLE, clear_of_course
 from .fixed_things import clear_of_fixed, share_before_touch
 from .hunters import closing, worst_hunter
 from .values import find_beset, run_opponents
@@ -249,7 +251,10 @@ def rate_path(
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
     work.threat[slot] = clear[MARGIN]
+    work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
+        if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
+            work.decided[slot] = clear[SAMPLE]
         return clear[MARGIN]
     short = clear[MARGIN] < work.target[i]
     sure = clear[MARGIN]
@@ -259,18 +264,23 @@ def rate_path(
         floor = work.threat_target[i]
     elif share == 1.0 and best >= STRAIGHT_SAFE:
         floor = min(work.threat_target[i], best - STRAIGHT_BASE)
+    touched = share * (boats.static_samples[i] + 1.0)
     if share < 1.0 and OBSTACLE_BASE * share <= best:
+        work.decided[slot] = touched
         return OBSTACLE_BASE * share
     if short and share == 1.0 and STRAIGHT_BASE + sure <= best:
         return STRAIGHT_BASE + sure
     worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if share < 1.0:
-        work.bound[slot] = FIXED_THING
+        work.bound[slot], work.decided[slot] = FIXED_THING, touched
         return OBSTACLE_BASE * share
     threat = work.threat[slot]
     if short or threat < work.threat_target[i]:
         least = min(sure, threat) if short else threat
+        if least < threat or threat >= work.threat_target[i]:
+            work.decided[slot] = np.inf
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
+    work.decided[slot] = np.inf
     clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
     if work.fixed[slot, MARGIN] < 0.0:
         work.bound[slot] = FIXED_THING

@@ -21,8 +21,9 @@ SAG_M = 0.022
 FULL_THRUST = 0.9
 """Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
 
-READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
-"""What is noted of a path where its thrust is full at last: sample (-1: never), heading rad, speed m/s."""
+READY_SAMPLE, READY_HEADING, READY_SPEED, TURNING_SAMPLE = range(4)
+"""What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there,
+and the last sample (-1: none) up to which the boat turns as hard as it may, as in every longer turn to that side."""
 
 STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
@@ -91,9 +92,9 @@ def trace_path(
         least: number of them after which the path may end where thrust is full.
         earliest: first sample at which that counts.
         path: shape (>= samples + 1, 2), float64.
-        ready: shape (3,), where thrust is full first, see `READY_SAMPLE`.
+        ready: shape (4,), what is noted, see `READY_SAMPLE`.
     """
-    ready[READY_SAMPLE] = -1.0
+    ready[READY_SAMPLE], ready[TURNING_SAMPLE] = -1.0, -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
         _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, least, earliest, path, ready)
         return
@@ -141,19 +142,23 @@ def _trace_usv(
     sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
+    turning = True
     k, step = 0, done - 1
     if done == 1:
         path[0, 0], path[0, 1] = x, y
+        ready[TURNING_SAMPLE] = 0.0
         _note_ready(params, 0, earliest, thrust, heading, v, ready)
         k, step = 1, 0
     while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0
+        turning = turning and togo_deg > 0.0
         if togo_deg > 0.0 and thrust > 0.0:
             full = turn_of_rudder(params, thrust, most, dt_s)
             turn = min(full, togo_deg)
             rudder = most * turn / full
+            turning = turning and turn == full
         new_speed = next_speed(params, v, thrust, rudder, dt_s)
         if new_speed == 0.0:
             turn = 0.0
@@ -174,6 +179,8 @@ def _trace_usv(
         step += 1
         if step % stride == 0:
             path[k, 0], path[k, 1] = x, y
+            if turning:
+                ready[TURNING_SAMPLE] = k
             if ready[READY_SAMPLE] < 0.0:
                 _note_ready(params, k, earliest, thrust, math.atan2(ux, uy), v, ready)
             k += 1
