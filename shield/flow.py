@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .certificates.clearance import MARGIN
-from .jit import Array, BoolArray, lean_kernel
+from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan
@@ -31,8 +31,12 @@ LEAST_TURN_DEG = 1e-3
 
 
 @lean_kernel
-def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan) -> None:
-    """Keep every boat's manoeuvre for the next decision, as an absolute heading."""
+def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Work, plan: Plan) -> None:
+    """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
+
+    Values that tables tell of opponents are each a barrier of its own. Margins of a manoeuvre are not: another may
+    trade one for the other, so there the least counts for all.
+    """
     for i in range(ours.shape[0]):
         if not ours[i]:
             memory.kept[i] = False
@@ -47,7 +51,10 @@ def commit(state: Array, ours: BoolArray, memory: Memory, work: Work, plan: Plan
             )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
-        memory.threat_m[i] = work.threat[i]
+        if boats.look[i] > 0:
+            copy_row(memory.threat_m[i], work.threats[i])
+        else:
+            memory.threat_m[i, :] = work.threat[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
 
 
@@ -71,7 +78,7 @@ def finish(
     else:
         count = pick_movers(ours, work, plan)
         ladder(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-    commit(state, ours, memory, work, plan)
+    commit(state, ours, boats, memory, work, plan)
 
 
 @lean_kernel

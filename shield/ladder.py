@@ -101,7 +101,8 @@ def ladder(
     look = 1
     for m in range(count):
         i = plan.movers[m]
-        work.target[i], work.threat_target[i] = 0.0, 0.0
+        work.target[i] = 0.0
+        work.threat_target[i, :] = 0.0
         hold(i, plan.held, work)
         look = max(look, boats.look[i])
     run_opponents(look, ours, state, boats, tuning, work, work.ways)

@@ -119,7 +119,7 @@ class Memory(NamedTuple):
         target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
-        threat_m: the same against hunting opponents alone.
+        threat_m: (n, n) the same against each hunting opponent.
         escaping: whether the boat was carrying it out at the last decision.
     """
 
@@ -145,8 +145,10 @@ class Work(NamedTuple):
         out, spare, spare2: (N_CLEARANCE,).
         merit: (n,) merit of the plan held.
         threat: (n + 1,) margin against hunting opponents alone, m.
+        threats: (n + 1, n) the same against each, m; as far as they were looked at.
+        fails: (n + 1,) whether one of these is below what must be kept.
         target: (n,) margin the boat must keep, m.
-        threat_target: (n,) margin it must keep against hunting opponents, m.
+        threat_target: (n, n) margin it must keep against each hunting opponent, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
@@ -179,6 +181,8 @@ class Work(NamedTuple):
     spare2: Array
     merit: Array
     threat: Array
+    threats: Array
+    fails: BoolArray
     target: Array
     threat_target: Array
     bound: IntArray
@@ -205,7 +209,9 @@ class Work(NamedTuple):
 def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
     kept, escaping = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    return Memory(kept, np.ones(shape), *(np.zeros(shape) for _ in range(4)), escaping)
+    target_deg, speed_mps, margin_m = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    threat_m = np.zeros((*shape, shape[-1]))
+    return Memory(kept, np.ones(shape), target_deg, speed_mps, margin_m, threat_m, escaping)
 
 
 def new_work(boats: int, samples: int) -> Work:
@@ -222,8 +228,10 @@ def new_work(boats: int, samples: int) -> Work:
         spare2=np.zeros(N_CLEARANCE),
         merit=np.zeros(boats),
         threat=np.zeros(boats + 1),
+        threats=np.zeros((boats + 1, boats)),
+        fails=np.zeros(boats + 1, np.bool_),
         target=np.zeros(boats),
-        threat_target=np.zeros(boats),
+        threat_target=np.zeros((boats, boats)),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),

@@ -23,14 +23,16 @@ def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning,
 def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> None:
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
-    What is feared from opponents has its own: beside a team-mate, whose margin is small and sure, it would else be let
-    go at once.
+    What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
+    be let go at once.
     """
     for i in range(ours.shape[0]):
-        work.target[i], work.threat_target[i] = 0.0, 0.0
+        work.target[i] = 0.0
+        work.threat_target[i, :] = 0.0
         if ours[i] and memory.kept[i]:
             work.target[i] = boats.decay[i] * max(0.0, min(memory.margin_m[i], boats.cap_m[i]))
-            work.threat_target[i] = boats.decay[i] * max(0.0, min(memory.threat_m[i], boats.cap_m[i]))
+            for j in range(ours.shape[0]):
+                work.threat_target[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], boats.cap_m[i]))
 
 
 @lean_kernel

@@ -29,6 +29,8 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
     copy_row(work.clear[i], work.clear[slot])
     copy_row(work.fixed[i], work.fixed[slot])
     work.threat[i] = work.threat[slot]
+    work.fails[i] = work.fails[slot]
+    copy_row(work.threats[i], work.threats[slot])
     work.sealed[i] = work.sealed[slot]
     work.bound[i] = work.bound[slot]
     work.merit[i] = merit

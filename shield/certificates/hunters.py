@@ -141,21 +141,22 @@ def worst_hunter(
     boats: Boats,
     tuning: Tuning,
     work: Work,
-    floor_m: float,
+    level_m: float,
 ) -> None:
-    """Clearance from hunting opponents, in ``work.threat[slot]``; that in ``slot`` is lowered where it is worse.
+    """Clearance from each hunting opponent, in ``work.threats[slot]``; that in ``slot`` is lowered where it is worse.
 
-    Once below the floor the search stops: who came there last is looked at first, so that of many manoeuvres those
-    that fail cost little.
+    Of one that is short of its target (``work.fails``) and below the level nothing more is to be known: the search
+    stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
 
-    ``work.sealed[slot]`` says whether the boat is short of its target by what a table tells of where it is looked up
-    first. One step on (done = 1) that is one place for all manoeuvres: then none does better.
+    ``work.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
+    first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
     clear = work.clear[slot]
     first = work.first_hunter[i]
-    sealed = False
-    threat = FAR
-    decided = np.inf
+    refused, fails = False, False
+    at_best, threat = FAR, FAR
+    threat_at, failed_at = np.inf, np.inf
+    work.threats[slot, :] = FAR
     for number in range(state.shape[0]):
         j = _first_then_rest(first, number)
         if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
@@ -165,26 +166,29 @@ def worst_hunter(
         if looked_up(i, j, slot, ours, boats, work):
             at_once = margin_at_once(i, j, slot, boats, work)
             margin = min(at_once, margin_later(i, j, slot, boats, work))
-            if margin < threat:
-                threat = margin
-                decided = math.ceil(boats.joint_look / boats.stride)
-                sealed = margin == at_once and margin < work.threat_target[i]
+            at = math.ceil(boats.joint_look / boats.stride)
+            at_best = min(at_best, at_once)
+            refused = refused or at_once < work.threat_target[i, j]
             if margin < clear[MARGIN]:
                 clear[MARGIN] = margin
                 work.bound[slot] = j
         else:
             # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+            floor_m = min(work.threat_target[i, j], level_m)
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
-            if work.out[MARGIN] < threat:
-                threat = work.out[MARGIN]
-                decided = work.out[SAMPLE]
-                sealed = False
+            margin, at = work.out[MARGIN], work.out[SAMPLE]
             if work.out[MARGIN] < clear[MARGIN]:
                 copy_row(clear, work.out)
                 work.bound[slot] = j
-        if threat < floor_m:
+        if margin < threat:
+            threat, threat_at = margin, at
+        work.threats[slot, j] = margin
+        if margin < work.threat_target[i, j]:
+            fails, failed_at = True, min(failed_at, at)
+        if margin < min(work.threat_target[i, j], level_m):
             work.first_hunter[i] = j
             break
-    work.sealed[slot] = sealed
+    work.sealed[slot] = refused and threat >= at_best
     work.threat[slot] = threat
-    work.decided[slot] = decided
+    work.fails[slot] = fails
+    work.decided[slot] = max(threat_at, failed_at)

@@ -49,8 +49,8 @@ def set_out(
 @lean_kernel
 def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
     """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
-    margin = worst_by_tables(i, slot, ours, boats, work)
-    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if margin < work.threat_target[i] else 2.0 * PAIR_SAFE
+    margin, fails = worst_by_tables(i, slot, ours, boats, work)
+    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if fails else 2.0 * PAIR_SAFE
 
 
 @lean_kernel

@@ -251,6 +251,7 @@ def rate_path(
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
     work.threat[slot] = clear[MARGIN]
+    work.threats[slot, :] = clear[MARGIN]
     work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
         if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
@@ -261,9 +262,9 @@ def rate_path(
     share = share_before_touch(i, slot, state, boats, fixed, work)
     floor = -FAR
     if share == 1.0 and best >= FIXED_LOST:
-        floor = work.threat_target[i]
+        floor = FAR
     elif share == 1.0 and best >= STRAIGHT_SAFE:
-        floor = min(work.threat_target[i], best - STRAIGHT_BASE)
+        floor = best - STRAIGHT_BASE
     touched = share * (boats.static_samples[i] + 1.0)
     if share < 1.0 and OBSTACLE_BASE * share <= best:
         work.decided[slot] = touched
@@ -275,9 +276,9 @@ def rate_path(
         work.bound[slot], work.decided[slot] = FIXED_THING, touched
         return OBSTACLE_BASE * share
     threat = work.threat[slot]
-    if short or threat < work.threat_target[i]:
+    if short or work.fails[slot]:
         least = min(sure, threat) if short else threat
-        if least < threat or threat >= work.threat_target[i]:
+        if least < threat or not work.fails[slot]:
             work.decided[slot] = np.inf
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
     work.decided[slot] = np.inf

@@ -202,13 +202,16 @@ def margin_later(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
 
 
 @lean_kernel
-def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
+def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> tuple[float, bool]:
     """The least of the margins of boat i on the manoeuvre in ``slot`` against opponents that are looked up, m."""
     least = FAR
+    fails = False
     for j in range(ours.shape[0]):
         if j != i and work.near[i, j] and looked_up(i, j, slot, ours, boats, work):
-            least = min(least, margin_at_once(i, j, slot, boats, work), margin_later(i, j, slot, boats, work))
-    return least
+            margin = min(margin_at_once(i, j, slot, boats, work), margin_later(i, j, slot, boats, work))
+            least = min(least, margin)
+            fails = fails or margin < work.threat_target[i, j]
+    return least, fails
 
 
 @lean_kernel
