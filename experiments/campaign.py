@@ -54,6 +54,13 @@ class Campaign:
         self._failed: list[dict[str, Any]] = []
         self._before = self._finished()
 
+    @property
+    def words_of_before(self) -> str:
+        """What an earlier run left of these games, and how much that is not of them."""
+        others = len(self.store.load()) - len(self._before)
+        words = f"{len(self._before)} of {len(self.specs)} games are in {self.store.lines} and are taken from there"
+        return words + (f"; {others} there are of other settings and count for nothing here" if others else "")
+
     def _finished(self) -> dict[str, Row]:
         wanted = {spec.key for spec in self.specs}
         return {key: row for key, row in self.store.load().items() if key in wanted}

@@ -13,6 +13,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
+from ..conditions import words_of
 from ..judging import check_judge
 from ..pool import check_jobs
 from ..results import replay_of, results_of, write_results
@@ -73,6 +74,8 @@ def run_games(
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder(command)
     campaign = Campaign(settings.specs(), ResultStore(folder, resume), processes)
+    if resume:
+        warn(campaign.words_of_before)
     started = time.perf_counter()
     try:
         played = _play(campaign, processes)
@@ -87,6 +90,9 @@ def run_games(
 
 def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     """Print the tables of a run and where its files are."""
+    conditions = words_of(results["settings"]["conditions"])
+    if conditions:
+        console.print(f"All games with {conditions}.\n", soft_wrap=True)
     for summary in results["pairings"]:
         console.print(pairing_table(summary))
         console.print(verdict_table(summary))

@@ -81,6 +81,12 @@ def test_resuming_with_other_settings_plays_anew(played, tmp_path):
     other = AblationSettings(opponents=("easy",), games=1, rules={"max_time_s": 2.0})
     fresh = Campaign(other.specs(), ResultStore(tmp_path, resume=True))
     assert fresh.so_far().rows == []
+    others = len(campaign.store.load())
+    assert others > 0
+    assert fresh.words_of_before == (
+        f"0 of 2 games are in {tmp_path / 'games.jsonl'} and are taken from there; "
+        f"{others} there are of other settings and count for nothing here"
+    )
 
 
 def explode(spec):

@@ -69,6 +69,7 @@ def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
     assert "add --resume" in refused.stderr
     resumed = run(*arguments, "--resume")
     assert resumed.exit_code == ExitCode.OK, resumed.output
+    assert "2 of 4 games are in out/games.jsonl and are taken from there" in resumed.stderr
     content = json.loads(Path("out/results.json").read_text())
     assert (content["games_resumed"], content["games_played"], content["complete"]) == (2, 4, True)
     assert len(Path("out/games.jsonl").read_text().splitlines()) == 4

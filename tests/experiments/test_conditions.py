@@ -76,6 +76,7 @@ def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = run("ablate", *TINY, *GIVEN, "--out", "out")
     assert done.exit_code == ExitCode.OK, done.output
+    assert f"All games with {ROUGH.words}." in done.stdout
     content = json.loads(Path("out/results.json").read_text())
     assert keys.undocumented(content, keys.RESULTS) == []
     assert content["settings"]["conditions"] == {"delay_s": 0.3, "noise_m": 0.5, "current_mps": 0.3}
