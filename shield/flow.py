@@ -34,8 +34,8 @@ LEAST_TURN_DEG = 1e-3
 def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Work, plan: Plan) -> None:
     """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
 
-    Values that tables tell of opponents are each a barrier of its own. Margins of a manoeuvre are not: another may
-    trade one for the other, so there the least counts for all.
+    Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
+    of a manoeuvre are not: another may trade one for the other, so for other boats the least counts for all.
     """
     for i in range(ours.shape[0]):
         if not ours[i]:
@@ -52,9 +52,9 @@ def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Wo
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
         if boats.look[i] > 0:
-            copy_row(memory.threat_m[i], work.threats[i])
+            copy_row(memory.threat_m[i], work.threats_m[i])
         else:
-            memory.threat_m[i, :] = work.threat[i]
+            memory.threat_m[i, :] = work.threat_m[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
 
 

@@ -102,7 +102,7 @@ def ladder(
     for m in range(count):
         i = plan.movers[m]
         work.target[i] = 0.0
-        work.threat_target[i, :] = 0.0
+        work.threat_target_m[i, :] = 0.0
         hold(i, plan.held, work)
         look = max(look, boats.look[i])
     run_opponents(look, ours, state, boats, tuning, work, work.ways)

@@ -156,7 +156,7 @@ def _pair_row(
         if work.out[MARGIN] > work.spare2[MARGIN]:
             copy_row(work.out, work.spare2)
     k, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
-    target = work.threat_target[i, j] if hunts(i, j, ours, boats) else work.target[i]
+    target = work.threat_target_m[i, j] if hunts(i, j, ours, boats) else work.target[i]
     lack = target + AIM_M - work.out[MARGIN]
     C[r, :] = 0.0
     _add_effect(C, r, i, 1.0, k, nx, ny, work.path[i], 2 * m, gain, work)
@@ -187,7 +187,7 @@ def _table_row(
     C[r, :] = 0.0
     C[r, 2 * m] = slope.own_heading * gain[i, 0]
     C[r, 2 * m + 1] = slope.own_speed * gain[i, 1]
-    lack = work.threat_target[i, j] + AIM_M + work.radius[i, j] + boats.table_margin_m - slope.value_m
+    lack = work.threat_target_m[i, j] + AIM_M + work.radius[i, j] + boats.table_margin_m - slope.value_m
     if _out_of_reach(C, r, lack, tuning):
         return False
     return _close_row(C, d, lack, r, z_now)

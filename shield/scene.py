@@ -119,7 +119,7 @@ class Memory(NamedTuple):
         target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
-        threat_m: (n, n) the same against each hunting opponent.
+        threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
         escaping: whether the boat was carrying it out at the last decision.
     """
 
@@ -144,11 +144,11 @@ class Work(NamedTuple):
         fixed: (n + 1, N_CLEARANCE) worst clearance from fixed things.
         out, spare, spare2: (N_CLEARANCE,).
         merit: (n,) merit of the plan held.
-        threat: (n + 1,) margin against hunting opponents alone, m.
-        threats: (n + 1, n) the same against each, m; as far as they were looked at.
+        threat_m: (n + 1,) margin against hunting opponents alone, m.
+        threats_m: (n + 1, n) the same against each, m; as far as they were looked at.
         fails: (n + 1,) whether one of these is below what must be kept.
         target: (n,) margin the boat must keep, m.
-        threat_target: (n, n) margin it must keep against each hunting opponent, m.
+        threat_target_m: (n, n) margin it must keep against each hunting opponent, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
@@ -180,11 +180,11 @@ class Work(NamedTuple):
     spare: Array
     spare2: Array
     merit: Array
-    threat: Array
-    threats: Array
+    threat_m: Array
+    threats_m: Array
     fails: BoolArray
     target: Array
-    threat_target: Array
+    threat_target_m: Array
     bound: IntArray
     near: BoolArray
     hunted: BoolArray
@@ -227,11 +227,11 @@ def new_work(boats: int, samples: int) -> Work:
         spare=np.zeros(N_CLEARANCE),
         spare2=np.zeros(N_CLEARANCE),
         merit=np.zeros(boats),
-        threat=np.zeros(boats + 1),
-        threats=np.zeros((boats + 1, boats)),
+        threat_m=np.zeros(boats + 1),
+        threats_m=np.zeros((boats + 1, boats)),
         fails=np.zeros(boats + 1, np.bool_),
         target=np.zeros(boats),
-        threat_target=np.zeros((boats, boats)),
+        threat_target_m=np.zeros((boats, boats)),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),

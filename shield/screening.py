@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .certificates.assign import assign_plans
+from .certificates.clearance import FAR
 from .certificates.manoeuvre import STRAIGHT_SAFE, look_around
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
@@ -10,6 +11,7 @@ from .platforms import layout as L
 from .platforms.step import step_boat
 from .platforms.usv import wrap_degrees
 from .scene import Boats, Fixed, Memory, Tuning, Work
+from .tables.grid import CAP
 
 
 @lean_kernel
@@ -17,6 +19,15 @@ def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning,
     """State of boat i one step after its command, by the full boat and autopilot model."""
     copy_row(work.next_state[i], state[i])
     step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
+
+
+@lean_kernel
+def _most_told(i: int, j: int, boats: Boats, work: Work) -> float:
+    """Largest margin, m, a table can tell of a pair: beyond it the margin is said to be infinite."""
+    table = boats.table[i, j]
+    if table < 0:
+        return FAR
+    return boats.tables.axes[table, CAP] - work.radius[i, j] - boats.table_margin_m
 
 
 @lean_kernel
@@ -28,11 +39,12 @@ def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> No
     """
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
-        work.threat_target[i, :] = 0.0
+        work.threat_target_m[i, :] = 0.0
         if ours[i] and memory.kept[i]:
             work.target[i] = boats.decay[i] * max(0.0, min(memory.margin_m[i], boats.cap_m[i]))
             for j in range(ours.shape[0]):
-                work.threat_target[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], boats.cap_m[i]))
+                most = min(boats.cap_m[i], _most_told(i, j, boats, work))
+                work.threat_target_m[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
 
 
 @lean_kernel

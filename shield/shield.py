@@ -92,7 +92,7 @@ class Shield:
             fleet: the boats to come, whose value tables are then read as well.
 
         Raises:
-            FleetError, PlatformError: the fleet is one that `decide` would refuse.
+            FleetError, PlatformError: boats that `decide` would refuse.
         """
         twin = Shield(self.config)
         twin.decide(*tight_spot())

@@ -28,9 +28,9 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
     copy_row(work.ready[i], work.ready[slot])
     copy_row(work.clear[i], work.clear[slot])
     copy_row(work.fixed[i], work.fixed[slot])
-    work.threat[i] = work.threat[slot]
+    work.threat_m[i] = work.threat_m[slot]
     work.fails[i] = work.fails[slot]
-    copy_row(work.threats[i], work.threats[slot])
+    copy_row(work.threats_m[i], work.threats_m[slot])
     work.sealed[i] = work.sealed[slot]
     work.bound[i] = work.bound[slot]
     work.merit[i] = merit

@@ -1,7 +1,8 @@
 """What of the fixed things concerns a boat on a manoeuvre, and when.
 
 An obstacle stops a boat, and who is stopped is caught: one that is touched before a half turn could be over counts
-before what hunters may do. Later ones leave time for another manoeuvre, and count with what is kept by rule.
+before what hunters may do. Later ones leave time for another manoeuvre, and count with what is kept by rule. So does
+what a current may do by then: only its drift of a moment, which fixed things are widened by, comes before hunters.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def clear_of_near_obstacles(
         work.path[slot],
         boats.static_samples[i],
         way_per_sample(i, state, boats),
-        fixed.current_mps * boats.sample_s,
+        0.0,
         grace(boats, fixed),
         fixed.circles,
         fixed.segments,
@@ -83,9 +84,6 @@ def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fix
     """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
     last = boats.static_samples[i]
     way_m = way_per_sample(i, state, boats)
-    drift_m = fixed.current_mps * boats.sample_s
-    path = work.path[slot]
-    first = first_touch(
-        state[i], path, last, way_m, drift_m, grace(boats, fixed), fixed.circles, fixed.segments, fixed.segment_m
-    )
+    path, leave = work.path[slot], grace(boats, fixed)
+    first = first_touch(state[i], path, last, way_m, 0.0, leave, fixed.circles, fixed.segments, fixed.segment_m)
     return first / (last + 1.0)

@@ -143,7 +143,7 @@ def worst_hunter(
     work: Work,
     level_m: float,
 ) -> None:
-    """Clearance from each hunting opponent, in ``work.threats[slot]``; that in ``slot`` is lowered where it is worse.
+    """Clearance from each hunting opponent, in ``work.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
     Of one that is short of its target (``work.fails``) and below the level nothing more is to be known: the search
     stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
@@ -151,44 +151,40 @@ def worst_hunter(
     ``work.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
     first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
-    clear = work.clear[slot]
     first = work.first_hunter[i]
     refused, fails = False, False
     at_best, threat = FAR, FAR
     threat_at, failed_at = np.inf, np.inf
-    work.threats[slot, :] = FAR
+    work.threats_m[slot, :] = FAR
     for number in range(state.shape[0]):
         j = _first_then_rest(first, number)
-        if j == i or not work.near[i, j] or not hunts(i, j, ours, boats):
-            continue
-        if work.breach[i, j]:
+        if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
             continue
         if looked_up(i, j, slot, ours, boats, work):
             at_once = margin_at_once(i, j, slot, boats, work)
             margin = min(at_once, margin_later(i, j, slot, boats, work))
             at = math.ceil(boats.joint_look / boats.stride)
             at_best = min(at_best, at_once)
-            refused = refused or at_once < work.threat_target[i, j]
-            if margin < clear[MARGIN]:
-                clear[MARGIN] = margin
-                work.bound[slot] = j
+            refused = refused or at_once < work.threat_target_m[i, j]
+            if margin < work.clear[slot, MARGIN]:
+                work.clear[slot, MARGIN], work.bound[slot] = margin, j
         else:
             # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-            floor_m = min(work.threat_target[i, j], level_m)
+            floor_m = min(work.threat_target_m[i, j], level_m)
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
             margin, at = work.out[MARGIN], work.out[SAMPLE]
-            if work.out[MARGIN] < clear[MARGIN]:
-                copy_row(clear, work.out)
+            if margin < work.clear[slot, MARGIN]:
+                copy_row(work.clear[slot], work.out)
                 work.bound[slot] = j
         if margin < threat:
             threat, threat_at = margin, at
-        work.threats[slot, j] = margin
-        if margin < work.threat_target[i, j]:
+        work.threats_m[slot, j] = margin
+        if margin < work.threat_target_m[i, j]:
             fails, failed_at = True, min(failed_at, at)
-        if margin < min(work.threat_target[i, j], level_m):
+        if margin < min(work.threat_target_m[i, j], level_m):
             work.first_hunter[i] = j
             break
     work.sealed[slot] = refused and threat >= at_best
-    work.threat[slot] = threat
+    work.threat_m[slot] = threat
     work.fails[slot] = fails
     work.decided[slot] = max(threat_at, failed_at)

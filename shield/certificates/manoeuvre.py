@@ -20,7 +20,7 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning, Work
 from .clearance import FAR, MARGIN, SAMPLE, clear_of_course
-from .fixed_things import clear_of_fixed, share_before_touch
+from .fixed_things import clear_of_fixed, clear_of_near_obstacles, share_before_touch
 from .hunters import closing, worst_hunter
 from .values import find_beset, run_opponents
 
@@ -39,6 +39,9 @@ STRAIGHT_BASE = 300.0
 
 OBSTACLE_BASE = 50.0
 """Merit of a manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it counts."""
+
+DEEPEST_M = 10.0
+"""Depth in an obstacle, m, from which one manoeuvre is as bad as another."""
 
 FIXED_THING = -2
 """In the place of the neighbour that binds: a fixed thing does."""
@@ -227,6 +230,46 @@ def worst_clearance(
 
 
 @lean_kernel
+def _level_to_beat(best: float) -> float:
+    """Margin against hunters, m, at which a manoeuvre that is short of what it must keep is no better than the best."""
+    if best >= FIXED_LOST:
+        return FAR
+    return best - STRAIGHT_BASE if best >= STRAIGHT_SAFE else -FAR
+
+
+@lean_kernel
+def _rate_touching(
+    i: int,
+    slot: int,
+    share: float,
+    best: float,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+) -> float:
+    """Merit of a path that touches an obstacle after that share of a half turn's time.
+
+    Where there may be a current a boat too near to one has to come away at once, and may fail at that with whatever it
+    does: among manoeuvres that touch at the same time the one that goes least deep is worth more.
+    """
+    merit = OBSTACLE_BASE * share
+    decided = share * (boats.static_samples[i] + 1.0)
+    if fixed.current_mps > 0.0:
+        clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
+        merit += max(0.0, 1.0 + work.spare2[MARGIN] / DEEPEST_M)
+        decided = np.inf
+    work.decided[slot] = decided
+    if merit <= best:
+        return merit
+    worst_hunter(i, slot, state, ours, boats, tuning, work, -FAR)
+    work.bound[slot], work.decided[slot] = FIXED_THING, decided
+    return merit
+
+
+@lean_kernel
 def rate_path(
     i: int,
     slot: int,
@@ -250,33 +293,23 @@ def rate_path(
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
-    work.threat[slot] = clear[MARGIN]
-    work.threats[slot, :] = clear[MARGIN]
+    work.threat_m[slot] = clear[MARGIN]
+    work.threats_m[slot, :] = clear[MARGIN]
     work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
         if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
             work.decided[slot] = clear[SAMPLE]
         return clear[MARGIN]
-    short = clear[MARGIN] < work.target[i]
-    sure = clear[MARGIN]
     share = share_before_touch(i, slot, state, boats, fixed, work)
-    floor = -FAR
-    if share == 1.0 and best >= FIXED_LOST:
-        floor = FAR
-    elif share == 1.0 and best >= STRAIGHT_SAFE:
-        floor = best - STRAIGHT_BASE
-    touched = share * (boats.static_samples[i] + 1.0)
-    if share < 1.0 and OBSTACLE_BASE * share <= best:
-        work.decided[slot] = touched
-        return OBSTACLE_BASE * share
-    if short and share == 1.0 and STRAIGHT_BASE + sure <= best:
-        return STRAIGHT_BASE + sure
-    worst_hunter(i, slot, state, ours, boats, tuning, work, floor)
     if share < 1.0:
-        work.bound[slot], work.decided[slot] = FIXED_THING, touched
-        return OBSTACLE_BASE * share
-    threat = work.threat[slot]
+        return _rate_touching(i, slot, share, best, state, ours, boats, fixed, tuning, work)
+    sure = clear[MARGIN]
+    short = sure < work.target[i]
+    if short and STRAIGHT_BASE + sure <= best:
+        return STRAIGHT_BASE + sure
+    worst_hunter(i, slot, state, ours, boats, tuning, work, _level_to_beat(best))
     if short or work.fails[slot]:
+        threat = work.threat_m[slot]
         least = min(sure, threat) if short else threat
         if least < threat or not work.fails[slot]:
             work.decided[slot] = np.inf

@@ -210,7 +210,7 @@ def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work
         if j != i and work.near[i, j] and looked_up(i, j, slot, ours, boats, work):
             margin = min(margin_at_once(i, j, slot, boats, work), margin_later(i, j, slot, boats, work))
             least = min(least, margin)
-            fails = fails or margin < work.threat_target[i, j]
+            fails = fails or margin < work.threat_target_m[i, j]
     return least, fails
 
 

@@ -41,6 +41,27 @@ def test_a_boat_told_of_the_current_stays_out(name, top):
     assert max(told) < 0.0
 
 
+@pytest.mark.parametrize(("name", "top"), [("heron", 2.0), ("surveyor", 3.0)])
+@pytest.mark.parametrize("inside_m", [0.05, 0.2, 0.6])
+def test_a_boat_that_begins_too_near_to_a_wall_comes_away(name, top, inside_m):
+    """Nothing is remembered of an escape, and all manoeuvres fail at once: the one that leaves must still be found."""
+    wall = [(0.0, -50.0), (0.0, 150.0), (-1.0, 150.0), (-1.0, -50.0)]
+    config = ShieldConfig(current_mps=CURRENT_MPS)
+    kept_m = Surroundings(polygons=[wall]).pack(config).segment_m
+    shield = BatchedShield(config, 1, (name,), (0,), Surroundings(polygons=[wall]))
+    state = np.zeros((1, 1, L.N_STATE))
+    state[0, 0, [L.X, L.SPEED, L.THRUST]] = kept_m - inside_m, top, 100.0
+    nearest = np.inf
+    for _ in range(80):
+        wanted = np.array([[[top, 90.0 - state[0, 0, L.HEADING]]]])
+        sent = shield.decide(state, wanted, np.ones((1, 1), bool))
+        state[0, 0, L.X] -= CURRENT_MPS * config.dt_s
+        step_all(packed([name]), state, sent, config.dt_s)
+        nearest = min(nearest, state[0, 0, L.X])
+    assert nearest > kept_m - inside_m - 0.5
+    assert state[0, 0, L.X] > kept_m + 1.0
+
+
 def test_fixed_things_are_widened_by_the_drift_until_a_command_acts():
     around = Surroundings((0.0, 0.0, 80.0, 40.0), [(20.0, 20.0, 2.0)], keep_out=[(50.0, 20.0, 3.0)])
     still, told = (around.pack(ShieldConfig(delay_s=0.4, current_mps=mps)) for mps in (0.0, 0.6))

@@ -78,7 +78,7 @@ def test_the_best_of_all_is_found(name, thrust, done):
         best = max(rated(at, p, top, done)[1] for p in range(first, at.boats.plans[0] + 1))
         choose_plan(0, top, done, True, at.state, at.ours, at.boats, at.fixed, at.plans, at.tuning, at.memory, at.work)
         chosen = rated_as_chosen(at)
-        assert chosen == pytest.approx(best, abs=0.5)  # the hysteresis apart
+        assert chosen == pytest.approx(best, abs=at.tuning.hysteresis_m + 1e-9)
         assert at.work.merit[0] == pytest.approx(chosen, abs=1e-9)
 
 
