@@ -33,10 +33,10 @@ def ending(world, hunts=lambda world: True):
     return world.clock.now_s() - began
 
 
-def lying(other, **more):
+def lying(other, end=END, **more):
     """One boat of ours that lies still, and another."""
     return World(
-        fleet_of(blue=1, red=1, more=END), [(40.0, 20.0, 0.0, 0.0)], straight(0.0, 0.0), others=[other], **more
+        fleet_of(blue=1, red=1, more=end), [(40.0, 20.0, 0.0, 0.0)], straight(0.0, 0.0), others=[other], **more
     )
 
 
@@ -61,12 +61,18 @@ def test_a_boat_that_is_hunted_at_the_end_is_kept_out_of_the_way_until_it_is_lef
 
 
 def test_who_comes_near_after_the_longest_time_is_told(caplog):
-    world = lying(("red_1", 40.0, 2.0, 0.0, 2.0))
+    """Still on its way when the time is over: how a hunt of minutes ends would hang on every turn of it."""
+    world = lying(("red_1", 40.0, 2.0, 0.0, 2.0), "end: {clear_s: 10.0, longest_s: 3.0}")
     took = ending(world)
-    assert took == pytest.approx(40.3, abs=0.5)
+    assert took == pytest.approx(3.3, abs=0.5)
     assert len(world.loop.near) == 1
     assert "red_1 comes within" in world.loop.near[0]
     assert "take it over by hand" in caplog.text
+
+
+def test_a_hunt_does_not_keep_the_run_longer_than_the_longest_time():
+    world = lying(("red_1", 40.0, 2.0, 0.0, 2.0))
+    assert ending(world) == pytest.approx(40.3, abs=0.5)
 
 
 def test_on_quiet_water_boats_are_handed_over_at_once():
