@@ -11,7 +11,7 @@ from typing import overload
 import numpy as np
 
 from . import plan
-from .certificates.manoeuvre import FIXED_THING
+from .certificates.rating import FIXED_THING
 from .commands import Commands
 from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray

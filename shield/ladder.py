@@ -8,7 +8,8 @@ import numpy as np
 
 from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
-from .certificates.manoeuvre import FIXED_LOST, PAIR_SAFE, told_margin
+from .certificates.manoeuvre import told_margin
+from .certificates.rating import FIXED_LOST, PAIR_SAFE
 from .certificates.values import run_opponents
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check

@@ -8,7 +8,7 @@ import numpy as np
 
 from .active_set import OPTIMAL, project
 from .certificates.assign import hold, recheck
-from .certificates.manoeuvre import PAIR_SAFE
+from .certificates.rating import PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import Plan
 from .platforms import layout as L

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from .certificates.assign import assign_plans
 from .certificates.clearance import FAR
-from .certificates.manoeuvre import STRAIGHT_SAFE, look_around
+from .certificates.manoeuvre import look_around
+from .certificates.rating import STRAIGHT_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L

@@ -11,8 +11,8 @@ from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
 from .laying import lay_path, most_merit, run_out, set_out
-from .manoeuvre import PAIR_SAFE, STRAIGHT_SAFE, rate_path
 from .paths import TURNING_SAMPLE, angle_to_go
+from .rating import PAIR_SAFE, STRAIGHT_SAFE, rate_path
 
 SWEEPS = 3
 

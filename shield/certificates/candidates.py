@@ -7,8 +7,8 @@ import math
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Memory, Tuning
-from .manoeuvre import FIXED_LOST
 from .paths import angle_to_go
+from .rating import FIXED_LOST
 
 COMMANDED = -1.0
 """Speed entry of a manoeuvre that keeps the commanded speed."""

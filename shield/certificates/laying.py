@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..scene import Boats, Tuning, Work
-from .manoeuvre import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
 from .paths import trace_path
+from .rating import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
 from .values import looked_up, set_place, tabled, worst_by_tables
 
 NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)

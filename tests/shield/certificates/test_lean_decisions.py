@@ -7,7 +7,7 @@ from numba import njit
 from shield_scenes import bits, head_on, relative
 from stages import screened, stages_of
 from steerclear.shield import Shield, ShieldConfig, Surroundings
-from steerclear.shield.certificates.manoeuvre import rate_path
+from steerclear.shield.certificates.rating import rate_path
 from steerclear.shield.platforms import layout as L
 
 

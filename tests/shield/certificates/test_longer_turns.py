@@ -9,8 +9,8 @@ from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.certificates.assign import choose_plan
 from steerclear.shield.certificates.candidates import candidate, hard_turn, preference, remembered
 from steerclear.shield.certificates.laying import lay_path
-from steerclear.shield.certificates.manoeuvre import rate_path
 from steerclear.shield.certificates.paths import TURNING_SAMPLE
+from steerclear.shield.certificates.rating import rate_path
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state

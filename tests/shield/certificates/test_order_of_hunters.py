@@ -7,7 +7,7 @@ from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.assign import choose_plan
 from steerclear.shield.certificates.clearance import MARGIN
 from steerclear.shield.certificates.hunters import _first_then_rest
-from steerclear.shield.certificates.manoeuvre import rate_path
+from steerclear.shield.certificates.rating import rate_path
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state

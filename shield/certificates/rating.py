@@ -1,0 +1,127 @@
+"""What an escape manoeuvre is worth: one number, in the order of what matters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..jit import Array, BoolArray, lean_kernel
+from ..scene import Boats, Fixed, Tuning, Work
+from .clearance import FAR, MARGIN, SAMPLE
+from .fixed_things import clear_of_fixed, clear_of_near_obstacles, share_before_touch
+from .hunters import worst_hunter
+from .manoeuvre import worst_clearance
+
+PAIR_SAFE = 1e3
+"""Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
+
+FIXED_LOST = 500.0
+"""Merit from which it keeps clear of all boats and of obstacles near in time, but not of all fixed things."""
+
+STRAIGHT_SAFE = 100.0
+"""Merit from which it keeps clear of team-mates, of opponents that hold their course and of obstacles near in time, but
+not of pursuers."""
+
+STRAIGHT_BASE = 300.0
+"""Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
+
+OBSTACLE_BASE = 50.0
+"""Merit of a manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it counts."""
+
+DEEPEST_M = 10.0
+"""Depth in an obstacle, m, from which one manoeuvre is as bad as another."""
+
+FIXED_THING = -2
+"""In the place of the neighbour that binds: a fixed thing does."""
+
+
+@lean_kernel
+def _level_to_beat(best: float) -> float:
+    """Margin against hunters, m, at which a manoeuvre that is short of what it must keep is no better than the best."""
+    if best >= FIXED_LOST:
+        return FAR
+    return best - STRAIGHT_BASE if best >= STRAIGHT_SAFE else -FAR
+
+
+@lean_kernel
+def _rate_touching(
+    i: int,
+    slot: int,
+    share: float,
+    best: float,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+) -> float:
+    """Merit of a path that touches an obstacle after that share of a half turn's time.
+
+    Where there may be a current a boat too near to one has to come away at once, and may fail at that with whatever it
+    does: among manoeuvres that touch at the same time the one that goes least deep is worth more.
+    """
+    merit = OBSTACLE_BASE * share
+    decided = share * (boats.static_samples[i] + 1.0)
+    if fixed.current_mps > 0.0:
+        clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
+        merit += max(0.0, 1.0 + work.spare2[MARGIN] / DEEPEST_M)
+        decided = np.inf
+    work.decided[slot] = decided
+    if merit <= best:
+        return merit
+    worst_hunter(i, slot, state, ours, boats, tuning, work, -FAR)
+    work.bound[slot], work.decided[slot] = FIXED_THING, decided
+    return merit
+
+
+@lean_kernel
+def rate_path(
+    i: int,
+    slot: int,
+    best: float,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+) -> float:
+    """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
+
+    What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
+    first, of obstacles near in time second, of hunting opponents third; then of all fixed things, and last room to
+    spare. Of a manoeuvre that fails at the first the merit is the margin itself, m. The clearance told is from all
+    boats, whatever the merit hangs on.
+    """
+    clear = work.clear[slot]
+    work.sealed[slot] = False
+    floor = best if best < STRAIGHT_SAFE else 0.0
+    worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
+    work.fixed[slot, MARGIN] = FAR
+    work.threat_m[slot] = clear[MARGIN]
+    work.threats_m[slot, :] = clear[MARGIN]
+    work.decided[slot] = np.inf
+    if clear[MARGIN] < 0.0:
+        if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
+            work.decided[slot] = clear[SAMPLE]
+        return clear[MARGIN]
+    share = share_before_touch(i, slot, state, boats, fixed, work)
+    if share < 1.0:
+        return _rate_touching(i, slot, share, best, state, ours, boats, fixed, tuning, work)
+    sure = clear[MARGIN]
+    short = sure < work.target[i]
+    if short and STRAIGHT_BASE + sure <= best:
+        return STRAIGHT_BASE + sure
+    worst_hunter(i, slot, state, ours, boats, tuning, work, _level_to_beat(best))
+    if short or work.fails[slot]:
+        threat = work.threat_m[slot]
+        least = min(sure, threat) if short else threat
+        if least < threat or not work.fails[slot]:
+            work.decided[slot] = np.inf
+        return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
+    work.decided[slot] = np.inf
+    clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
+    if work.fixed[slot, MARGIN] < 0.0:
+        work.bound[slot] = FIXED_THING
+    spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
+    return PAIR_SAFE + max(FIXED_LOST - PAIR_SAFE, min(work.fixed[slot, MARGIN], 0.0)) + spare
