@@ -16,7 +16,7 @@ from .jit import Array, BoolArray, IntArray, kernel
 from .plan import Plan, new_plan
 from .platforms import Platform
 from .platforms import layout as L
-from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work
+from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import queue_commands, run_on_commands, steps_of_delay
@@ -125,7 +125,7 @@ class BatchedShield:
         self._lifted = np.zeros((games, len(surroundings.stops)), np.bool_)
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
-        self._work = new_work(n, int(self._boats.hunt_samples.max()))
+        self._work = new_work(n, path_samples(self._boats))
         self._plan = new_plan(n, n * ((WAYS + 1) * n + 6) + 2)
         self._margin = np.full(n, config.position_error_m)
         self._late_m = config.track_error_mps * config.delay_s

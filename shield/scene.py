@@ -28,8 +28,10 @@ class Boats(NamedTuple):
         granted_dec_mps2: rate at which each boat, as an opponent, loses speed in a turn, (n,).
         granted_loss: share of its top speed that each boat, as an opponent, loses in its granted turn, (n,).
         samples: path samples of each boat's horizon, (n,).
-        hunt_samples: path samples over which hunting opponents are followed, (n,), at least ``samples``.
-        fade: factor of negative margins against hunters per path sample, (n,).
+        hunt_samples: path samples over which hunting opponents are followed once thrust is full, (n,), at least
+            ``samples``.
+        thrust_samples: path samples until thrust is full from rest, (n,): so much longer they are followed at most.
+        fade: factor of negative margins against hunters per path sample, for boats at full thrust, (n,).
         static_samples: samples over which fixed things are looked at, (n,).
         stride: model steps between path samples.
         sample_s: time between path samples, s.
@@ -53,6 +55,7 @@ class Boats(NamedTuple):
     granted_loss: Array
     samples: IntArray
     hunt_samples: IntArray
+    thrust_samples: IntArray
     fade: Array
     static_samples: IntArray
     stride: int
@@ -152,6 +155,8 @@ class Work(NamedTuple):
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
+        hunt_samples: (n,) path samples over which opponents are followed at most, as the boat is now.
+        fade: (n,) factor of negative margins against them per path sample, so that it is the same at the end.
         breach: (n, n) pairs inside the separation.
         radius: (n, n) radius to keep, m.
         course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
@@ -188,6 +193,8 @@ class Work(NamedTuple):
     bound: IntArray
     near: BoolArray
     hunted: BoolArray
+    hunt_samples: IntArray
+    fade: Array
     breach: BoolArray
     radius: Array
     course: Array
@@ -204,6 +211,11 @@ class Work(NamedTuple):
     searched: IntArray
     first_hunter: IntArray
     first_manner: IntArray
+
+
+def path_samples(boats: Boats) -> int:
+    """Path samples that the working memory of these boats must hold."""
+    return int((boats.hunt_samples + boats.thrust_samples).max(initial=1))
 
 
 def new_memory(*shape: int) -> Memory:
@@ -235,6 +247,8 @@ def new_work(boats: int, samples: int) -> Work:
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),
+        hunt_samples=np.zeros(boats, np.int64),
+        fade=np.zeros(boats),
         breach=np.zeros((boats, boats), np.bool_),
         radius=np.zeros((boats, boats)),
         course=np.zeros((boats, 4)),

@@ -88,6 +88,9 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         granted_loss=np.array([share * _lasting_loss(limit) for limit in limits]),
         samples=np.array([max(2, math.ceil(value / sample_s)) for value in horizon_s], dtype=np.int64),
         hunt_samples=np.array([max(2, math.ceil(value / sample_s)) for value in hunt_s], dtype=np.int64),
+        thrust_samples=np.array(
+            [math.ceil(limit.thrust_s / sample_s) if share > 0.0 else 0 for limit in limits], dtype=np.int64
+        ),
         fade=np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
         static_samples=np.array(
             [

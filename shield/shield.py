@@ -22,7 +22,7 @@ from .linearised import add_slack, build, check, pick_movers, take_answer
 from .plan import NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
-from .scene import Boats, Fixed, Memory, Work, new_memory, new_work
+from .scene import Boats, Fixed, Memory, Work, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
@@ -158,7 +158,7 @@ class Shield:
             n = len(fleet)
             seats = 1 if self.config.coordination == "team" else n
             rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
-            samples = int(self._boats.hunt_samples.max(initial=1))
+            samples = path_samples(self._boats)
             self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(seats)]
             self._key, self._pending = key, np.full((steps_of_delay(self.config), n, 2), np.nan)
         return self._boats

@@ -51,6 +51,7 @@ FAMILIES: dict[str, Family] = {
         Family("corner", duels.corner, 1, field_for=2),
         Family("sudden_turn", duels.sudden_turn, 1),
         Family("rammer_1", groups.rammer_1, 1),
+        Family("at_rest", groups.at_rest, 1),
         Family("rammer_2", groups.rammer_2, 2),
         Family("rammer_3", groups.rammer_3, 3),
         Family("rammer_3v3", groups.rammer_3v3, 3),

@@ -62,8 +62,11 @@ def cluster(cast: Cast) -> None:
         cast.add_other(x, y, cast.uniform(-180.0, 180.0), 0.0, still)
 
 
-def ram(cast: Cast) -> None:
-    """Add a rammer: pure pursuit, lead pursuit, something between, a feint to one side, or a wait ahead of the bow."""
+def ram(cast: Cast, reach: float = 1.0) -> None:
+    """Add a rammer: pure pursuit, lead pursuit, something between, a feint to one side, or a wait ahead of the bow.
+
+    It starts up to ``reach`` times as far away as others do.
+    """
     kind, top = float(cast.rng.random()), cast.top(cast.other)
     attack = {"aim": S.AIM_TARGET, "speed_mps": top}
     close = cast.uniform(4.0, 12.0) * cast.scale + cast.radius_m - 2.5
@@ -79,7 +82,7 @@ def ram(cast: Cast) -> None:
     else:
         wait = S.phase(**attack, lead=0.5, standoff_m=cast.uniform(0.5, 1.5) * close)
         phases = [wait, S.phase(**attack, lead=1.0, within_m=close, at_s=cast.uniform(5.0, 30.0))]
-    gap = cast.range_m()
+    gap = cast.uniform(cast.nearest_m, reach * cast.farthest_m)
     x, y = ahead(0.0, 0.0, cast.uniform(-180.0, 180.0), gap)
     while not cast.is_clear(x, y, cast.radius_m + 1.0):
         x, y = ahead(0.0, 0.0, cast.uniform(-180.0, 180.0), gap)
@@ -102,6 +105,16 @@ def rammers(cast: Cast, own: int, others: int) -> None:
 def rammer_1(cast: Cast) -> None:
     """One rammer against one boat."""
     rammers(cast, 1, 1)
+
+
+def at_rest(cast: Cast) -> None:
+    """One rammer, at times from far away, against a boat that lies still and wants to stay for a while."""
+    waits_s, room = cast.uniform(10.0, 60.0), 25.0 * cast.scale
+    goal = (cast.uniform(-room, room), cast.uniform(-room, room))
+    go = S.phase(S.AIM_GOALS, cast.top(cast.own), at_s=waits_s)
+    boat = cast.add_own(0.0, 0.0, cast.uniform(-180.0, 180.0), 0.0, goal, (0.0, 0.0))
+    cast.script[boat] = S.script(S.phase(S.AIM_NOWHERE), go, reached_m=cast.reached_m(cast.own))
+    ram(cast, reach=2.0)
 
 
 def rammer_2(cast: Cast) -> None:

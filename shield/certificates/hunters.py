@@ -52,47 +52,20 @@ def clear_of_hunter(
     """Clearance of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
     The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently. The one that
-    came below its floor last is looked at first. Where a table is for the pair they are followed until the boat's
-    thrust is full; what they can do from there on the table tells.
+    came below its floor last is looked at first. They are followed until the boat's thrust is full and as long beyond
+    as such a boat needs to get away; where a table is for the pair it tells what they can do from there on.
     """
-    path, ready = work.path[slot], work.ready[slot]
-    till_ready = ready[READY_SAMPLE] >= 0.0 and tabled(i, j, ours, boats, work)
-    samples = min(boats.hunt_samples[i], int(ready[READY_SAMPLE])) if till_ready else boats.hunt_samples[i]
-    sample_s = boats.sample_s
-    speed, top = state[j, L.SPEED], boats.params[j, L.MAX_SPEED]
-    course = work.course[j]
-    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
+    ready = int(work.ready[slot, READY_SAMPLE])
+    till_ready = ready >= 0 and tabled(i, j, ours, boats, work)
+    samples = work.hunt_samples[i]
+    if ready >= 0:
+        samples = min(samples, ready if till_ready else ready + boats.hunt_samples[i])
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
-    for turn_to in range(manners):
-        manner = _first_then_rest(first, turn_to)
-        share = RUDDERS[manner // 2]
-        weight = clear_of_pursuer(
-            path,
-            course[0],
-            course[1],
-            course[2],
-            course[3],
-            speed,
-            top,
-            boats.granted_acc_mps2[j],
-            boats.granted_dec_mps2[j],
-            boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
-            share * turn,
-            manner % 2 == 1,
-            LEAD_SHARE * boats.hunt_samples[i],
-            sample_s,
-            samples,
-            closing(i, j, state, boats, tuning),
-            work.radius[i, j],
-            boats.fade[i],
-            floor_m,
-            cap_m,
-            till_ready,
-            work.hunter,
-            work.spare,
-        )
+    for number in range(manners):
+        manner = _first_then_rest(first, number)
+        weight = _run_hunter(i, j, slot, manner, samples, till_ready, state, boats, tuning, work, floor_m, cap_m)
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -100,6 +73,52 @@ def clear_of_hunter(
             if work.out[MARGIN] < floor_m:
                 work.first_manner[i, j] = manner
                 return
+
+
+@lean_kernel
+def _run_hunter(
+    i: int,
+    j: int,
+    slot: int,
+    manner: int,
+    samples: int,
+    to_end: bool,
+    state: Array,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+    cap_m: float,
+) -> float:
+    """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by."""
+    sample_s = boats.sample_s
+    course = work.course[j]
+    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
+    return clear_of_pursuer(
+        work.path[slot],
+        course[0],
+        course[1],
+        course[2],
+        course[3],
+        state[j, L.SPEED],
+        boats.params[j, L.MAX_SPEED],
+        boats.granted_acc_mps2[j],
+        boats.granted_dec_mps2[j],
+        boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
+        RUDDERS[manner // 2] * turn,
+        manner % 2 == 1,
+        LEAD_SHARE * work.hunt_samples[i],
+        sample_s,
+        samples,
+        closing(i, j, state, boats, tuning),
+        work.radius[i, j],
+        work.fade[i],
+        floor_m,
+        cap_m,
+        to_end,
+        work.hunter,
+        work.spare,
+    )
 
 
 @lean_kernel

@@ -57,8 +57,8 @@ def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> 
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     how = hunters_run(i, slot, boats, work)
-    samples = boats.samples[i] if how == NO_HUNTERS else boats.hunt_samples[i]
-    least = boats.samples[i] if how == HUNTERS_TILL_READY else samples
+    samples = boats.samples[i] if how == NO_HUNTERS else work.hunt_samples[i]
+    beyond = boats.hunt_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     trace_path(
@@ -71,7 +71,8 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         done,
         boats.stride,
         samples,
-        least,
+        boats.samples[i],
+        beyond,
         0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride,
         work.path[slot],
         work.ready[slot],

@@ -16,6 +16,7 @@ import math
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
+from ..platforms.limits import FULL_THRUST
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing
@@ -26,6 +27,16 @@ REGAIN_M = 0.01
 
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
+
+
+@lean_kernel
+def _set_hunt(i: int, state: Array, boats: Boats, work: Work) -> None:
+    """How long opponents of boat i are followed at most: what it lacks in thrust it has to regain before it runs."""
+    samples, fade = boats.hunt_samples[i], boats.fade[i]
+    if state[i, L.THRUST] < FULL_THRUST * boats.params[i, L.MAX_THRUST]:
+        samples += boats.thrust_samples[i]
+        fade **= boats.hunt_samples[i] / samples
+    work.hunt_samples[i], work.fade[i] = samples, fade
 
 
 @lean_kernel
@@ -44,6 +55,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for i in range(n):
         work.hunted[i] = False
+        _set_hunt(i, state, boats, work)
         work.first_hunter[i] = 0
         work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
@@ -56,7 +68,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
             top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
             samples = max(boats.samples[i], boats.samples[j])
             if boats.team[i] != boats.team[j]:
-                samples = max(samples, max(boats.hunt_samples[i], boats.hunt_samples[j]))
+                samples = max(samples, max(work.hunt_samples[i], work.hunt_samples[j]))
             horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
             radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]

@@ -13,13 +13,11 @@ import math
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate, full_turn
+from ..platforms.limits import FULL_THRUST
 from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 
 SAG_M = 0.022
 """Most a straight line between two samples may cut off the arc sailed between them, m."""
-
-FULL_THRUST = 0.9
-"""Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
 
 READY_SAMPLE, READY_HEADING, READY_SPEED, TURNING_SAMPLE = range(4)
 """What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there,
@@ -73,6 +71,7 @@ def trace_path(
     stride: int,
     samples: int,
     least: int,
+    beyond: int,
     earliest: int,
     path: Array,
     ready: Array,
@@ -89,14 +88,17 @@ def trace_path(
         done: 1 when ``row`` is the state one step from now, 0 when it is the present one.
         stride: model steps between samples.
         samples: number of samples after sample 0.
-        least: number of them after which the path may end where thrust is full.
+        least: number of them after which the path may end.
+        beyond: number of them after the one where thrust is full that the path goes on for.
         earliest: first sample at which that counts.
         path: shape (>= samples + 1, 2), float64.
         ready: shape (4,), what is noted, see `READY_SAMPLE`.
     """
     ready[READY_SAMPLE], ready[TURNING_SAMPLE] = -1.0, -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
-        _trace_usv(params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, least, earliest, path, ready)
+        _trace_usv(
+            params, row, side, togo_deg, speed_mps, dt_s, done, stride, samples, least, beyond, earliest, path, ready
+        )
         return
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
@@ -104,7 +106,7 @@ def trace_path(
     _note_ready(params, 0, earliest, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
     k = 1
     step = 0
-    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0):
+    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
         if step % stride == 0:
@@ -125,6 +127,7 @@ def _trace_usv(
     stride: int,
     samples: int,
     least: int,
+    beyond: int,
     earliest: int,
     path: Array,
     ready: Array,
@@ -149,7 +152,7 @@ def _trace_usv(
         ready[TURNING_SAMPLE] = 0.0
         _note_ready(params, 0, earliest, thrust, heading, v, ready)
         k, step = 1, 0
-    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0):
+    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0

@@ -15,12 +15,13 @@ import math
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
+from ..platforms.limits import FULL_THRUST
 from ..platforms.usv import turn_of_rudder
 from ..scene import Boats, Tuning, Work
 from ..tables.grid import CAP
 from ..tables.lookup import Gradient, table_gradient, table_value
 from .clearance import FAR
-from .paths import FULL_THRUST, READY_HEADING, READY_SAMPLE, READY_SPEED, sail
+from .paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
 
 WAYS = 3
 """Ways an opponent may move: straight on, hard to port, hard to starboard."""

@@ -15,6 +15,9 @@ from .usv import fresh_state
 
 LONGEST_S = 60.0
 
+FULL_THRUST = 0.9
+"""Share of its full thrust from which a boat can do, about, what it can at full thrust."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -27,6 +30,7 @@ class Limits:
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
         turn_loss: share of top speed lost in a long turn at full rudder and full speed command.
         turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
+        thrust_s: time from rest under a full speed command until thrust is full, s; 0 without a thrust model.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
     """
 
@@ -36,6 +40,7 @@ class Limits:
     half_turn_s: float
     turn_loss: float
     turn_deceleration_mps2: float
+    thrust_s: float
     stop_s: float
 
 
@@ -50,6 +55,7 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
         half_turn_s=_half_turn(platform, dt_s),
         turn_loss=1.0 - speeds.min() / speeds[0],
         turn_deceleration_mps2=_deceleration(speeds, dt_s),
+        thrust_s=_thrust(platform, dt_s),
         stop_s=_stop(platform, dt_s),
     )
 
@@ -119,6 +125,17 @@ def _half_turn(platform: Platform, dt_s: float) -> float:
         before = state[L.HEADING]
         actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
         turned += (state[L.HEADING] - before) % 360.0
+        step += 1
+    return step * dt_s
+
+
+def _thrust(platform: Platform, dt_s: float) -> float:
+    if platform.kind != "usv":
+        return 0.0
+    params, cruising = cruise(platform, dt_s)
+    state, step = fresh_state(0.0, 0.0, 0.0), 0
+    while state[L.THRUST] < FULL_THRUST * cruising[L.THRUST] and step * dt_s < LONGEST_S:
+        actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
         step += 1
     return step * dt_s
 

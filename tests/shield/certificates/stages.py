@@ -8,7 +8,7 @@ from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.program import Program, solve
-from steerclear.shield.scene import new_memory, new_work
+from steerclear.shield.scene import new_memory, new_work, path_samples
 from steerclear.shield.setup import boats_of, plans_of, tuning_of
 
 
@@ -38,7 +38,7 @@ def stages_of(config, state, platforms, team, surroundings=None):
         plans_of(config),
         tuning_of(config),
         new_memory(n),
-        new_work(n, int(boats.hunt_samples.max())),
+        new_work(n, path_samples(boats)),
         plan.new_plan(n, n * (n + 5) + 2),
     )
 
