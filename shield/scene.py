@@ -30,6 +30,7 @@ class Boats(NamedTuple):
         samples: path samples of each boat's horizon, (n,).
         hunt_samples: path samples over which hunting opponents are followed once thrust is full, (n,), at least
             ``samples``.
+        full_thrust: thrust, percent, from which each boat is taken to be at full thrust, (n,).
         thrust_samples: path samples until thrust is full from rest, (n,): so much longer they are followed at most.
         fade: factor of negative margins against hunters per path sample, for boats at full thrust, (n,).
         static_samples: samples over which fixed things are looked at, (n,).
@@ -55,6 +56,7 @@ class Boats(NamedTuple):
     granted_loss: Array
     samples: IntArray
     hunt_samples: IntArray
+    full_thrust: Array
     thrust_samples: IntArray
     fade: Array
     static_samples: IntArray

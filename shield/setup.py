@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .exceptions import TableError
 from .jit import Array, IntArray
 from .platforms import Platform, get_platform
 from .platforms import layout as L
-from .platforms.limits import Limits, limits_of
+from .platforms.limits import ENOUGH_THRUST, FULL_THRUST, Limits, limits_of
 from .scene import Boats, Tuning
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
@@ -68,39 +68,22 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     limits = [limits_of(kind, config.dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
     share = config.opponent_share if certificate.hunters else 0.0
-    horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.dt_s) for kind in kinds]
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
-    sample_s = stride * config.dt_s
     looked = _tables_of(config, kinds, team) if share == 1.0 else _no_tables(len(kinds))
     with_table = (looked.table >= 0).any(axis=1)
-    hunt_s = [
-        max(value, config.hunt_s or certificate.hunt_s(limit)) if share > 0.0 else value
-        for value, limit in zip(horizon_s, limits, strict=True)
-    ]
+    params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
     return Boats(
-        params=np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM),
+        params=params,
         team=np.array(team, dtype=np.int64),
         fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
         granted_turn_dps=np.array([share * limit.turn_rate_dps for limit in limits]),
         granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),
         granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
         granted_loss=np.array([share * _lasting_loss(limit) for limit in limits]),
-        samples=np.array([max(2, math.ceil(value / sample_s)) for value in horizon_s], dtype=np.int64),
-        hunt_samples=np.array([max(2, math.ceil(value / sample_s)) for value in hunt_s], dtype=np.int64),
-        thrust_samples=np.array(
-            [math.ceil(limit.thrust_s / sample_s) if share > 0.0 else 0 for limit in limits], dtype=np.int64
-        ),
-        fade=np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
-        static_samples=np.array(
-            [
-                max(2, math.ceil(min(limit.half_turn_s + STATIC_REACTION_S, value) / sample_s))
-                for limit, value in zip(limits, horizon_s, strict=True)
-            ],
-            dtype=np.int64,
-        ),
+        full_thrust=np.where(with_table, FULL_THRUST, ENOUGH_THRUST) * params[:, L.MAX_THRUST],
         stride=stride,
-        sample_s=sample_s,
+        sample_s=stride * config.dt_s,
         plans=np.where(with_table, len(certificate.plans), certificate.nimble),
         decay=np.where(with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)),
         cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
@@ -110,7 +93,33 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         look=np.where(with_table, looked.steps, 0),
         joint_look=max(1, looked.steps, round(JOINT_LOOK_S / config.dt_s)),
         feared=np.asarray((looked.table >= 0).any(axis=0)),
+        **_horizons(config, kinds, limits, stride * config.dt_s, share > 0.0),
     )
+
+
+def _horizons(
+    config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], sample_s: float, hunters: bool
+) -> dict[str, Any]:
+    """How many samples each boat's paths, hunters and fixed things are followed for."""
+    certificate = CERTIFICATES[config.certificate]
+    horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.dt_s) for kind in kinds]
+    hunt_s, static_s, thrust_s = list(horizon_s), [], []
+    for i, limit in enumerate(limits):
+        static_s.append(min(limit.half_turn_s + STATIC_REACTION_S, horizon_s[i]))
+        thrust_s.append(limit.thrust_s if hunters else 0.0)
+        if hunters:
+            hunt_s[i] = max(horizon_s[i], config.hunt_s or certificate.hunt_s(limit))
+    return {
+        "samples": _samples(horizon_s, sample_s, 2),
+        "hunt_samples": _samples(hunt_s, sample_s, 2),
+        "thrust_samples": _samples(thrust_s, sample_s, 0),
+        "fade": np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
+        "static_samples": _samples(static_s, sample_s, 2),
+    }
+
+
+def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:
+    return np.array([max(least, math.ceil(value / sample_s)) for value in times_s], dtype=np.int64)
 
 
 class _LookedUp(NamedTuple):

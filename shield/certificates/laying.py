@@ -74,6 +74,7 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         boats.samples[i],
         beyond,
         0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride,
+        boats.full_thrust[i],
         work.path[slot],
         work.ready[slot],
     )

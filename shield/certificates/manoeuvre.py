@@ -16,7 +16,6 @@ import math
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..platforms.limits import FULL_THRUST
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing
@@ -33,7 +32,7 @@ RECOVERY_S = 1.5
 def _set_hunt(i: int, state: Array, boats: Boats, work: Work) -> None:
     """How long opponents of boat i are followed at most: what it lacks in thrust it has to regain before it runs."""
     samples, fade = boats.hunt_samples[i], boats.fade[i]
-    if state[i, L.THRUST] < FULL_THRUST * boats.params[i, L.MAX_THRUST]:
+    if state[i, L.THRUST] < boats.full_thrust[i]:
         samples += boats.thrust_samples[i]
         fade **= boats.hunt_samples[i] / samples
     work.hunt_samples[i], work.fade[i] = samples, fade

@@ -16,7 +16,10 @@ from .usv import fresh_state
 LONGEST_S = 60.0
 
 FULL_THRUST = 0.9
-"""Share of its full thrust from which a boat can do, about, what it can at full thrust."""
+"""Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
+
+ENOUGH_THRUST = 0.85
+"""Share of its full thrust from which a nimble boat gets away from hunters about as well as with all of it."""
 
 
 @dataclass(frozen=True)

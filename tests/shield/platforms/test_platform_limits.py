@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from steerclear.shield.platforms import PLATFORMS, get_platform, step_boat
+from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.limits import cruise, limits_of
 
@@ -63,6 +63,21 @@ def test_limits_are_finite_and_positive(name):
     values = [limits.top_speed_mps, limits.acceleration_mps2, limits.turn_rate_dps, limits.half_turn_s, limits.stop_s]
     assert np.isfinite(values).all()
     assert min(values) > 0.0
+
+
+@pytest.mark.parametrize(("name", "about_s"), [("heron", 13.2), ("surveyor", 6.6)])
+def test_thrust_takes_its_time_from_rest(name, about_s):
+    platform = get_platform(name)
+    limits, params, state = limits_of(platform), platform.pack(), fresh_state(0.0, 0.0, 0.0)
+    assert limits.thrust_s == pytest.approx(about_s, abs=0.3)
+    for _ in range(round(limits.thrust_s / 0.1)):
+        assert state[L.THRUST] < 90.0
+        step_boat(params, state, platform.max_speed_mps, 0.0, 0.1)
+    assert state[L.THRUST] >= 89.0
+
+
+def test_boats_without_a_thrust_model_have_theirs_at_once():
+    assert limits_of(get_platform("si")).thrust_s == 0.0
 
 
 @pytest.mark.parametrize("name", ["heron", "surveyor"])
