@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .exceptions import FleetError
 from .jit import Array, BoolArray, IntArray, kernel
-from .platforms import Platform
+from .platforms import Platform, get_platform
 from .platforms import layout as L
 
 _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
@@ -88,7 +88,8 @@ class Fleet:
             position_error_m: (n,) bound on the position error, m.
 
         Raises:
-            FleetError: shapes do not fit together.
+            FleetError: shapes do not fit together, or two boats have the same name.
+            PlatformError: a platform is unknown.
         """
         position = _shaped("position_m", position_m, (None, 2))
         n = len(position)
@@ -104,19 +105,19 @@ class Fleet:
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
             state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
         teams = _whole("team", _shaped("team", team, (n,)))
-        if platforms is None:
-            raise FleetError("platforms is None; give a platform's name, or one for each boat")
-        kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
         fleet = cls(
             state=state,
             team=teams,
-            platforms=kinds,
+            platforms=_kinds(platforms, n),
             controlled=teams == 0 if controlled is None else _shaped("controlled", controlled, (n,)).astype(np.bool_),
             names=tuple(f"boat_{i}" for i in range(n)) if names is None else tuple(names),
             age_s=None if age_s is None else _shaped("age_s", age_s, (n,)),
             position_error_m=None if position_error_m is None else _shaped("position_error_m", position_error_m, (n,)),
         )
         fleet.check()
+        twins = sorted({name for name in fleet.names if fleet.names.count(name) > 1})
+        if twins:
+            raise FleetError(f"names holds {twins[0]!r} more than once; give every boat a name of its own")
         return fleet
 
     def __len__(self) -> int:
@@ -188,6 +189,16 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array
         wanted = tuple("n" if entry is None else entry for entry in shape)
         raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
     return array
+
+
+def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tuple[str | Platform, ...]:
+    """Platforms of n boats, each a known one."""
+    if platforms is None:
+        raise FleetError("platforms is None; give a platform's name, or one for each boat")
+    kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
+    for kind in set(kinds):
+        get_platform(kind)
+    return kinds
 
 
 def _whole(name: str, values: Array) -> IntArray:

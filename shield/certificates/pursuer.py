@@ -78,6 +78,28 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -
 
 
 @lean_kernel
+def _turn_towards(ux: float, uy: float, ax: float, ay: float, c: float, s: float) -> tuple[float, float, float]:
+    """Heading (ux, uy) turned towards (ax, ay) by the most there is, cosine c and sine s, and the share of it used."""
+    along, across = ux * ax + uy * ay, ux * ay - uy * ax
+    if along > 0.0 and abs(across) * c <= along * s:
+        norm = math.sqrt(ax * ax + ay * ay)
+        if norm <= 1e-12:
+            return ux, uy, 1.0
+        return ax / norm, ay / norm, min(1.0, abs(across) / (norm * s)) if s > 0.0 else 0.0
+    if across >= 0.0:
+        return c * ux - s * uy, s * ux + c * uy, 1.0
+    return c * ux + s * uy, c * uy - s * ux, 1.0
+
+
+@lean_kernel
+def _speed_after(speed_mps: float, steady_mps: float, acc_mps2: float, dec_mps2: float, time_s: float) -> float:
+    """Speed some time on of a pursuer whose speed in the present turn would settle at the steady one."""
+    if speed_mps > steady_mps:
+        return max(steady_mps, speed_mps - dec_mps2 * time_s)
+    return min(steady_mps, speed_mps + acc_mps2 * time_s)
+
+
+@lean_kernel
 def clear_of_pursuer(
     own: Array,
     x: float,
@@ -162,22 +184,9 @@ def clear_of_pursuer(
             before = k - stride
             vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
             ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
-        along, across = ux * ax + uy * ay, ux * ay - uy * ax
-        rudder = 1.0
-        if along > 0.0 and abs(across) * c <= along * s:
-            norm = math.sqrt(ax * ax + ay * ay)
-            if norm > 1e-12:
-                ux, uy = ax / norm, ay / norm
-                rudder = min(1.0, abs(across) / (norm * s)) if s > 0.0 else 0.0
-        elif across >= 0.0:
-            ux, uy = c * ux - s * uy, s * ux + c * uy
-        else:
-            ux, uy = c * ux + s * uy, c * uy - s * ux
+        ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
         time_s = stride * sample_s
-        steady = fastest_mps * (1.0 - loss * rudder)
-        new_speed = min(steady, speed_mps + acc_mps2 * time_s)
-        if speed_mps > steady:
-            new_speed = max(steady, speed_mps - dec_mps2 * time_s)
+        new_speed = _speed_after(speed_mps, fastest_mps * (1.0 - loss * rudder), acc_mps2, dec_mps2, time_s)
         way = 0.5 * (speed_mps + new_speed) * time_s
         speed_mps = new_speed
         x += way * ux

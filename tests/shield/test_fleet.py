@@ -40,6 +40,7 @@ def fleet(**changes):
         ({"platforms": ["heron"]}, "platforms has 1 entries for 2 boats"),
         ({"platforms": None}, "platforms is None"),
         ({"names": ["a"]}, "names has 1 entries for 2 boats"),
+        ({"names": ["a", "a"]}, "names holds 'a' more than once; give every boat a name of its own"),
         ({"controlled": [True]}, "controlled has shape"),
         ({"thrust": [1.0]}, "thrust has shape"),
         ({"thrust": [math.inf, 0.0]}, "memory of boat 'boat_0'.*give NaN where it is unknown"),
@@ -64,7 +65,10 @@ def test_what_cannot_be_used_is_refused_in_words_that_help(changes, text):
 @pytest.mark.parametrize("names", ["hron", ["heron", "hron"]])
 def test_an_unknown_platform_is_told_the_known_ones(names):
     with pytest.raises(PlatformError, match="known platforms: di, heron"):
-        Shield().decide(fleet(platforms=names), AHEAD)
+        fleet(platforms=names)
+    kinds = (names,) * 2 if isinstance(names, str) else tuple(names)
+    with pytest.raises(PlatformError, match="known platforms: di, heron"):
+        Shield().decide(replace(fleet(), platforms=kinds), AHEAD)
 
 
 @pytest.mark.parametrize(
