@@ -8,7 +8,7 @@ from .actions import HOLD, ActionReader, to_command
 from .adapters import from_agents, from_callable
 from .guard import GuardedTeam
 from .protocol import Action, BatchPolicy, TeamPolicy
-from .registry import describe, make, make_batch, names
+from .registry import check, describe, make, make_batch, names
 from .report import Failure, PolicyReport
 from .sb3 import load_sb3
 from .submissions import load_submission
@@ -22,6 +22,7 @@ __all__ = [
     "GuardedTeam",
     "PolicyReport",
     "TeamPolicy",
+    "check",
     "describe",
     "from_agents",
     "from_callable",

@@ -155,6 +155,22 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
     raise unknown_policy(text)
 
 
+def check(name_or_path: str | Path) -> None:
+    """Look whether there is such a policy, without loading it: for what is to be refused before long work begins.
+
+    Raises:
+        PolicyError: an unknown name (the message names near matches), or no such file.
+    """
+    text = str(name_or_path)
+    if text in names():
+        return
+    path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
+    if not (text.startswith(SB3_PREFIX) or looks_like_path(text)):
+        raise unknown_policy(text)
+    if not path.exists():
+        raise PolicyError(f"there is no policy at {path}; give a submission's folder or zip, or sb3:PATH.zip")
+
+
 def make_batch(name: str, **options: Any) -> BatchPolicy:
     """A scripted policy for a whole batch of games.
 

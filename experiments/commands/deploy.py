@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 from rich.table import Table
+from steerclear import policies
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.operator import Operator
@@ -63,6 +64,8 @@ def deploy(
     Exit status: 0 done, 1 checks do not allow the start, 2 bad input, 130 interrupted.
     """
     orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
+    if demo:
+        policies.check(opponents)
     file = load_fleet(orders.fleet_file)
     dashboard = d.on_terminal() and not plain
     operator, console, started = Operator(), out(), time.perf_counter()
@@ -104,6 +107,7 @@ def _orders(
         raise ConfigError("give a FLEET.yaml, or --demo for boats that come with the package")
     if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
+    policies.check(policy)
     return Orders(
         fleet_file=demo_file() if fleet is None else fleet,
         policy=policy,

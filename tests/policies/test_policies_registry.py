@@ -37,6 +37,27 @@ def test_an_unknown_name_lists_near_matches_and_all_names():
         policies.make_batch("ramer")
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("medum", "did you mean medium"),
+        ("nowhere/solution.py", "there is no policy at nowhere/solution.py"),
+        ("sb3:nowhere.zip", "there is no policy at nowhere.zip"),
+    ],
+)
+def test_what_is_not_there_is_said_without_loading_anything(name, text):
+    with pytest.raises(PolicyError, match=text):
+        policies.check(name)
+
+
+def test_what_is_there_passes(tmp_path):
+    for name in policies.names():
+        policies.check(name)
+    policies.check(tmp_path)
+    (tmp_path / "weights.zip").touch()
+    policies.check(f"sb3:{tmp_path / 'weights.zip'}")
+
+
 def test_an_unknown_option_is_explained():
     with pytest.raises(PolicyError, match="'medium' has no option 'role'; did you mean 'roles'"):
         policies.make("medium", role="attack")

@@ -9,11 +9,13 @@ import time
 from pathlib import Path
 
 import pytest
+from steerclear.experiments import cli
 from steerclear.experiments.boats.demo import demo_text
 from steerclear.experiments.deploy.demo import PORTS, Demo, demo_file
 from steerclear.experiments.deploy.lifeline import end_with_parent
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import BridgeError
+from typer.testing import CliRunner
 
 STARTER = """
 import sys, time
@@ -107,3 +109,11 @@ def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
         os.close(theirs)
         thread.join(10.0)
     assert told == [(os.getpid(), signal.SIGTERM), 1]
+
+
+@pytest.mark.parametrize("option", ["--policy", "--opponents"])
+def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.commands.deploy.Demo", None)
+    told = CliRunner().invoke(cli.app, ["deploy", "--demo", option, "medum"])
+    assert told.exit_code == 2
+    assert "did you mean medium" in " ".join(told.output.split())
