@@ -30,9 +30,10 @@ class Boats(NamedTuple):
         samples: path samples of each boat's horizon, (n,).
         hunt_samples: path samples over which hunting opponents are followed once thrust is full, (n,), at least
             ``samples``.
-        full_thrust: thrust, percent, from which each boat is taken to be at full thrust, (n,).
-        thrust_samples: path samples until thrust is full from rest, (n,): so much longer they are followed at most.
-        fade: factor of negative margins against hunters per path sample, for boats at full thrust, (n,).
+        ready_thrust: thrust, percent, from which each boat is taken to have all of it, (n,).
+        thrust_samples: path samples until a boat has its thrust back at the latest, (n,): so much longer hunters are
+            followed at most.
+        fade: factor of negative margins against hunters per path sample, for boats that have their thrust, (n,).
         static_samples: samples over which fixed things are looked at, (n,).
         stride: model steps between path samples.
         sample_s: time between path samples, s.
@@ -56,7 +57,7 @@ class Boats(NamedTuple):
     granted_loss: Array
     samples: IntArray
     hunt_samples: IntArray
-    full_thrust: Array
+    ready_thrust: Array
     thrust_samples: IntArray
     fade: Array
     static_samples: IntArray
@@ -157,8 +158,7 @@ class Work(NamedTuple):
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
-        hunt_samples: (n,) path samples over which opponents are followed at most, as the boat is now.
-        fade: (n,) factor of negative margins against them per path sample, so that it is the same at the end.
+        reach_samples: (n,) path samples over which opponents may be followed, as the boat is now.
         breach: (n, n) pairs inside the separation.
         radius: (n, n) radius to keep, m.
         course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
@@ -195,8 +195,7 @@ class Work(NamedTuple):
     bound: IntArray
     near: BoolArray
     hunted: BoolArray
-    hunt_samples: IntArray
-    fade: Array
+    reach_samples: IntArray
     breach: BoolArray
     radius: Array
     course: Array
@@ -249,8 +248,7 @@ def new_work(boats: int, samples: int) -> Work:
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),
-        hunt_samples=np.zeros(boats, np.int64),
-        fade=np.zeros(boats),
+        reach_samples=np.zeros(boats, np.int64),
         breach=np.zeros((boats, boats), np.bool_),
         radius=np.zeros((boats, boats)),
         course=np.zeros((boats, 4)),

@@ -13,7 +13,7 @@ from .certificates import CERTIFICATES
 from .certificates.paths import SAG_M
 from .config import ShieldConfig
 from .exceptions import TableError
-from .jit import Array, IntArray
+from .jit import Array, BoolArray, IntArray
 from .platforms import Platform, get_platform
 from .platforms import layout as L
 from .platforms.limits import ENOUGH_THRUST, FULL_THRUST, Limits, limits_of
@@ -81,7 +81,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),
         granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
         granted_loss=np.array([share * _lasting_loss(limit) for limit in limits]),
-        full_thrust=np.where(with_table, FULL_THRUST, ENOUGH_THRUST) * params[:, L.MAX_THRUST],
+        ready_thrust=_ready_thrust(params, limits, with_table),
         stride=stride,
         sample_s=stride * config.dt_s,
         plans=np.where(with_table, len(certificate.plans), certificate.nimble),
@@ -116,6 +116,13 @@ def _horizons(
         "fade": np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
         "static_samples": _samples(static_s, sample_s, 2),
     }
+
+
+def _ready_thrust(params: Array, limits: list[Limits], with_table: BoolArray) -> Array:
+    """Thrust, percent, from which boats have enough: of that at top speed, or for a table of all there is."""
+    top = params[:, L.MAX_THRUST]
+    steady = np.minimum(top, [limit.thrust for limit in limits])
+    return np.asarray(np.where(with_table, FULL_THRUST * top, ENOUGH_THRUST * steady))
 
 
 def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:

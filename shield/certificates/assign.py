@@ -11,7 +11,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
 from .laying import lay_path, most_merit, run_out, set_out
-from .paths import TURNING_SAMPLE, angle_to_go
+from .paths import READY_SAMPLE, TURNING_SAMPLE, angle_to_go
 from .rating import PAIR_SAFE, STRAIGHT_SAFE, rate_path
 
 SWEEPS = 3
@@ -57,8 +57,8 @@ def choose_plan(
     table the choice is made anew at every step, so that is asked of the other side only. What a table refuses one step
     on it refuses for every manoeuvre: then the first that keeps clear of all else will do.
 
-    A hard turn that fails while the boat still turns says the same of every longer one to that side: until then they
-    are one and the same, and longer ones are worth no more.
+    A hard turn that fails while the boat still turns, its thrust back by then, says the same of every longer one to
+    that side: until then they are one and the same, and longer ones are worth no more.
     """
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
@@ -77,7 +77,8 @@ def choose_plan(
             continue
         run_out(i, trial, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
-        if hard and work.decided[trial] <= work.ready[trial, TURNING_SAMPLE]:
+        ready, turning = work.ready[trial, READY_SAMPLE], work.ready[trial, TURNING_SAMPLE]
+        if hard and 0.0 <= ready <= turning and work.decided[trial] <= turning:
             if side > 0.0:
                 no_more_starboard = togo
             else:

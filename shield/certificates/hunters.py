@@ -25,7 +25,7 @@ FORGOTTEN_LOSS = 0.1
 """Hunters that lose less of their speed for good in their hardest turn are followed with that turn only."""
 
 LEAD_SHARE = 0.15
-"""Share of the time it is followed by which a hunter leads the boat at most."""
+"""Share of the time that the hunt lasts by which a hunter leads the boat at most."""
 
 
 @lean_kernel
@@ -57,15 +57,15 @@ def clear_of_hunter(
     """
     ready = int(work.ready[slot, READY_SAMPLE])
     till_ready = ready >= 0 and tabled(i, j, ours, boats, work)
-    samples = work.hunt_samples[i]
+    lasts = boats.hunt_samples[i] + boats.thrust_samples[i]
     if ready >= 0:
-        samples = min(samples, ready if till_ready else ready + boats.hunt_samples[i])
+        lasts = min(lasts, ready + boats.hunt_samples[i])
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
         manner = _first_then_rest(first, number)
-        weight = _run_hunter(i, j, slot, manner, samples, till_ready, state, boats, tuning, work, floor_m, cap_m)
+        weight = _run_hunter(i, j, slot, manner, lasts, till_ready, state, boats, tuning, work, floor_m, cap_m)
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -81,8 +81,8 @@ def _run_hunter(
     j: int,
     slot: int,
     manner: int,
-    samples: int,
-    to_end: bool,
+    lasts: int,
+    till_ready: bool,
     state: Array,
     boats: Boats,
     tuning: Tuning,
@@ -90,8 +90,14 @@ def _run_hunter(
     floor_m: float,
     cap_m: float,
 ) -> float:
-    """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by."""
-    sample_s = boats.sample_s
+    """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by.
+
+    The hunt lasts so many samples; how far it leads the boat and how margins fade over it go by that.
+    """
+    sample_s, fade = boats.sample_s, boats.fade[i]
+    if lasts != boats.hunt_samples[i]:
+        fade **= boats.hunt_samples[i] / lasts
+    samples = min(lasts, int(work.ready[slot, READY_SAMPLE])) if till_ready else lasts
     course = work.course[j]
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
     return clear_of_pursuer(
@@ -107,15 +113,15 @@ def _run_hunter(
         boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
         RUDDERS[manner // 2] * turn,
         manner % 2 == 1,
-        LEAD_SHARE * work.hunt_samples[i],
+        LEAD_SHARE * lasts,
         sample_s,
         samples,
         closing(i, j, state, boats, tuning),
         work.radius[i, j],
-        work.fade[i],
+        fade,
         floor_m,
         cap_m,
-        to_end,
+        till_ready,
         work.hunter,
         work.spare,
     )

@@ -9,7 +9,7 @@ from .rating import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
 from .values import looked_up, set_place, tabled, worst_by_tables
 
 NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
-"""How far hunters are run through: not at all, until thrust is full and tables answer, or to the end."""
+"""How far hunters are run through: not at all, until thrust is back and tables answer, or to the end of the hunt."""
 
 
 @lean_kernel
@@ -57,7 +57,7 @@ def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> 
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     how = hunters_run(i, slot, boats, work)
-    samples = boats.samples[i] if how == NO_HUNTERS else work.hunt_samples[i]
+    samples = boats.samples[i] if how == NO_HUNTERS else boats.hunt_samples[i] + boats.thrust_samples[i]
     beyond = boats.hunt_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
@@ -74,7 +74,7 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         boats.samples[i],
         beyond,
         0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride,
-        boats.full_thrust[i],
+        boats.ready_thrust[i],
         work.path[slot],
         work.ready[slot],
     )

@@ -16,6 +16,7 @@ import math
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
+from ..platforms.usv import next_thrust
 from ..scene import Boats, Tuning, Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing
@@ -26,16 +27,6 @@ REGAIN_M = 0.01
 
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
-
-
-@lean_kernel
-def _set_hunt(i: int, state: Array, boats: Boats, work: Work) -> None:
-    """How long opponents of boat i are followed at most: what it lacks in thrust it has to regain before it runs."""
-    samples, fade = boats.hunt_samples[i], boats.fade[i]
-    if state[i, L.THRUST] < boats.full_thrust[i]:
-        samples += boats.thrust_samples[i]
-        fade **= boats.hunt_samples[i] / samples
-    work.hunt_samples[i], work.fade[i] = samples, fade
 
 
 @lean_kernel
@@ -54,7 +45,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for i in range(n):
         work.hunted[i] = False
-        _set_hunt(i, state, boats, work)
+        work.reach_samples[i] = _reach_samples(i, state, ours, boats, tuning)
         work.first_hunter[i] = 0
         work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
@@ -67,7 +58,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
             top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
             samples = max(boats.samples[i], boats.samples[j])
             if boats.team[i] != boats.team[j]:
-                samples = max(samples, max(work.hunt_samples[i], work.hunt_samples[j]))
+                samples = max(samples, max(work.reach_samples[i], work.reach_samples[j]))
             horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
             radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
@@ -86,6 +77,24 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
     find_beset(ours, state, boats, tuning, work)
+
+
+@lean_kernel
+def _reach_samples(i: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning) -> int:
+    """Samples over which opponents of boat i may be followed.
+
+    One whose thrust stays enough for the next step, whatever is commanded, is followed as boats are that have all of
+    theirs; so is one that is not ours, whose manoeuvres nobody looks at.
+    """
+    if not ours[i]:
+        return boats.hunt_samples[i]
+    row = state[i]
+    least, _, _ = next_thrust(
+        boats.params[i], row[L.SPEED], row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL], 0.0, tuning.dt_s
+    )
+    if boats.look[i] == 0 and min(least, row[L.THRUST]) >= boats.ready_thrust[i]:
+        return boats.hunt_samples[i]
+    return boats.hunt_samples[i] + boats.thrust_samples[i]
 
 
 @lean_kernel

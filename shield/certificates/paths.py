@@ -51,10 +51,10 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 @lean_kernel
 def _note_ready(
-    k: int, earliest: int, thrust: float, full_thrust: float, heading_rad: float, speed_mps: float, ready: Array
+    k: int, earliest: int, thrust: float, ready_thrust: float, heading_rad: float, speed_mps: float, ready: Array
 ) -> None:
     """Note the first sample, from the earliest that counts, at which thrust is full."""
-    if ready[READY_SAMPLE] < 0.0 and k >= earliest and thrust >= full_thrust:
+    if ready[READY_SAMPLE] < 0.0 and k >= earliest and thrust >= ready_thrust:
         ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, heading_rad, speed_mps
 
 
@@ -72,11 +72,11 @@ def trace_path(
     least: int,
     beyond: int,
     earliest: int,
-    full_thrust: float,
+    ready_thrust: float,
     path: Array,
     ready: Array,
 ) -> None:
-    """Fill ``path[: samples + 1]`` with positions, m, along an escape manoeuvre.
+    """Write positions, m, along an escape manoeuvre: ``path[: samples + 1]``, or fewer, see ``least`` and ``beyond``.
 
     Args:
         params: platform row of the boat.
@@ -91,7 +91,7 @@ def trace_path(
         least: number of them after which the path may end.
         beyond: number of them after the one where thrust is full that the path goes on for.
         earliest: first sample at which that counts.
-        full_thrust: thrust, percent, taken as full.
+        ready_thrust: thrust, percent, from which the boat has all of it.
         path: shape (>= samples + 1, 2), float64.
         ready: shape (4,), what is noted, see `READY_SAMPLE`.
     """
@@ -110,7 +110,7 @@ def trace_path(
             least,
             beyond,
             earliest,
-            full_thrust,
+            ready_thrust,
             path,
             ready,
         )
@@ -118,7 +118,7 @@ def trace_path(
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
     path[0, 0], path[0, 1] = row[L.X], row[L.Y]
-    _note_ready(0, earliest, row[L.THRUST], full_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
+    _note_ready(0, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
     k = 1
     step = 0
     while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
@@ -126,7 +126,7 @@ def trace_path(
         step += 1
         if step % stride == 0:
             path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-            _note_ready(k, earliest, row[L.THRUST], full_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
+            _note_ready(k, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
             k += 1
 
 
@@ -144,7 +144,7 @@ def _trace_usv(
     least: int,
     beyond: int,
     earliest: int,
-    full_thrust: float,
+    ready_thrust: float,
     path: Array,
     ready: Array,
 ) -> None:
@@ -166,7 +166,7 @@ def _trace_usv(
     if done == 1:
         path[0, 0], path[0, 1] = x, y
         ready[TURNING_SAMPLE] = 0.0
-        _note_ready(0, earliest, thrust, full_thrust, heading, v, ready)
+        _note_ready(0, earliest, thrust, ready_thrust, heading, v, ready)
         k, step = 1, 0
     while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
         last = thrust
@@ -201,7 +201,7 @@ def _trace_usv(
             if turning:
                 ready[TURNING_SAMPLE] = k
             if ready[READY_SAMPLE] < 0.0:
-                _note_ready(k, earliest, thrust, full_thrust, math.atan2(ux, uy), v, ready)
+                _note_ready(k, earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)
             k += 1
         if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and k > 0:
             _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, samples, path)

@@ -33,11 +33,11 @@ PLACE_X, PLACE_Y, PLACE_HEADING, PLACE_SPEED, PLACE_USABLE = range(5)
 
 
 @lean_kernel
-def _note_place(row: Array, full_thrust: float, place: Array) -> None:
+def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
     """Write the place of a state row; of a boat not at full thrust the table tells nothing."""
     place[PLACE_X], place[PLACE_Y] = row[L.X], row[L.Y]
     place[PLACE_HEADING], place[PLACE_SPEED] = math.radians(row[L.HEADING]), row[L.SPEED]
-    place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= full_thrust else 0.0
+    place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= ready_thrust else 0.0
 
 
 @lean_kernel
@@ -56,7 +56,7 @@ def run_opponents(
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(steps):
                 actuate(params, work.row, speed, turn, tuning.dt_s)
-            _note_place(work.row, boats.full_thrust[j], ways[j, way])
+            _note_place(work.row, boats.ready_thrust[j], ways[j, way])
 
 
 @lean_kernel
@@ -72,7 +72,7 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work
         work.beset[i] = False
         if not ours[i] or boats.look[i] == 0:
             continue
-        _note_place(state[i], boats.full_thrust[i], work.place[i])
+        _note_place(state[i], boats.ready_thrust[i], work.place[i])
         count = 0
         for j in range(n):
             if j != i and work.near[i, j] and looked_up(i, j, i, ours, boats, work):
@@ -108,12 +108,12 @@ def set_place(
     first = 0 if done == 1 else boats.look[i]
     for _ in range(first):
         togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
-    _note_place(work.row, boats.full_thrust[i], work.place[slot])
+    _note_place(work.row, boats.ready_thrust[i], work.place[slot])
     if not work.beset[i]:
         return
     for _ in range(boats.joint_look + 1 - done - first):
         togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
-    _note_place(work.row, boats.full_thrust[i], work.later[slot])
+    _note_place(work.row, boats.ready_thrust[i], work.later[slot])
 
 
 @lean_kernel

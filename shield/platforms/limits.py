@@ -15,11 +15,14 @@ from .usv import fresh_state
 
 LONGEST_S = 60.0
 
+EVERY_S = 0.5
+"""Time between the moments of a stop that are tried, s."""
+
 FULL_THRUST = 0.9
 """Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
 
 ENOUGH_THRUST = 0.85
-"""Share of its full thrust from which a nimble boat gets away from hunters about as well as with all of it."""
+"""Share of its thrust at top speed from which a boat gets away from hunters about as well as with all of it."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Limits:
         half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
         turn_loss: share of top speed lost in a long turn at full rudder and full speed command.
         turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
-        thrust_s: time from rest under a full speed command until thrust is full, s; 0 without a thrust model.
+        thrust: thrust at top speed, percent; 0 without a thrust model.
+        thrust_s: longest time under a full speed command until 90 % of that is there, from rest or out of a stop, s.
         stop_s: time from top speed to below 5 % of it under a stop command, s.
     """
 
@@ -43,6 +47,7 @@ class Limits:
     half_turn_s: float
     turn_loss: float
     turn_deceleration_mps2: float
+    thrust: float
     thrust_s: float
     stop_s: float
 
@@ -58,6 +63,7 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
         half_turn_s=_half_turn(platform, dt_s),
         turn_loss=1.0 - speeds.min() / speeds[0],
         turn_deceleration_mps2=_deceleration(speeds, dt_s),
+        thrust=round(float(cruise(platform, dt_s)[1][L.THRUST]), 3),
         thrust_s=_thrust(platform, dt_s),
         stop_s=_stop(platform, dt_s),
     )
@@ -133,11 +139,25 @@ def _half_turn(platform: Platform, dt_s: float) -> float:
 
 
 def _thrust(platform: Platform, dt_s: float) -> float:
+    """The longest of the times it takes out of a stop begun at top speed, let go at any moment, rest being the last."""
     if platform.kind != "usv":
         return 0.0
-    params, cruising = cruise(platform, dt_s)
-    state, step = fresh_state(0.0, 0.0, 0.0), 0
-    while state[L.THRUST] < FULL_THRUST * cruising[L.THRUST] and step * dt_s < LONGEST_S:
+    params, slowing = cruise(platform, dt_s)
+    enough = FULL_THRUST * slowing[L.THRUST]
+    longest = _until_thrust(platform, fresh_state(0.0, 0.0, 0.0), enough, dt_s)
+    for _ in range(int(LONGEST_S / EVERY_S)):
+        if slowing[L.SPEED] < 0.01 * platform.max_speed_mps:
+            break
+        for _ in range(max(1, round(EVERY_S / dt_s))):
+            actuate(params, slowing, 0.0, 0.0, dt_s)
+        longest = max(longest, _until_thrust(platform, slowing.copy(), enough, dt_s))
+    return longest
+
+
+def _until_thrust(platform: Platform, state: Array, enough: float, dt_s: float) -> float:
+    """Time under a full speed command until so much thrust is there, s."""
+    params, step = platform.pack(), 0
+    while state[L.THRUST] < enough and step * dt_s < LONGEST_S:
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
         step += 1
     return step * dt_s
