@@ -37,6 +37,17 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
 
 
 @lean_kernel
+def holds_for_longer(slot: int, work: Work) -> bool:
+    """Whether a hard turn that fails says the same of every longer one to that side, see `choose_plan`.
+
+    It does when that was decided while the boat still turned and had its thrust back by then, on which hangs how long
+    it is hunted.
+    """
+    turning = work.ready[slot, TURNING_SAMPLE]
+    return 0.0 <= work.ready[slot, READY_SAMPLE] <= turning and work.decided[slot] <= turning
+
+
+@lean_kernel
 def choose_plan(
     i: int,
     wanted_mps: float,
@@ -77,8 +88,7 @@ def choose_plan(
             continue
         run_out(i, trial, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
-        ready, turning = work.ready[trial, READY_SAMPLE], work.ready[trial, TURNING_SAMPLE]
-        if hard and 0.0 <= ready <= turning and work.decided[trial] <= turning:
+        if hard and holds_for_longer(trial, work):
             if side > 0.0:
                 no_more_starboard = togo
             else:

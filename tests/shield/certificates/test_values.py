@@ -89,16 +89,25 @@ def test_a_gap_between_two_that_lie_still_is_seen_as_one():
 @pytest.mark.parametrize(
     ("fleet", "settings"),
     [
-        (apart(1.0, 24.0, 180.0, percent=40.0), {}),
         (apart(1.0, 9.0, 180.0, 2.0, 2.0, "heron"), {}),
         (apart(1.0, 24.0, 180.0), {"opponent_share": 0.9}),
         (apart(1.0, 24.0, 180.0), {"position_error_m": 1.5}),
     ],
-    ids=["thrust the table is not for", "nimble boats", "tamer opponents", "a radius beyond the table"],
+    ids=["nimble boats", "tamer opponents", "a radius beyond the table"],
 )
 def test_where_no_table_answers_opponents_are_run_through(fleet, settings):
     same = {"table_response_per_s": 1.0, **settings}  # the rate is the boat's, whoever answers
     assert answers(fleet, **same) == answers(fleet, certificate="turning_circle", **same)
+
+
+def test_boats_that_lack_the_thrust_the_table_is_for_are_run_through():
+    """The run lasts a little longer than without a table: until thrust is what the table needs."""
+    fleet = apart(1.0, 24.0, 180.0, percent=40.0)
+    sent, reason, certificate = answers(fleet, table_response_per_s=1.0)
+    same = answers(fleet, table_response_per_s=1.0, certificate="turning_circle")
+    assert (sent, reason) == same[:2]
+    assert certificate == pytest.approx(same[2], abs=0.05)
+    assert certificate[0] < 0.0
 
 
 def test_nimble_boats_are_looked_up_when_asked_for():

@@ -1,0 +1,33 @@
+"""The README's code runs as it stands and prints what it says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+def printed(block, capsys):
+    exec(compile(block.replace("my_submission.zip", "medium"), "README.md", "exec"), {})
+    return capsys.readouterr().out.strip()
+
+
+def test_there_are_as_many_blocks_as_are_run_here():
+    assert len(BLOCKS) == 3
+
+
+def test_fifteen_lines_print_what_is_said(capsys):
+    said = re.search(r"## Fifteen lines.*?```text\n(.*?)\n```", README, flags=re.DOTALL).group(1)
+    assert printed(BLOCKS[0], capsys) == said
+
+
+def test_a_wrapped_game_steps_and_tells_its_reason(capsys):
+    said = re.search(r"\.reason\.name\)  # (\w+);", BLOCKS[1]).group(1)
+    assert printed(BLOCKS[1], capsys) == said
+
+
+@pytest.mark.filterwarnings("default")
+def test_learners_begin(capsys):
+    printed(BLOCKS[2], capsys)
