@@ -117,7 +117,7 @@ def _orders(
         seed=seed,
         tlog=tlog,
         speed=speed,
-        connect_s=max(wait_s, 60.0) if demo else wait_s,
+        connect_s=max(wait_s, 60.0) if demo and wait_s > 0.0 else wait_s,
     )
 
 

@@ -13,7 +13,7 @@ from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
 from steerclear.shield.bridge.tick import TickSink
-from steerclear.shield.exceptions import FleetFileError
+from steerclear.shield.exceptions import ConfigError, FleetFileError
 
 from .preflight_file import measured_delay_s
 from .rules import game_config
@@ -23,6 +23,9 @@ LOG = logging.getLogger(__name__)
 
 LONGEST_MINUTES = 120.0
 """Room for so long a log is asked for when no end is given."""
+
+LONGEST_WAIT_S = 3600.0
+FASTEST = 1000.0
 
 Shown = Callable[[CheckResult], None]
 
@@ -41,6 +44,9 @@ class Orders:
         tlog: whether raw packets are kept as well.
         speed: times faster than real time, for simulated boats that live so.
         connect_s: how long boats are waited for, s.
+
+    Raises:
+        ConfigError: the speed is not above 0 or the wait is out of range.
     """
 
     fleet_file: Path
@@ -52,6 +58,12 @@ class Orders:
     tlog: bool = True
     speed: float = 1.0
     connect_s: float = CONNECT_S
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.connect_s <= LONGEST_WAIT_S:
+            raise ConfigError(f"boats are waited for {self.connect_s:g} s; give --wait more than 0, at most an hour")
+        if not 0.0 < self.speed <= FASTEST:
+            raise ConfigError(f"boats live {self.speed:g} times as fast; give --speed more than 0, at most {FASTEST:g}")
 
 
 @dataclass
