@@ -43,7 +43,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
     check_results(results, separation_m)
     replays = results.get("replays") or ()
     parts = {
-        "TITLE": as_text(results.get("title") or "What the shield changes"),
+        "TITLE": as_text(results.get("title") or _title(results["settings"])),
         "STYLE": template("report.css"),
         "SUBTITLE": as_text(_subtitle(results, separation_m)),
         "HEADLINES": headlines(results["pairings"], separation_m),
@@ -104,10 +104,26 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
         parts.append(
             f"{settings['own']} against {', '.join(settings.get('opponents') or ())}".removesuffix(" against ")
         )
-    parts.append(f"{len(results['games'])} games, each start played without and with the shield")
+    count = len(results["games"])
+    parts.append(f"{count} game{'' if count == 1 else 's'}, {_played(settings)}")
     parts.append(f"separation {separation_m:g} m")
     parts.append(words_of(settings.get("conditions") or {}))
     return " · ".join(filter(None, parts))
+
+
+def _title(settings: Mapping[str, Any]) -> str:
+    states = set(settings.get("states") or (False, True))
+    if len(states) > 1:
+        return "What the shield changes"
+    return "Games with the shield" if True in states else "Games without the shield"
+
+
+def _played(settings: Mapping[str, Any]) -> str:
+    """Which states of the shield the games were played in."""
+    states = set(settings.get("states") or (False, True))
+    if len(states) > 1:
+        return "each start played without and with the shield"
+    return "played with the shield" if True in states else "played without the shield"
 
 
 def _plots(results: Mapping[str, Any], separation_m: float) -> str:

@@ -57,6 +57,21 @@ def count(plot, tag, style):
     return sum(1 for part in plot.iter() if part.tag.endswith(tag) and part.get("class") == style)
 
 
+@pytest.mark.parametrize(
+    ("states", "title", "played"),
+    [
+        ([False, True], "What the shield changes", "each start played without and with the shield"),
+        ([True], "Games with the shield", "played with the shield"),
+        ([False], "Games without the shield", "played without the shield"),
+    ],
+)
+def test_the_report_says_which_states_were_played(states, title, played, results, tmp_path):
+    results["settings"]["states"] = states
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert title in text
+    assert f"7 games, {played} ·" in text
+
+
 def test_the_report_shows_what_it_was_given(results, tmp_path):
     text = write_report(results, tmp_path / "deep" / "report.html").read_text()
     hits, teammates, captures, closest, changed, reasons = plots_in(text)
