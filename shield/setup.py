@@ -71,7 +71,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     looked = _tables_of(config, kinds, team) if share == 1.0 else _no_tables(len(kinds))
-    with_table = (looked.table >= 0).any(axis=1)
+    with_table = np.asarray((looked.table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
     return Boats(
         params=params,
