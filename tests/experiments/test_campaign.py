@@ -89,6 +89,16 @@ def test_resuming_with_other_settings_plays_anew(played, tmp_path):
     )
 
 
+def test_games_of_a_policy_from_a_file_are_said_to_be_of_the_file_as_it_was(played, tmp_path):
+    campaign, _ = played
+    specs = [replace(spec, own="entry/solution.py") for spec in campaign.specs]
+    store = ResultStore(tmp_path)
+    for spec in specs[:1]:
+        store.append(spec.key, {"pairing": spec.pairing, "game": spec.game})
+    told = Campaign(specs, ResultStore(tmp_path, resume=True)).words_of_before
+    assert "with entry/solution.py as it was then: after a change of it choose another --out" in told
+
+
 def explode(spec):
     if spec.opponent == "hold":
         raise GameError("no room; use a larger field")
