@@ -1,6 +1,7 @@
 """Everything is compiled before the first decision, and nothing is remembered of it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,6 +57,7 @@ def test_a_fleets_tables_are_read(monkeypatch):
 
 
 def test_a_fleet_of_unknown_boats_is_refused():
-    fleet, _ = head_on("raft")
+    fleet, _ = head_on()
+    fleet = replace(fleet, platforms=("raft", "raft"))
     with pytest.raises(PlatformError, match="raft"):
         Shield().warm_up(fleet)

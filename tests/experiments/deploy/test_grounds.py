@@ -19,7 +19,7 @@ from steerclear.shield.surroundings import OPEN_WATER
 from steerclear.shield.wrappers import ShieldedParallelEnv
 from steerclear.shield.wrappers.mctf import MctfReader
 
-STEPS, LEG_STEPS = 900, 300
+STEPS, LEG_STEPS = 2400, 300
 
 
 def to_and_from_own_flag(env, agents, step):
