@@ -43,7 +43,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
     check_results(results, separation_m)
     replays = results.get("replays") or ()
     parts = {
-        "TITLE": as_text(results.get("title") or _title(results["settings"])),
+        "TITLE": as_text(results.get("title") or _played(results["settings"])[0]),
         "STYLE": template("report.css"),
         "SUBTITLE": as_text(_subtitle(results, separation_m)),
         "HEADLINES": headlines(results["pairings"], separation_m),
@@ -105,25 +105,19 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
             f"{settings['own']} against {', '.join(settings.get('opponents') or ())}".removesuffix(" against ")
         )
     count = len(results["games"])
-    parts.append(f"{count} game{'' if count == 1 else 's'}, {_played(settings)}")
+    parts.append(f"{count} game{'' if count == 1 else 's'}, {_played(settings)[1]}")
     parts.append(f"separation {separation_m:g} m")
     parts.append(words_of(settings.get("conditions") or {}))
     return " · ".join(filter(None, parts))
 
 
-def _title(settings: Mapping[str, Any]) -> str:
+def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
+    """Title, and words for the states of the shield that the games were played in."""
     states = set(settings.get("states") or (False, True))
     if len(states) > 1:
-        return "What the shield changes"
-    return "Games with the shield" if True in states else "Games without the shield"
-
-
-def _played(settings: Mapping[str, Any]) -> str:
-    """Which states of the shield the games were played in."""
-    states = set(settings.get("states") or (False, True))
-    if len(states) > 1:
-        return "each start played without and with the shield"
-    return "played with the shield" if True in states else "played without the shield"
+        return "What the shield changes", "each start played without and with the shield"
+    how = "with" if True in states else "without"
+    return f"Games {how} the shield", f"played {how} the shield"
 
 
 def _plots(results: Mapping[str, Any], separation_m: float) -> str:

@@ -165,7 +165,7 @@ def check(name_or_path: str | Path) -> None:
     if text in names():
         return
     path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
-    if not (text.startswith(SB3_PREFIX) or looks_like_path(text)):
+    if not text or not (text.startswith(SB3_PREFIX) or looks_like_path(text)):
         raise unknown_policy(text)
     if not path.exists():
         raise PolicyError(f"there is no policy at {path}; give a submission's folder or zip, or sb3:PATH.zip")

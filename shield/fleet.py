@@ -196,7 +196,9 @@ def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tupl
     if platforms is None:
         raise FleetError("platforms is None; give a platform's name, or one for each boat")
     kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
-    for kind in set(kinds):
+    for kind in kinds:
+        if not isinstance(kind, (str, Platform)):
+            raise FleetError(f"platforms holds {kind!r}; give names of platforms, or Platform objects")
         get_platform(kind)
     return kinds
 

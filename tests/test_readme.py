@@ -9,8 +9,15 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
+def run(block):
+    """The names a block leaves."""
+    left = {}
+    exec(compile(block.replace("my_submission.zip", "medium"), "README.md", "exec"), left)
+    return left
+
+
 def printed(block, capsys):
-    exec(compile(block.replace("my_submission.zip", "medium"), "README.md", "exec"), {})
+    run(block)
     return capsys.readouterr().out.strip()
 
 
@@ -29,5 +36,6 @@ def test_a_wrapped_game_steps_and_tells_its_reason(capsys):
 
 
 @pytest.mark.filterwarnings("default")
-def test_learners_begin(capsys):
-    printed(BLOCKS[2], capsys)
+def test_as_many_learners_begin_as_is_said():
+    said = int(re.search(r"# (\d+) boats", BLOCKS[2]).group(1))
+    assert len(run(BLOCKS[2])["observations"]) == said

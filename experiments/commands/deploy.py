@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -63,9 +63,9 @@ def deploy(
 
     Exit status: 0 done, 1 checks do not allow the start, 2 bad input, 130 interrupted.
     """
-    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
     if demo:
         policies.check(opponents)
+    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
     file = load_fleet(orders.fleet_file)
     dashboard = d.on_terminal() and not plain
     operator, console, started = Operator(), out(), time.perf_counter()
@@ -108,8 +108,8 @@ def _orders(
     if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
     policies.check(policy)
-    return Orders(
-        fleet_file=demo_file() if fleet is None else fleet,
+    orders = Orders(
+        fleet_file=fleet or Path(),
         policy=policy,
         boat=boat,
         minutes=minutes,
@@ -119,6 +119,7 @@ def _orders(
         speed=speed,
         connect_s=max(wait_s, 60.0) if demo and wait_s > 0.0 else wait_s,
     )
+    return orders if fleet is not None else replace(orders, fleet_file=demo_file())  # a folder, once all else is sound
 
 
 def _table(figures: dict[str, float]) -> Table:

@@ -25,7 +25,10 @@ LONGEST_MINUTES = 120.0
 """Room for so long a log is asked for when no end is given."""
 
 LONGEST_WAIT_S = 3600.0
+"""Nobody means to wait longer for boats; more is a slip of the keyboard."""
+
 FASTEST = 1000.0
+"""Simulated boats live no faster, times real time."""
 
 Shown = Callable[[CheckResult], None]
 

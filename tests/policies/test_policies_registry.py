@@ -40,6 +40,7 @@ def test_an_unknown_name_lists_near_matches_and_all_names():
 @pytest.mark.parametrize(
     ("name", "text"),
     [
+        ("", "unknown policy ''"),
         ("medum", "did you mean medium"),
         ("nowhere/solution.py", "there is no policy at nowhere/solution.py"),
         ("sb3:nowhere.zip", "there is no policy at nowhere.zip"),

@@ -39,6 +39,7 @@ def fleet(**changes):
         ({"team": [0, math.nan]}, "team holds a value that is not a whole number"),
         ({"platforms": ["heron"]}, "platforms has 1 entries for 2 boats"),
         ({"platforms": None}, "platforms is None"),
+        ({"platforms": ["heron", ["heron"]]}, "platforms holds .*give names of platforms"),
         ({"names": ["a"]}, "names has 1 entries for 2 boats"),
         ({"names": ["a", "a"]}, "names holds 'a' more than once; give every boat a name of its own"),
         ({"controlled": [True]}, "controlled has shape"),

@@ -112,19 +112,23 @@ def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
 
 
 @pytest.mark.parametrize("option", ["--policy", "--opponents"])
-def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeypatch):
+def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("steerclear.experiments.commands.deploy.Demo", None)
     told = CliRunner().invoke(cli.app, ["deploy", "--demo", option, "medum"])
     assert told.exit_code == 2
     assert "did you mean medium" in " ".join(told.output.split())
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("command", [("deploy", "--demo"), ("preflight", "FLEET.yaml")])
 @pytest.mark.parametrize(
     ("option", "value"), [("--wait", "nan"), ("--wait", "-5"), ("--wait", "1e9"), ("--speed", "0"), ("--speed", "nan")]
 )
-def test_waits_and_speeds_out_of_range_are_refused_at_once(command, option, value, monkeypatch):
+def test_waits_and_speeds_out_of_range_are_refused_at_once(command, option, value, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("steerclear.experiments.commands.deploy.Demo", None)
     told = CliRunner().invoke(cli.app, [*command, option, value])
     assert told.exit_code == 2
     assert f"give {option} more than 0" in " ".join(told.output.split())
+    assert list(tmp_path.iterdir()) == []
