@@ -112,8 +112,10 @@ class ActionDecoder:
             state: (n, N_STATE) the boats' state rows.
 
         Raises:
-            GameError: an unknown agent or an action that is none.
+            GameError: not a mapping, an unknown agent or an action that is none.
         """
+        if not isinstance(actions, Mapping):
+            raise GameError(f"actions are a {type(actions).__name__}; give a dict of agent id -> action")
         commands = np.zeros((len(self._ids), 2))
         for agent_id, action in actions.items():
             if agent_id not in self._index:

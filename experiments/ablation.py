@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from steerclear import policies
 
 from .conditions import CALM, Conditions
 from .score import DEFAULT_PENALTY
@@ -59,14 +60,15 @@ class AblationSettings:
 
     def specs(self) -> list[MatchSpec]:
         """List all games, those with the same number next to each other, so that an early end leaves pairs."""
+        digests = {name: policies.fingerprint(name) for name in (self.own, *self.opponents)}
         return [
-            self._spec(opponent, game, shielded)
+            self._spec(opponent, game, shielded, (digests[self.own], digests[opponent]))
             for game in range(self.games)
             for opponent in self.opponents
             for shielded in self.states
         ]
 
-    def _spec(self, opponent: str, game: int, shielded: bool) -> MatchSpec:
+    def _spec(self, opponent: str, game: int, shielded: bool, files: tuple[str, str]) -> MatchSpec:
         return MatchSpec(
             preset=self.preset,
             own=self.own,
@@ -82,6 +84,7 @@ class AblationSettings:
             radii_m=self.radii_m,
             judge=self.judge,
             conditions=self.conditions,
+            files=files,
         )
 
 

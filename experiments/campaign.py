@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from steerclear import policies
-
 from .match import play_row
 from .pool import Outcome, run_all
 from .spec import MatchSpec
@@ -61,10 +59,8 @@ class Campaign:
         """What an earlier run left of these games, and how much that is not of them."""
         others = len(self.store.load()) - len(self._before)
         words = f"{len(self._before)} of {len(self.specs)} games are in {self.store.lines} and are taken from there"
-        files = {name for spec in self.specs for name in (spec.own, spec.opponent)} - set(policies.names())
-        if self._before and files:
-            words += f", with {', '.join(sorted(files))} as it was then: after a change of it choose another --out"
-        return words + (f"; {others} there are of other settings and count for nothing here" if others else "")
+        text = "of other settings, or of a policy's files before they changed, and count for nothing here"
+        return words + (f"; {others} there are {text}" if others else "")
 
     def _finished(self) -> dict[str, Row]:
         wanted = {spec.key for spec in self.specs}

@@ -39,6 +39,7 @@ class MatchSpec:
         radii_m: radii at which breaches are counted.
         judge: whose breaches the oracle judges, see `judging.JUDGE`.
         conditions: delay, position noise and current, the same with a shield and without.
+        files: digests of both policies' files (`policies.fingerprint`), own and opponent; empty where there are none.
     """
 
     preset: str
@@ -56,6 +57,7 @@ class MatchSpec:
     radii_m: tuple[float, ...] = RADII_M
     judge: str = "shielded"
     conditions: Conditions = CALM
+    files: tuple[str, str] = ("", "")
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -75,7 +77,9 @@ class MatchSpec:
     @property
     def key(self) -> str:
         """Short name that two specs share exactly when they describe the same game, however its breaches are judged."""
-        beside = {"judge", "conditions"} if self.conditions.calm else {"judge"}
+        beside = {"judge"}
+        beside |= {"conditions"} if self.conditions.calm else set()
+        beside |= set() if any(self.files) else {"files"}
         return key_of({name: value for name, value in asdict(self).items() if name not in beside})
 
     @property

@@ -6,6 +6,7 @@ take objects and functions. `make_batch` builds the scripted ones for a `Batched
 
 from .actions import HOLD, ActionReader, to_command
 from .adapters import from_agents, from_callable
+from .fingerprint import fingerprint
 from .guard import GuardedTeam
 from .protocol import Action, BatchPolicy, TeamPolicy
 from .registry import check, describe, make, make_batch, names
@@ -24,6 +25,7 @@ __all__ = [
     "TeamPolicy",
     "check",
     "describe",
+    "fingerprint",
     "from_agents",
     "from_callable",
     "load_sb3",

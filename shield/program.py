@@ -57,8 +57,8 @@ def check_solver(name: str) -> None:
     """
     if name not in qpsolvers.available_solvers:
         raise SolverError(
-            f"QP solver {name!r} is not installed; installed: {', '.join(sorted(qpsolvers.available_solvers))} "
-            f"(pip install {name})"
+            f"QP solver {name!r} is unknown to qpsolvers or not installed; choose one of "
+            f"{', '.join(sorted(qpsolvers.available_solvers))}, or install its package"
         )
 
 

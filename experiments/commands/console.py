@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import functools
 import logging
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from steerclear.shield.exceptions import SteerclearError
+from steerclear.shield.exceptions import ConfigError, SteerclearError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 MAX_WIDTH = 100
@@ -50,6 +52,7 @@ def command(function: Command) -> Command:
     def guarded(*args: Any, **kwargs: Any) -> Any:
         logging.captureWarnings(True)
         try:
+            check_json_file(kwargs.get("json_file"))
             return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
@@ -59,6 +62,21 @@ def command(function: Command) -> Command:
             _leave("interrupted", ExitCode.INTERRUPTED)
 
     return guarded  # type: ignore[return-value]
+
+
+def check_json_file(path: Path | None) -> None:
+    """Find out before hours of work that the file of ``--json`` cannot be written.
+
+    Raises:
+        ConfigError: it is a folder, or the nearest folder that exists cannot be written to.
+    """
+    if path is None:
+        return
+    if path.is_dir():
+        raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise ConfigError(f"--json {path} cannot be written: {above} takes no files; name a file elsewhere")
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:

@@ -92,6 +92,11 @@ def test_unknown_agents_are_refused(env):
         env.step({"agent_7": 4})
 
 
+def test_actions_in_anything_but_a_mapping_are_refused(env):
+    with pytest.raises(GameError, match="actions are a list; give a dict of agent id -> action"):
+        env.step([4, 4])
+
+
 def test_kinds_are_given_once_per_boat_or_by_name():
     config = GameConfig(team_size=1)
     assert action_kinds(config, ["afp", "discrete"]) == {"agent_0": "afp", "agent_1": "discrete"}

@@ -85,18 +85,22 @@ def test_resuming_with_other_settings_plays_anew(played, tmp_path):
     assert others > 0
     assert fresh.words_of_before == (
         f"0 of 2 games are in {tmp_path / 'games.jsonl'} and are taken from there; "
-        f"{others} there are of other settings and count for nothing here"
+        f"{others} there are of other settings, or of a policy's files before they changed, and count for nothing here"
     )
 
 
-def test_games_of_a_policy_from_a_file_are_said_to_be_of_the_file_as_it_was(played, tmp_path):
-    campaign, _ = played
-    specs = [replace(spec, own="entry/solution.py") for spec in campaign.specs]
-    store = ResultStore(tmp_path)
-    for spec in specs[:1]:
-        store.append(spec.key, {"pairing": spec.pairing, "game": spec.game})
-    told = Campaign(specs, ResultStore(tmp_path, resume=True)).words_of_before
-    assert "with entry/solution.py as it was then: after a change of it choose another --out" in told
+def test_games_of_a_policy_whose_file_changed_are_played_anew(tmp_path):
+    entry = tmp_path / "entry.py"
+    entry.write_text("SPEED = 1")
+    settings = AblationSettings(own=str(entry), opponents=("easy",), games=1)
+    store = ResultStore(tmp_path / "out")
+    for spec in settings.specs():
+        store.append(spec.key, {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None})
+    assert len(Campaign(settings.specs(), store).so_far().rows) == 2
+    entry.write_text("SPEED = 2")
+    changed = Campaign(settings.specs(), store)
+    assert changed.so_far().rows == []
+    assert "of a policy's files before they changed" in changed.words_of_before
 
 
 def explode(spec):

@@ -30,6 +30,16 @@ def run(*arguments):
     return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.parametrize(("place", "remedy"), [("kept", "name a file in it"), ("kept/a.txt/b.json", "a file elsewhere")])
+def test_a_json_file_that_cannot_be_is_refused_before_any_game(place, remedy):
+    Path("kept").mkdir()
+    Path("kept/a.txt").touch()
+    done = run("ablate", "--opponents", "easy", *TINY, "--out", "out", "--json", place)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert remedy in done.stderr
+    assert not Path("out").exists()
+
+
 def test_a_tiny_ablation_from_end_to_end(tmp_path):
     done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out", "--json", "copy.json")
     assert done.exit_code == ExitCode.OK, done.output
