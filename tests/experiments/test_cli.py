@@ -30,7 +30,9 @@ def run(*arguments):
     return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize(("place", "remedy"), [("kept", "name a file in it"), ("kept/a.txt/b.json", "a file elsewhere")])
+@pytest.mark.parametrize(
+    ("place", "remedy"), [("kept", "name a file in it"), ("kept/a.txt/b.json", "name a file elsewhere")]
+)
 def test_a_json_file_that_cannot_be_is_refused_before_any_game(place, remedy):
     Path("kept").mkdir()
     Path("kept/a.txt").touch()
