@@ -49,7 +49,8 @@ def html_page(name: str, parts: Mapping[str, str], sources: str = "") -> str:
 
 
 def report_page(name: str, parts: Mapping[str, str]) -> str:
-    """As `html_page`, for reports: their title, headlines, replays and bars stand at ``TOP``."""
+    """As `html_page`, for reports: their title, warnings, headlines, replays and bars stand at ``TOP``."""
+    parts = {"WARNINGS": "", **parts}
     return html_page(name, {**parts, "TOP": fill(template("report_top.html"), parts).removesuffix("\n")})
 
 

@@ -28,8 +28,9 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
     Args:
         results: ``settings`` (with ``separation_m``, its own or in ``shield``; 2.5 m when left out), ``versions``,
             ``pairings`` (as `summary.summarise` returns them), ``games`` (rows of games); and, where there are any,
-            ``bars`` (as `ablation.ablation_bars`), ``machine``, ``title``, ``failed`` (games that could not be
-            played) and ``replays`` ({"label", "path"}, the path seen from the report). Further figures are shown,
+            ``bars`` (as `ablation.ablation_bars`), ``warnings`` (sentences shown first), ``machine``, ``title``,
+            ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen from the
+            report). Further figures are shown,
             further keys ignored.
         path: File to write.
 
@@ -46,6 +47,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         "TITLE": as_text(results.get("title") or _played(results["settings"])[0]),
         "STYLE": template("report.css"),
         "SUBTITLE": as_text(_subtitle(results, separation_m)),
+        "WARNINGS": "".join(f'<p class="card bad">{as_text(words)}</p>' for words in results.get("warnings") or ()),
         "HEADLINES": headlines(results["pairings"], separation_m),
         "BARS": bars_table(results.get("bars") or ()),
         "REPLAYS": replay_links(replays),

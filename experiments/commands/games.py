@@ -93,11 +93,11 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     conditions = words_of(results["settings"]["conditions"])
     if conditions:
         console.print(f"All games with {conditions}.\n", soft_wrap=True)
+    for words in results["warnings"]:
+        console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for summary in results["pairings"]:
         console.print(pairing_table(summary))
         console.print(verdict_table(summary))
-        if summary["policy_failures"]:
-            console.print(f"The policy failed {summary['policy_failures']} times; its boats held for those steps.")
         console.print()
     if results["bars"]:
         console.print(bars_table(results["bars"]))

@@ -1,0 +1,43 @@
+"""What is said first when policies failed."""
+
+import pytest
+from steerclear.experiments.ablation import AblationSettings
+from steerclear.experiments.campaign import Played
+from steerclear.experiments.failure_words import failure_warnings
+from steerclear.experiments.match import play_row
+from steerclear.experiments.page import as_text
+from steerclear.experiments.results import results_of, write_results
+from steerclear.experiments.spec import MatchSpec
+
+
+def row(own=0, other=0, text=None):
+    return {"policy_failures": own, "opponent_policy_failures": other, "first_failure": text}
+
+
+def test_games_in_which_nothing_failed_need_no_warning():
+    assert failure_warnings([row(), row()]) == []
+    assert failure_warnings([]) == []
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([row(), row(1200, 0, "own: KeyError: 'a'")], "own policy failed 1,200 times, in 1 of 2 games"),
+        ([row(0, 3, "opponent: no"), row(0, 4, "opponent: yes")], "opponents' policy failed 7 times, in 2 of 2 games"),
+    ],
+)
+def test_failures_are_counted_and_the_first_is_quoted(rows, words):
+    (text,) = failure_warnings(rows)
+    assert words in text
+    assert text.endswith(next(row["first_failure"] for row in rows if row["first_failure"]))
+
+
+def test_results_and_report_say_it_before_any_figure(tmp_path):
+    settings = AblationSettings(own="hold", opponents=("hold",), games=1, states=(False,), rules={"max_time_s": 1.0})
+    played = play_row(MatchSpec("aamas2024", "hold", "hold", rules={"max_time_s": 1.0}))
+    rows = [played | row(10, 0, "own: step 1: <lost>")]
+    results = results_of("evaluate", settings, Played(rows), 1.0)
+    assert results["warnings"] == failure_warnings(rows)
+    write_results(tmp_path, results, rows)
+    page = (tmp_path / "report.html").read_text()
+    assert page.index(as_text(results["warnings"][0])) < page.index('class="tiles"')
