@@ -51,7 +51,13 @@ def verdict_table(summary: Mapping[str, Any]) -> Group:
     )
 
 
-def titled(title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]], width: int | None = None) -> Group:
+def titled(
+    title: str,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str | Text]],
+    width: int | None = None,
+    wrap: bool = False,
+) -> Group:
     """Lay out a table under its title: the first column words, the others numbers.
 
     Args:
@@ -59,10 +65,11 @@ def titled(title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]
         heads: of the columns.
         rows: cells.
         width: of a column of numbers, at least, characters.
+        wrap: whether long words of the first column go on in a second line rather than lose their end.
     """
     # the dividers alone part the columns: four columns of intervals fit 80 characters
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=0, pad_edge=False, show_header=any(heads))
-    table.add_column(heads[0], no_wrap=len(heads) > 1)
+    table.add_column(heads[0], no_wrap=len(heads) > 1 and not wrap)
     for head in heads[1:]:
         table.add_column(head, justify="right", no_wrap=True, min_width=width)
     for row in rows:
@@ -76,7 +83,7 @@ def bars_table(bars: Sequence[Mapping[str, Any]]) -> Group:
         [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", _VERDICTS[bar["met"]]]
         for bar in bars
     ]
-    return titled("Bars", ["", "measured", "bar", ""], rows)
+    return titled("Bars", ["", "measured", "bar", ""], rows, wrap=True)
 
 
 def interval_text(figure: Figure | None, limit_text: Callable[[float], str] | None = None) -> str:

@@ -12,7 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..encounters.campaign import Campaign, Pair, Settings
 from ..encounters.families import FAMILIES
 from ..encounters.guards import parse_guards
-from ..encounters.results import cells_table, results_of, write_all
+from ..encounters.results import cells_table, heads_legend, results_of, write_all
 from ..encounters.scenes import Conditions
 from ..pool import check_jobs
 from ..store import LINES_FILE, ResultStore, write_json
@@ -144,6 +144,8 @@ def _show(results: dict[str, Any], folder: Path) -> None:
     for table in cells_table(results):
         console.print(table)
         console.print()
+    if results["cells"]:
+        console.print(f"{heads_legend()}\n", style="dim")
     if results["bars"]:
         console.print(bars_table(results["bars"]))
         console.print()

@@ -96,6 +96,28 @@ def write_all(folder: Path, results: dict[str, Any], campaign: Campaign, replays
     return folder / "results.json"
 
 
+HEADS = (
+    ("bare", "encounters breached without a guard"),
+    ("hit", "breached with it"),
+    ("avoid.", "of these avoidable in hindsight (+ not judged)"),
+    ("<=%", "95 % upper limit of that share"),
+    ("unav.", "unavoidable"),
+    ("outside", "breached of those that started outside the unavoidable set"),
+    ("close", "closest distance, m"),
+    ("chg%", "commands changed"),
+    ("time", "to the goal, over that without a guard"),
+    ("dead", "deadlocks"),
+    ("rev", "reversals per boat and minute"),
+    ("us", "per decision"),
+)
+"""Columns of the terminal's table and what they mean."""
+
+
+def heads_legend() -> str:
+    """What the columns of the terminal's table mean, in a sentence."""
+    return "; ".join(f"{head}: {words}" for head, words in HEADS)
+
+
 def cells_table(results: Mapping[str, Any]) -> list[Group]:
     """Tables for the terminal, one per pair of platforms and guard."""
     cells = results["cells"]
@@ -104,7 +126,7 @@ def cells_table(results: Mapping[str, Any]) -> list[Group]:
 
 
 def _table(own: str, other: str, guard: str, cells: Sequence[Mapping[str, Any]]) -> Group:
-    heads = ["", "bare", "hit", "avoid.", "<=%", "unav.", "outside", "close", "chg%", "time", "dead", "rev", "us"]
+    heads = ["", *(head for head, _words in HEADS)]
     rows: list[list[str | Text]] = [[cell["family"], *_figures(cell)] for cell in cells]
     counts = sorted({cell["encounters"] for cell in cells})
     title = f"{own} meets {other}, guard {guard}, {'-'.join(f'{n}' for n in (*counts[:1], *counts[1:][-1:]))} each"

@@ -127,3 +127,11 @@ def test_bars_say_whether_they_are_met():
     assert [line[-1] for line in lines if line[0] in ("hits", "steps")] == ["met", "met"]
     assert [line[-2] for line in lines if line[0] in ("hits", "steps")] == ["0.00", "not"]
     assert ">= 250,000" in text
+
+
+def test_a_long_name_of_a_bar_takes_nothing_from_its_figures():
+    bar = {"name": "shield:certificate=value_table: " + "many words " * 6, "sense": "<=", "limit": 0.0}
+    shown = printed(bars_table([bar | {"value": 1234.0, "met": met} for met in (False, None)]), 80)
+    for words in ("measured", "1,234 <= 0.00 not met", "1,234 <= 0.00 no data"):
+        assert words in shown
+    assert shown.split().count("words") == 12

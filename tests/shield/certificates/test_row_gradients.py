@@ -9,6 +9,7 @@ from steerclear.shield.certificates.clearance import FAR, MARGIN
 from steerclear.shield.certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import clear_of_boat
+from steerclear.shield.certificates.values import WAYS, set_place, table_margin
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -110,6 +111,45 @@ def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
     told, measured = np.array(both).transpose(1, 0, 2).reshape(2, -1)
     assert np.mean(np.sign(told) == np.sign(measured)) > 0.8
     assert np.median(np.abs(told - measured) / np.abs(measured)) < error
+
+
+def table_row_gradients(task, way):
+    """As `Linearised.gradients`, of the row about an opponent that is looked up and moves on in one way, or None."""
+    at, n = task.at, 2 * task.count
+    C, d = np.zeros((1, n)), np.zeros(1)
+
+    def margin(z):
+        task.move(z)
+        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.state, at.boats, at.tuning, at.work)
+        return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], at.boats, at.work)
+
+    now = margin(task.z)
+    if now >= FAR or not rows._table_row(
+        0, 1, way, 0, at.boats, at.tuning, at.work, at.plan.gain, at.plan.z_now, C, d, 0
+    ):
+        return None
+    scale = (at.work.threat_target_m[0, 1] + rows.AIM_M - now) / (d[0] - C[0] @ task.z)
+    steps = STEP * np.eye(n)
+    return scale * C[0], np.array([(margin(task.z + step) - margin(task.z - step)) / (2.0 * STEP) for step in steps])
+
+
+def test_turn_and_speed_do_to_the_margin_by_table_what_its_row_says():
+    random, found = np.random.default_rng(5), []
+    config = ShieldConfig(separation_m=2.0, table_margin_m=0.2)
+    for _ in range(400):
+        state = meeting(random, "surveyor", random.uniform(8.0, 30.0))
+        state[:, L.THRUST] = 100.0
+        at = stages_of(config, state, ["surveyor"] * 2, [0, 1])
+        if screened(at, np.column_stack([random.uniform(1.0, 2.9, 2), random.uniform(-2.0, 2.0, 2)])):
+            continue
+        task = Linearised(at, *built(at))
+        found += [pair for way in range(WAYS) if (pair := table_row_gradients(task, way)) is not None]
+    pairs = np.array(found)
+    told, measured = pairs[np.isfinite(pairs).all(axis=(1, 2))].transpose(1, 2, 0)
+    assert told.shape[1] > 40
+    for axis in (0, 1):
+        error = np.abs(told[axis] - measured[axis])
+        assert np.mean(error < 0.03 + 0.05 * np.abs(measured[axis])) > 0.9
 
 
 def edge(y):
