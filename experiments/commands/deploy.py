@@ -81,7 +81,8 @@ def deploy(
             water = stack.enter_context(Demo(orders.fleet_file, opponents, speed))
             with err().status("simulated boats are starting; the first time all is compiled, which takes minutes"):
                 water.wait(DEMO_WAIT_S)
-        outcome = run_boats(orders, Surface(lambda result: d.show_check(console, result), sinks), operator)
+        surface = Surface(lambda result: d.show_check(console, result, orders.accept), sinks)
+        outcome = run_boats(orders, surface, operator)
     if outcome.figures:
         console.print(_table(outcome.figures))
     d.show_outcome(console, outcome)

@@ -41,7 +41,7 @@ def preflight(
     orders = Orders(fleet, "", boat, None, tuple(accept or ()), 0, not no_tlog, speed, wait)
     console, started = out(), time.perf_counter()
     surface = Surface(
-        lambda result: d.show_check(console, result),
+        lambda result: d.show_check(console, result, orders.accept),
         lambda file, operator, clock: (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),),
     )
     with logging_aside(d.text_log(load_fleet(fleet).log_dir), shown=True):
