@@ -186,7 +186,7 @@ def make_batch(name: str, **options: Any) -> BatchPolicy:
 
 def looks_like_path(text: str) -> bool:
     """Whether a policy's name is meant as a path: it exists, has a separator, or ends like a submission's file."""
-    return "/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists()
+    return bool(text) and ("/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists())
 
 
 def unknown_policy(name: str) -> PolicyError:

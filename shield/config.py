@@ -81,7 +81,10 @@ class ShieldConfig:
         from .program import check_solver
 
         for entry in fields(self):
-            _check_number(entry.name, getattr(self, entry.name))
+            value = getattr(self, entry.name)
+            _check_number(entry.name, value)
+            if isinstance(value, int):  # compiled code knows numbers by their kind: it would be compiled anew
+                object.__setattr__(self, entry.name, float(value))
         if not 0.0 <= self.opponent_share <= 1.0:
             raise ConfigError(f"opponent_share is {self.opponent_share}; give a share between 0 and 1")
         if self.certificate not in CERTIFICATES:
@@ -108,6 +111,14 @@ class ShieldConfig:
 
 _TEXTS = {"certificate", "coordination", "solver"}
 _POSITIVE = {"separation_m", "dt_s", "response_per_s", "table_response_per_s", "speed_weight", "horizon_s", "hunt_s"}
+_RANGES = {
+    "dt_s": (0.01, 1.0),
+    "horizon_s": (0.0, 120.0),
+    "hunt_s": (0.0, 120.0),
+    "tail_s": (0.0, 60.0),
+    "delay_s": (0.0, 2.0),
+}
+"""Times for which a decision can be made at all: memory and work grow with them, and what is farther off is a guess."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
 _MAY_BE_INFINITE = {"response_per_s", "table_response_per_s", "max_track_age_s"}
 
@@ -127,3 +138,6 @@ def _check_number(name: str, value: object) -> None:
     if value < 0 or (value == 0 and name in _POSITIVE):
         bound = "> 0" if name in _POSITIVE else ">= 0"
         raise ConfigError(f"{name} is {value}; it must be {bound}")
+    low, high = _RANGES.get(name, (0.0, math.inf))
+    if not low <= value <= high:
+        raise ConfigError(f"{name} is {value}; give {low:g} to {high:g} s")

@@ -174,6 +174,7 @@ class Work(NamedTuple):
         nobody: (n,) False.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
         first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
+        first_refuser: (n,) the same of the opponents that tables tell of, see `certificates.laying`.
         first_manner: (n, n) how it is followed first.
     """
 
@@ -211,6 +212,7 @@ class Work(NamedTuple):
     nobody: BoolArray
     searched: IntArray
     first_hunter: IntArray
+    first_refuser: IntArray
     first_manner: IntArray
 
 
@@ -264,5 +266,6 @@ def new_work(boats: int, samples: int) -> Work:
         nobody=np.zeros(boats, np.bool_),
         searched=np.full(boats, -1, np.int64),
         first_hunter=np.zeros(boats, np.int64),
+        first_refuser=np.zeros(boats, np.int64),
         first_manner=np.zeros((boats, boats), np.int64),
     )

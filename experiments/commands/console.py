@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import logging
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, NoReturn, TypeVar
 
 import typer
@@ -75,8 +75,11 @@ def check_json_file(path: Path | None) -> None:
     if path.is_dir():
         raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
     above = next(folder for folder in path.absolute().parents if folder.exists())
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise ConfigError(f"--json {path} cannot be written: {above} takes no files; name a file elsewhere")
+    try:
+        TemporaryFile(dir=above).close()
+    except OSError as error:
+        text = f"--json {path} cannot be written: {above} takes no files ({error.strerror}); name a file elsewhere"
+        raise ConfigError(text) from error
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:

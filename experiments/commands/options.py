@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 from pathlib import Path
 from typing import Annotated, Any
@@ -57,7 +58,7 @@ JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="A
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
-    """Read ``KEY=VALUE`` options; a value is JSON where it can be read as such, else text.
+    """Read ``KEY=VALUE`` options; a value is JSON or a Python number or tuple where it can be read so, else text.
 
     Raises:
         ConfigError: an entry without ``=``.
@@ -67,25 +68,48 @@ def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
         name, equals, text = pair.partition("=")
         if not equals or not name:
             raise ConfigError(f"{option} takes KEY=VALUE; got {pair!r}")
-        try:
-            settings[name.strip()] = json.loads(text)
-        except json.JSONDecodeError:
-            settings[name.strip()] = text
+        settings[name.strip()] = _value(text)
     return settings
+
+
+def _value(text: str) -> Any:
+    for read in (json.loads, ast.literal_eval):
+        try:
+            return read(text)
+        except (ValueError, SyntaxError):  # JSON's own error is a ValueError
+            continue
+    return text
 
 
 def shield_settings(
     separation: float | None, certificate: str | None, solver: str | None, pairs: list[str] | None
 ) -> dict[str, Any]:
-    """Collect the settings of the shield that were given."""
+    """Collect the settings of the shield that were given.
+
+    Raises:
+        ConfigError: one is given twice.
+    """
     named = {"separation_m": separation, "certificate": certificate, "solver": solver}
-    return {name: value for name, value in named.items() if value is not None} | key_values(pairs, "--shield-set")
+    return _together(named, pairs, "--shield-set")
 
 
 def game_settings(max_time_s: float | None, platform: str | None, pairs: list[str] | None) -> dict[str, Any]:
-    """Collect the settings of the game that were given."""
-    named = {"max_time_s": max_time_s, "platforms": platform}
-    return {name: value for name, value in named.items() if value is not None} | key_values(pairs, "--set")
+    """Collect the settings of the game that were given.
+
+    Raises:
+        ConfigError: one is given twice.
+    """
+    return _together({"max_time_s": max_time_s, "platforms": platform}, pairs, "--set")
+
+
+def _together(named: dict[str, Any], pairs: list[str] | None, option: str) -> dict[str, Any]:
+    """Settings with an option of their own and those of an option for any."""
+    given = {name: value for name, value in named.items() if value is not None}
+    more = key_values(pairs, option)
+    for name in given:
+        if name in more:
+            raise ConfigError(f"{name} is given twice, by {option} and by an option of its own; leave one out")
+    return given | more
 
 
 def split_names(text: str, option: str) -> tuple[str, ...]:

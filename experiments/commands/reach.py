@@ -158,6 +158,9 @@ def check(files: TableFiles = None) -> None:
         paths = [path for folder in (SHIPPED, cache_folder()) for path in sorted(folder.glob("*.npz"))]
     if not paths:
         raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
+    for path in paths:
+        if not path.is_file():
+            raise TableError(f"there is no table file {path}")
     faults = [_fault(path) for path in paths]
     for path, fault in zip(paths, faults, strict=True):
         out().print(f"{path.name}: {fault or 'in order'}", markup=False, soft_wrap=True)

@@ -10,7 +10,7 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Fixed, Memory, Tuning, Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
-from .laying import lay_path, most_merit, run_out, set_out
+from .laying import lay_path, refused_by_tables, run_out, set_out
 from .paths import READY_SAMPLE, TURNING_SAMPLE, angle_to_go
 from .rating import PAIR_SAFE, STRAIGHT_SAFE, rate_path
 
@@ -84,7 +84,7 @@ def choose_plan(
         if hard and togo >= (no_more_starboard if side > 0.0 else no_more_port):
             continue
         set_out(i, trial, side, togo, speed, done, state, boats, tuning, work)
-        if compared and most_merit(i, trial, ours, boats, work) <= best:
+        if compared and refused_by_tables(i, trial, best, ours, boats, work):
             continue
         run_out(i, trial, done, state, boats, tuning, work)
         merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)

@@ -64,7 +64,7 @@ def clear_of_hunter(
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
-        manner = _first_then_rest(first, number)
+        manner = first_then_rest(first, number)
         weight = _run_hunter(i, j, slot, manner, lasts, till_ready, state, boats, tuning, work, floor_m, cap_m)
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
@@ -144,7 +144,7 @@ def _look_up_end(i: int, j: int, slot: int, weight: float, boats: Boats, work: W
 
 
 @lean_kernel
-def _first_then_rest(first: int, number: int) -> int:
+def first_then_rest(first: int, number: int) -> int:
     """Entry ``number`` of the list 0, 1, 2, ... with ``first`` moved to its front."""
     if number == 0:
         return first
@@ -182,12 +182,12 @@ def worst_hunter(
     threat_at, failed_at = np.inf, np.inf
     work.threats_m[slot, :] = FAR
     for number in range(state.shape[0]):
-        j = _first_then_rest(first, number)
+        j = first_then_rest(first, number)
         if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
             continue
         if looked_up(i, j, slot, ours, boats, work):
-            at_once = margin_at_once(i, j, slot, boats, work)
-            margin = min(at_once, margin_later(i, j, slot, boats, work))
+            at_once = margin_at_once(i, j, slot, -FAR, boats, work)
+            margin = min(at_once, margin_later(i, j, slot, -FAR, boats, work))
             at = math.ceil(boats.joint_look / boats.stride)
             at_best = min(at_best, at_once)
             refused = refused or at_once < work.threat_target_m[i, j]

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..scene import Boats, Tuning, Work
+from .clearance import FAR
+from .hunters import first_then_rest
 from .paths import trace_path
-from .rating import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
-from .values import looked_up, set_place, tabled, worst_by_tables
+from .rating import STRAIGHT_BASE, STRAIGHT_SAFE
+from .values import looked_up, margin_at_once, margin_later, set_place, tabled
 
 NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
 """How far hunters are run through: not at all, until thrust is back and tables answer, or to the end of the hunt."""
+
+CLEARLY_M = 1e-6
+"""Margins this much below a bound are below it whatever the rounding, m."""
 
 
 @lean_kernel
@@ -47,10 +52,31 @@ def set_out(
 
 
 @lean_kernel
-def most_merit(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> float:
-    """What the merit of the manoeuvre in ``slot`` cannot exceed, by the tables alone; its path need not be laid."""
-    margin, fails = worst_by_tables(i, slot, ours, boats, work)
-    return max(STRAIGHT_SAFE, STRAIGHT_BASE + margin) if fails else 2.0 * PAIR_SAFE
+def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Boats, work: Work) -> bool:
+    """Whether by the tables alone the merit of the manoeuvre in ``slot`` cannot exceed ``best``: no path is needed.
+
+    It cannot when a margin is short of its target and the least of them is no better than the best manoeuvre's. Who
+    refused the last one is asked first, and nobody after the answer is clear.
+    """
+    if best < STRAIGHT_SAFE:
+        return False
+    first, least, fails = work.first_refuser[i], FAR, False
+    for number in range(ours.shape[0]):
+        j = first_then_rest(first, number)
+        if j == i or not work.near[i, j] or not looked_up(i, j, slot, ours, boats, work):
+            continue
+        enough_m = min(work.threat_target_m[i, j], best - STRAIGHT_BASE) - CLEARLY_M
+        for look in range(2):
+            if look == 0:
+                margin = margin_at_once(i, j, slot, enough_m, boats, work)
+            else:
+                margin = margin_later(i, j, slot, enough_m, boats, work)
+            least = min(least, margin)
+            fails = fails or margin < work.threat_target_m[i, j]
+            if fails and STRAIGHT_BASE + least <= best:
+                work.first_refuser[i] = j
+                return True
+    return False
 
 
 @lean_kernel

@@ -46,7 +46,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     for i in range(n):
         work.hunted[i] = False
         work.reach_samples[i] = _reach_samples(i, state, ours, boats, tuning)
-        work.first_hunter[i] = 0
+        work.first_hunter[i] = work.first_refuser[i] = 0
         work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
         ux, uy = math.sin(heading), math.cos(heading)

@@ -76,7 +76,7 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work
         count = 0
         for j in range(n):
             if j != i and work.near[i, j] and looked_up(i, j, i, ours, boats, work):
-                count += 1 if table_margin(i, j, work.place[i], work.ways[j], boats, work) < FAR else 0
+                count += 1 if table_margin(i, j, work.place[i], work.ways[j], -FAR, boats, work) < FAR else 0
         work.beset[i] = count > 1
         some = some or count > 1
     if some:
@@ -163,9 +163,13 @@ def margin_when_ready(
 
 
 @lean_kernel
-def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: Work) -> float:
-    """Margin of boat i at a place against opponent j at the worst of several, m; `FAR` beyond the table."""
+def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boats: Boats, work: Work) -> float:
+    """Margin of boat i at a place against opponent j at the worst of several, m; `FAR` beyond the table.
+
+    Once it is down to ``enough_m`` no more of them are looked at.
+    """
     table = boats.table[i, j]
+    enough_m += work.radius[i, j] + boats.table_margin_m
     least = FAR
     for way in range(others.shape[0]):
         other = others[way]
@@ -180,38 +184,30 @@ def table_margin(i: int, j: int, own: Array, others: Array, boats: Boats, work: 
             other[PLACE_SPEED],
         )
         least = min(least, value)
+        if least <= enough_m:
+            break
     if least >= boats.tables.axes[table, CAP] - 1e-9:
         return FAR
     return least - work.radius[i, j] - boats.table_margin_m
 
 
 @lean_kernel
-def margin_at_once(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
-    """Margin, m, of boat i where the manoeuvre in ``slot`` is looked up first, against the worst opponent j can do."""
-    return table_margin(i, j, work.place[slot], work.ways[j], boats, work)
+def margin_at_once(i: int, j: int, slot: int, enough_m: float, boats: Boats, work: Work) -> float:
+    """Margin, m, of boat i where the manoeuvre in ``slot`` is looked up first, against the worst opponent j can do.
+
+    For ``enough_m`` see `table_margin`.
+    """
+    return table_margin(i, j, work.place[slot], work.ways[j], enough_m, boats, work)
 
 
 @lean_kernel
-def margin_later(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+def margin_later(i: int, j: int, slot: int, enough_m: float, boats: Boats, work: Work) -> float:
     """The same some time into the manoeuvre, of a boat that is beset; `FAR` for others."""
     if not work.beset[i]:
         return FAR
     if work.later[slot, PLACE_USABLE] == 0.0:  # nothing is known of a boat that has let its thrust go by then
         return -work.radius[i, j]
-    return table_margin(i, j, work.later[slot], work.ways_later[j], boats, work)
-
-
-@lean_kernel
-def worst_by_tables(i: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> tuple[float, bool]:
-    """The least of the margins of boat i on the manoeuvre in ``slot`` against opponents that are looked up, m."""
-    least = FAR
-    fails = False
-    for j in range(ours.shape[0]):
-        if j != i and work.near[i, j] and looked_up(i, j, slot, ours, boats, work):
-            margin = min(margin_at_once(i, j, slot, boats, work), margin_later(i, j, slot, boats, work))
-            least = min(least, margin)
-            fails = fails or margin < work.threat_target_m[i, j]
-    return least, fails
+    return table_margin(i, j, work.later[slot], work.ways_later[j], enough_m, boats, work)
 
 
 @lean_kernel

@@ -12,6 +12,7 @@ import pytest
 from steerclear.env.record import load, save
 from steerclear.experiments import campaign, cli, keys
 from steerclear.experiments.commands import games as games_command
+from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
 from typer.testing import CliRunner
 
@@ -40,6 +41,32 @@ def test_a_json_file_that_cannot_be_is_refused_before_any_game(place, remedy):
     assert done.exit_code == ExitCode.BAD_INPUT
     assert remedy in done.stderr
     assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "more"), [("--separation", "--shield-set=separation_m=3"), ("--max-time", "--set=max_time_s=9")]
+)
+def test_a_setting_given_twice_is_refused(option, more):
+    done = run("evaluate", "medium", "--shield", option, "2", more, "--out", "out")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "is given twice" in done.stderr
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("text", ["[60, 60]", "(60, 60)", "60,60"])
+def test_pairs_are_read_as_they_are_written(text):
+    assert tuple(options.key_values([f"env_bounds_m={text}"], "--set")["env_bounds_m"]) == (60, 60)
+
+
+@pytest.mark.parametrize("text", ["medium_attack,rammer", "heron", "1.5.2", "f(x)"])
+def test_what_is_no_number_stays_text(text):
+    assert options.key_values([f"a={text}"], "--set") == {"a": text}
+
+
+def test_a_table_file_that_is_not_there_is_bad_input():
+    done = run("reach", "check", "nowhere.npz")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "there is no table file nowhere.npz" in done.stderr
 
 
 def test_a_tiny_ablation_from_end_to_end(tmp_path):

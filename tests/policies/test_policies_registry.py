@@ -164,3 +164,8 @@ def test_reach_decides_how_far_away_opponents_push():
     near.reset(core, 0, 0)
     core.state[0, 3:, :2] = [[100.0, 60.0], [101.0, 60.0], [102.0, 60.0]]
     assert abs(far.act(core, 0) - near.act(core, 0))[0, 0, 1] > 5.0
+
+
+def test_no_name_at_all_is_no_folder():
+    with pytest.raises(PolicyError, match="unknown policy ''"):
+        policies.make("")

@@ -121,7 +121,7 @@ def table_row_gradients(task, way):
     def margin(z):
         task.move(z)
         set_place(0, 0, 0.0, 0.0, 0.0, 1, at.state, at.boats, at.tuning, at.work)
-        return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], at.boats, at.work)
+        return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
 
     now = margin(task.z)
     if now >= FAR or not rows._table_row(
