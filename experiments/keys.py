@@ -118,6 +118,7 @@ RESULTS = {
     "failed[].game": "its number",
     "failed[].shielded": "whether with a shield",
     "failed[].error": "why",
+    "policy_files.*": "digests of the files of policies that are no named ones",
     "warnings[]": "what a reader has to know first: policies that failed while they played",
     "pairings[].pairing": "own policy vs opponent policy",
     "pairings[].games_off": "games without shield",

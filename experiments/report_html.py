@@ -30,8 +30,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
             ``pairings`` (as `summary.summarise` returns them), ``games`` (rows of games); and, where there are any,
             ``bars`` (as `ablation.ablation_bars`), ``warnings`` (sentences shown first), ``machine``, ``title``,
             ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen from the
-            report). Further figures are shown,
-            further keys ignored.
+            report). Further figures are shown, further keys ignored.
         path: File to write.
 
     Returns:

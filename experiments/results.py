@@ -42,6 +42,7 @@ def results_of(
         "complete": len(played.rows) == expected,
         "quick": quick,
         "settings": asdict(settings),
+        "policy_files": {name: digest for name, digest in settings.digests().items() if digest},
         "seeds": [settings.seed + game for game in range(settings.games)],
         "versions": versions(),
         "machine": machine(),

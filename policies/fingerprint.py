@@ -3,43 +3,63 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from collections.abc import Iterator
 from pathlib import Path
+
+from steerclear.shield.exceptions import PolicyError
 
 from .registry import SB3_PREFIX, names
 
-SUFFIXES = {".py", ".zip", ".pt", ".pth", ".pkl", ".npz", ".npy", ".onnx", ".safetensors"}
-"""What code and weights are kept in. Other files of a folder (logs, videos, settings of an editor) come and go."""
-NOT_OF_IT = {"__pycache__", "results"}
-"""Folders that running a policy fills."""
+RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"
+"""What tells folders of results and virtual environments, which are no part of a policy."""
 
 
 def fingerprint(name_or_path: str | Path) -> str:
-    """Digest of the code and weights of a policy from a file: other content, other digest.
+    """Digest of the files of a policy: other content or other names, other digest.
+
+    Hidden files and folders, ``__pycache__``, folders of results and virtual environments do not count.
 
     Args:
         name_or_path: as for `make`; of a ``solution.py`` all the folder it lies in counts.
 
     Returns:
         16 hexadecimal digits; empty for the named policies and where there is no file.
+
+    Raises:
+        PolicyError: a file cannot be read.
     """
     text = str(name_or_path)
     path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
     if text in names() or not path.exists():
         return ""
-    if text.startswith(SB3_PREFIX) or (path.is_file() and path.suffix != ".py"):
-        return _digest(path.parent, [path])
+    alone = text.startswith(SB3_PREFIX) or (path.is_file() and path.suffix != ".py")
     folder = path if path.is_dir() else path.parent
-    return _digest(folder, sorted(file for file in folder.rglob("*") if _counts(file.relative_to(folder), file)))
+    try:
+        return _digest(folder, [path] if alone else sorted(_files(folder, set())))
+    except OSError as error:
+        raise PolicyError(f"policy {text}: {error.filename} cannot be read ({error.strerror})") from error
 
 
-def _counts(inside: Path, file: Path) -> bool:
-    left_out = any(part in NOT_OF_IT or part.startswith(".") for part in inside.parts)
-    return not left_out and file.suffix in SUFFIXES and file.is_file()
+def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
+    """Files that count, those behind links to folders too, each folder once."""
+    if folder.resolve() in seen:
+        return
+    seen.add(folder.resolve())
+    for entry in os.scandir(folder):
+        path = Path(entry.path)
+        if entry.name.startswith(".") or entry.name == "__pycache__":
+            continue
+        if not entry.is_dir():
+            yield path
+        elif not any((path / name).exists() for name in (RUN_FILE, ENVIRONMENT_FILE)):
+            yield from _files(path, seen)
 
 
 def _digest(folder: Path, files: list[Path]) -> str:
     digest = hashlib.sha256()
-    for file in files:
-        content = hashlib.sha256(file.read_bytes()).hexdigest()
-        digest.update(f"{file.relative_to(folder).as_posix()} {content}\n".encode())
+    for path in files:
+        with path.open("rb") as file:
+            content = hashlib.file_digest(file, "sha256").hexdigest()
+        digest.update(f"{path.relative_to(folder).as_posix()} {content}\n".encode())
     return digest.hexdigest()[:16]

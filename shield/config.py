@@ -116,7 +116,7 @@ _RANGES = {
     "horizon_s": (0.0, 120.0),
     "hunt_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
-    "delay_s": (0.0, 2.0),
+    "delay_s": (0.0, 10.0),
 }
 """Times for which a decision can be made at all: memory and work grow with them, and what is farther off is a guess."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
@@ -131,8 +131,10 @@ def _check_number(name: str, value: object) -> None:
         return
     if value is None and name in _MAY_BE_NONE:
         return
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
         raise ConfigError(f"{name} is {value!r}; give a number")
+    if isinstance(value, int) and abs(value) > 1e300:  # no float holds it
+        raise ConfigError(f"{name} is too large; give a finite number")
     if math.isinf(value) and name not in _MAY_BE_INFINITE:
         raise ConfigError(f"{name} is {value}; give a finite number")
     if value < 0 or (value == 0 and name in _POSITIVE):
@@ -140,4 +142,5 @@ def _check_number(name: str, value: object) -> None:
         raise ConfigError(f"{name} is {value}; it must be {bound}")
     low, high = _RANGES.get(name, (0.0, math.inf))
     if not low <= value <= high:
-        raise ConfigError(f"{name} is {value}; give {low:g} to {high:g} s")
+        first = "more than 0 and at most" if name in _POSITIVE and low == 0.0 else f"{low:g} to"
+        raise ConfigError(f"{name} is {value}; give {first} {high:g} s")

@@ -68,18 +68,16 @@ def check_json_file(path: Path | None) -> None:
     """Find out before hours of work that the file of ``--json`` cannot be written.
 
     Raises:
-        ConfigError: it is a folder, or the nearest folder that exists cannot be written to.
+        ConfigError: it is a folder, its name is none, or the nearest folder that exists takes no files.
     """
     if path is None:
         return
-    if path.is_dir():
-        raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
-    above = next(folder for folder in path.absolute().parents if folder.exists())
     try:
-        TemporaryFile(dir=above).close()
+        if path.is_dir():
+            raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
+        TemporaryFile(dir=next(folder for folder in path.absolute().parents if folder.exists())).close()
     except OSError as error:
-        text = f"--json {path} cannot be written: {above} takes no files ({error.strerror}); name a file elsewhere"
-        raise ConfigError(text) from error
+        raise ConfigError(f"--json {path} cannot be written ({error.strerror}); name a file elsewhere") from error
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:

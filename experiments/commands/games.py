@@ -39,11 +39,11 @@ def check_settings(settings: AblationSettings) -> None:
     check_penalty(settings.penalty)
     check_judge(settings.judge)
     check_shield(settings.shield)
-    check_current(settings.conditions, settings.specs()[0].config())
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
         policies.make(name)
+    check_current(settings.conditions, settings.specs()[0].config())
 
 
 def default_folder(command: str) -> Path:

@@ -58,27 +58,32 @@ JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="A
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
-    """Read ``KEY=VALUE`` options; a value is JSON or a Python number or tuple where it can be read so, else text.
+    """Read ``KEY=VALUE`` options; a value is JSON or a tuple of numbers where it can be read so, else text.
 
     Raises:
-        ConfigError: an entry without ``=``.
+        ConfigError: an entry without ``=``, or a key given twice.
     """
-    settings = {}
+    settings: dict[str, Any] = {}
     for pair in pairs or []:
         name, equals, text = pair.partition("=")
         if not equals or not name:
             raise ConfigError(f"{option} takes KEY=VALUE; got {pair!r}")
+        if name.strip() in settings:
+            raise ConfigError(f"{name.strip()} is given twice, by {option} both times; leave one out")
         settings[name.strip()] = _value(text)
     return settings
 
 
 def _value(text: str) -> Any:
-    for read in (json.loads, ast.literal_eval):
-        try:
-            return read(text)
-        except (ValueError, SyntaxError):  # JSON's own error is a ValueError
-            continue
-    return text
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        pass
+    try:
+        value = ast.literal_eval(text)
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
+        return text
+    return value if isinstance(value, tuple) and all(type(item) in (int, float) for item in value) else text
 
 
 def shield_settings(

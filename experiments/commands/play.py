@@ -74,9 +74,10 @@ def play(
 
     Exit status: 0 done, 2 bad input, 130 interrupted.
     """
+    own = "keyboard" if keyboard else own
     spec = MatchSpec(
         preset=preset,
-        own="keyboard" if keyboard else own,
+        own=own,
         opponent=opponent,
         seed=seed,
         side=side,
@@ -86,6 +87,7 @@ def play(
         fixed_start=fixed_start,
         penalty=check_penalty(penalty),
         conditions=Conditions(delay, noise, current),
+        files=(policies.fingerprint(own), policies.fingerprint(opponent)),
     )
     if not 0.0 < speed < math.inf:
         raise ConfigError(f"--speed must be a number above 0; got {speed:g}")

@@ -160,7 +160,7 @@ def check(files: TableFiles = None) -> None:
         raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
     for path in paths:
         if not path.is_file():
-            raise TableError(f"there is no table file {path}")
+            raise TableError(f"there is no table file {path}; make one with steerclear reach solve --out {path}")
     faults = [_fault(path) for path in paths]
     for path, fault in zip(paths, faults, strict=True):
         out().print(f"{path.name}: {fault or 'in order'}", markup=False, soft_wrap=True)

@@ -99,16 +99,16 @@ def write_all(folder: Path, results: dict[str, Any], campaign: Campaign, replays
 HEADS = (
     ("bare", "encounters breached without a guard"),
     ("hit", "breached with it"),
-    ("avoid.", "of these avoidable in hindsight (+ not judged)"),
-    ("<=%", "95 % upper limit of that share"),
-    ("unav.", "unavoidable"),
+    ("avoid.", "of these avoidable in hindsight (+ not judged?)"),
+    ("<=%", "95 % upper limit of the avoidable ones, % of the encounters"),
+    ("unav.", "unavoidable, or begun inside the radius"),
     ("outside", "breached of those that started outside the unavoidable set"),
     ("close", "closest distance, m"),
-    ("chg%", "commands changed"),
+    ("chg%", "commands changed, %"),
     ("time", "to the goal, over that without a guard"),
     ("dead", "deadlocks"),
     ("rev", "reversals per boat and minute"),
-    ("us", "per decision"),
+    ("us", "microseconds per decision"),
 )
 """Columns of the terminal's table and what they mean."""
 

@@ -14,7 +14,8 @@ NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
 """How far hunters are run through: not at all, until thrust is back and tables answer, or to the end of the hunt."""
 
 CLEARLY_M = 1e-6
-"""Margins this much below a bound are below it whatever the rounding, m."""
+"""Margins this much below a bound are below it whatever the rounding, m: more than the room in which a table's value
+counts as its cap."""
 
 
 @lean_kernel

@@ -168,8 +168,7 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boa
 
     Once it is down to ``enough_m`` no more of them are looked at.
     """
-    table = boats.table[i, j]
-    enough_m += work.radius[i, j] + boats.table_margin_m
+    table, kept_m = boats.table[i, j], work.radius[i, j] + boats.table_margin_m
     least = FAR
     for way in range(others.shape[0]):
         other = others[way]
@@ -184,7 +183,7 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boa
             other[PLACE_SPEED],
         )
         least = min(least, value)
-        if least <= enough_m:
+        if least <= enough_m + kept_m:
             break
     if least >= boats.tables.axes[table, CAP] - 1e-9:
         return FAR

@@ -14,6 +14,7 @@ from steerclear.experiments import campaign, cli, keys
 from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
 TRACES = sorted((Path(__file__).parents[1] / "data" / "traces").glob("*.npz"))
@@ -32,7 +33,12 @@ def run(*arguments):
 
 
 @pytest.mark.parametrize(
-    ("place", "remedy"), [("kept", "name a file in it"), ("kept/a.txt/b.json", "name a file elsewhere")]
+    ("place", "remedy"),
+    [
+        ("kept", "name a file in it"),
+        ("kept/a.txt/b.json", "name a file elsewhere"),
+        (300 * "a", "name a file elsewhere"),
+    ],
 )
 def test_a_json_file_that_cannot_be_is_refused_before_any_game(place, remedy):
     Path("kept").mkdir()
@@ -58,7 +64,12 @@ def test_pairs_are_read_as_they_are_written(text):
     assert tuple(options.key_values([f"env_bounds_m={text}"], "--set")["env_bounds_m"]) == (60, 60)
 
 
-@pytest.mark.parametrize("text", ["medium_attack,rammer", "heron", "1.5.2", "f(x)"])
+def test_a_key_given_twice_is_refused():
+    with pytest.raises(ConfigError, match="a is given twice"):
+        options.key_values(["a=1", "a=2"], "--set")
+
+
+@pytest.mark.parametrize("text", ["medium_attack,rammer", "heron", "1.5.2", "f(x)", "{1, 2}", "b'a'", "1j", 9999 * "("])
 def test_what_is_no_number_stays_text(text):
     assert options.key_values([f"a={text}"], "--set") == {"a": text}
 
@@ -66,7 +77,7 @@ def test_what_is_no_number_stays_text(text):
 def test_a_table_file_that_is_not_there_is_bad_input():
     done = run("reach", "check", "nowhere.npz")
     assert done.exit_code == ExitCode.BAD_INPUT
-    assert "there is no table file nowhere.npz" in done.stderr
+    assert "there is no table file nowhere.npz; make one with steerclear reach solve" in done.stderr
 
 
 def test_a_tiny_ablation_from_end_to_end(tmp_path):
@@ -236,7 +247,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --own some/folder", "no submission at"),
         ("ablate --platform hern", "heron"),
         ("ablate --certificate turn", "turning_circle"),
-        ("ablate --solver nosuch", "installed: "),
+        ("ablate --solver nosuch", "choose one of daqp"),
         ("ablate --separation -1", "separation_m is -1.0"),
         ("ablate --separation nan", "give a number"),
         ("ablate --max-time 0", "max_time_s is 0.0"),

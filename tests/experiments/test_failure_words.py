@@ -24,12 +24,20 @@ def test_games_in_which_nothing_failed_need_no_warning():
     [
         ([row(), row(1200, 0, "own: KeyError: 'a'")], "own policy failed 1,200 times, in 1 of 2 games"),
         ([row(0, 3, "opponent: no"), row(0, 4, "opponent: yes")], "opponents' policy failed 7 times, in 2 of 2 games"),
+        ([row(1, 0, "own: no")], "own policy failed 1 time, in 1 of 1 games"),
     ],
 )
 def test_failures_are_counted_and_the_first_is_quoted(rows, words):
     (text,) = failure_warnings(rows)
     assert words in text
-    assert text.endswith(next(row["first_failure"] for row in rows if row["first_failure"]))
+    first = next(row["first_failure"] for row in rows if row["first_failure"])
+    assert text.endswith(f"First failure: {first.partition(': ')[2]}")
+
+
+def test_nobody_is_quoted_with_the_others_words():
+    own, opponents = failure_warnings([row(2, 3, "own: lost")])
+    assert own.endswith("First failure: lost")
+    assert "lost" not in opponents
 
 
 def test_results_and_report_say_it_before_any_figure(tmp_path):

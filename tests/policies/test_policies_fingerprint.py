@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 from steerclear import policies
+from steerclear.shield.exceptions import PolicyError
 
 
 @pytest.fixture
@@ -20,11 +21,29 @@ def test_what_has_no_file_has_no_digest(name):
     assert policies.fingerprint(name) == ""
 
 
-@pytest.mark.parametrize(("file", "content"), [("solution.py", b"SPEED = 2"), ("weights/actor.pt", b"\x01\x03")])
+@pytest.mark.parametrize(
+    ("file", "content"), [("solution.py", b"SPEED = 2"), ("weights/actor.pt", b"\x01\x03"), ("roles.json", b"{}")]
+)
 def test_other_code_or_weights_give_another_digest(entry, file, content):
     before = policies.fingerprint(entry)
     (entry / file).write_bytes(content)
     assert policies.fingerprint(entry) != before
+
+
+def test_what_lies_behind_links_counts_once(entry, tmp_path):
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared" / "helper.py").write_text("A = 1")
+    (entry / "shared").symlink_to(tmp_path / "shared")
+    (tmp_path / "shared" / "round").symlink_to(tmp_path / "shared")
+    before = policies.fingerprint(entry)
+    (tmp_path / "shared" / "helper.py").write_text("A = 2")
+    assert policies.fingerprint(entry) != before
+
+
+def test_a_file_that_cannot_be_read_is_said(entry):
+    (entry / "gone.py").symlink_to(entry / "nowhere.py")
+    with pytest.raises(PolicyError, match=r"gone\.py cannot be read"):
+        policies.fingerprint(entry)
 
 
 def test_a_renamed_file_gives_another_digest(entry):
@@ -35,7 +54,14 @@ def test_a_renamed_file_gives_another_digest(entry):
 
 def test_what_a_run_leaves_behind_does_not_count(entry):
     before = policies.fingerprint(entry)
-    for place in ("__pycache__/solution.py", "results/run/replay.npz", ".venv/lib.py", "log.txt"):
+    for place in (
+        "__pycache__/solution.pyc",
+        "results/run/games.jsonl",
+        "results/run/replay.npz",
+        ".venv/lib.py",
+        "venv/pyvenv.cfg",
+        "venv/lib.py",
+    ):
         (entry / place).parent.mkdir(parents=True, exist_ok=True)
         (entry / place).write_text("new")
     assert policies.fingerprint(entry) == before
