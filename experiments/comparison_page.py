@@ -15,6 +15,8 @@ from .markdown import MADE, table
 STEM = "comparison"
 COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
 MARKS = ("o", "s", "^", "D")
+LEGEND_LETTER_IN, LEGEND_MARK_IN, LEGEND_LINE_IN = 0.06, 0.55, 0.17
+"""Room in a legend of 8 points, inches: a letter, a mark with its gaps, a line."""
 OTHERS = ("#b5532a", "#6a4c93", "#2e7d32", "#c99700", "#ad1457", "#37474f")
 
 
@@ -116,18 +118,26 @@ def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
 
     across = min(len(contests), 3)
     down = math.ceil(len(contests) / across)
-    canvas = Figure(figsize=(4.4 * across, 3.6 * down), layout="constrained", dpi=150)
-    axes = canvas.subplots(down, across, squeeze=False).ravel()
     names = list(dict.fromkeys(guard for contest in contests for guard in contest.cells))
+    columns = legend_columns(names, 4.4 * across)
+    height_in = 3.6 * down + LEGEND_LINE_IN * math.ceil(len(names) / columns)
+    canvas = Figure(figsize=(4.4 * across, height_in), layout="constrained", dpi=150)
+    axes = canvas.subplots(down, across, squeeze=False).ravel()
     looks = looks_of(names)
     for axis, contest in zip(axes, contests, strict=False):
         _draw(axis, contest, looks)
     for axis in axes[len(contests) :]:
         axis.set_visible(False)
     handles, labels = axes[0].get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    canvas.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
     canvas.savefig(path)
     return path
+
+
+def legend_columns(names: Sequence[str], width_in: float) -> int:
+    """How many columns of these names fit beside each other, 1 to 4: of a wider legend the sides are cut off."""
+    widest_in = LEGEND_MARK_IN + LEGEND_LETTER_IN * max((len(name) for name in names), default=0)
+    return max(1, min(4, int(width_in / widest_in)))
 
 
 def looks_of(guards: Sequence[str]) -> dict[str, tuple[str, str]]:

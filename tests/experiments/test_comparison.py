@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments.comparison import cells_of, contests_of
-from steerclear.experiments.comparison_page import comparison_page, looks_of
+from steerclear.experiments.comparison_page import comparison_page, legend_columns, looks_of
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError
 
@@ -125,3 +125,17 @@ def test_guards_are_told_apart_when_colours_run_out():
     looks = looks_of(guards)
     assert list(looks) == guards
     assert len(set(looks.values())) == len(guards)
+
+
+@pytest.mark.parametrize(
+    ("names", "width_in", "columns"),
+    [
+        (["none", "shield"], 4.4, 4),
+        (["none", "shield:certificate=value_table"], 4.4, 1),
+        (["none", "shield:certificate=value_table"], 8.8, 3),
+        (["x" * 400], 4.4, 1),
+        ([], 4.4, 4),
+    ],
+)
+def test_a_legend_has_as_many_columns_as_fit(names, width_in, columns):
+    assert legend_columns(names, width_in) == columns
