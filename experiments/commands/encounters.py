@@ -35,7 +35,9 @@ Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.
 Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]
 Noise = Annotated[float, typer.Option(metavar="M", help="Bound on the error of positions seen, m.")]
 Current = Annotated[float, typer.Option(metavar="M/S", help="Speed of a current; the guard is told it, not where to.")]
-Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", "--jobs", metavar="N", help="Processes.", show_default="all cores")
+]
 NoJudge = Annotated[bool, typer.Option("--no-judge", help="Do not ask the oracle about breaches.")]
 SceneFiles = Annotated[
     list[Path] | None, typer.Option("--scene", metavar="FILE", help="Play scenes of a file instead.")

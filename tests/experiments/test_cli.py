@@ -80,6 +80,13 @@ def test_a_table_file_that_is_not_there_is_bad_input():
     assert "there is no table file nowhere.npz; make one with steerclear reach solve" in done.stderr
 
 
+@pytest.mark.parametrize("command", ["encounters", "attack", "ablate"])
+def test_processes_are_asked_for_by_the_same_name_everywhere(command):
+    done = run(command, "--jobs", "0", "--out", "out")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--jobs" in done.stderr
+
+
 def test_a_tiny_ablation_from_end_to_end(tmp_path):
     done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out", "--json", "copy.json")
     assert done.exit_code == ExitCode.OK, done.output
