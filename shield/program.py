@@ -58,7 +58,7 @@ def check_solver(name: str) -> None:
     if name not in qpsolvers.available_solvers:
         raise SolverError(
             f"QP solver {name!r} is unknown to qpsolvers or not installed; choose one of "
-            f"{', '.join(sorted(qpsolvers.available_solvers))}, or install its package"
+            f"{', '.join(sorted(qpsolvers.available_solvers))}, or install its package (pip install)"
         )
 
 

@@ -160,11 +160,12 @@ def test_an_unknown_side_is_refused():
 
 def test_a_spec_travels_through_json_and_its_key_names_the_game():
     spec = spec_of(shield={"separation_m": 3.0})
-    beside = ("judge", "conditions")  # which, when there are none, leave a game what it was
+    beside = ("judge", "conditions", "files")  # which, when there are none, leave a game what it was
     plain = {name: value for name, value in json.loads(json.dumps(asdict(spec))).items() if name not in beside}
     assert spec.key == spec_of(shield={"separation_m": 3.0}).key == key_of(plain)
     assert len({spec.key, spec_of().key, replace(spec, seed=9).key, replace(spec, penalty=0.0).key}) == 4
     assert replace(spec, judge="all").key == spec.key
+    assert replace(spec, files=("12ab", "")).key not in (spec.key, replace(spec, files=("", "12ab")).key)
 
 
 @pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])

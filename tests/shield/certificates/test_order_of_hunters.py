@@ -6,7 +6,7 @@ from stages import screened, stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.assign import choose_plan
 from steerclear.shield.certificates.clearance import MARGIN
-from steerclear.shield.certificates.hunters import _first_then_rest
+from steerclear.shield.certificates.hunters import first_then_rest
 from steerclear.shield.certificates.rating import rate_path
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -47,7 +47,7 @@ def scenes(certificate, platforms, count):
 
 @pytest.mark.parametrize("first_one", range(5))
 def test_each_is_looked_at_once(first_one):
-    order = [_first_then_rest(first_one, number) for number in range(5)]
+    order = [first_then_rest(first_one, number) for number in range(5)]
     assert order[0] == first_one
     assert order[1:] == [j for j in range(5) if j != first_one]
 
