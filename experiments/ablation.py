@@ -60,17 +60,13 @@ class AblationSettings:
 
     def specs(self) -> list[MatchSpec]:
         """List all games, those with the same number next to each other, so that an early end leaves pairs."""
-        digests = self.digests()
+        digests = {name: policies.fingerprint(name) for name in (self.own, *self.opponents)}
         return [
             self._spec(opponent, game, shielded, (digests[self.own], digests[opponent]))
             for game in range(self.games)
             for opponent in self.opponents
             for shielded in self.states
         ]
-
-    def digests(self) -> dict[str, str]:
-        """Digests of the policies' files by name, empty for named policies."""
-        return {name: policies.fingerprint(name) for name in (self.own, *self.opponents)}
 
     def _spec(self, opponent: str, game: int, shielded: bool, files: tuple[str, str]) -> MatchSpec:
         return MatchSpec(

@@ -42,6 +42,8 @@ GAME_COLUMNS = {
     "side": "colour of the own team",
     "seed": "of start places and policies",
     "penalty": "weight of a collision in the primary score",
+    "own_files": "digest of the own policy's files; empty for a named policy",
+    "opponent_files": "the same of the other team",
     "steps": "steps played",
     "duration_s": "game time played, s",
     "captures": "flags captured; captures_against by the other team",

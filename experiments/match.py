@@ -182,6 +182,7 @@ class Match:
             "game": spec.game,
             "shielded": spec.shield is not None,
             **{name: getattr(spec, name) for name in ("preset", "own", "opponent", "side", "seed", "penalty")},
+            **dict(zip(("own_files", "opponent_files"), spec.files, strict=True)),
             "steps": steps,
             "duration_s": steps * self.env.config.dt_s,
         }

@@ -42,7 +42,7 @@ def results_of(
         "complete": len(played.rows) == expected,
         "quick": quick,
         "settings": asdict(settings),
-        "policy_files": {name: digest for name, digest in settings.digests().items() if digest},
+        "policy_files": _policy_files(played.rows),
         "seeds": [settings.seed + game for game in range(settings.games)],
         "versions": versions(),
         "machine": machine(),
@@ -55,6 +55,12 @@ def results_of(
         "bars": ablation_bars(played.rows, settings.separation_m),
         "breaches": all_breaches(played.rows),
     }
+
+
+def _policy_files(rows: Sequence[Row]) -> dict[str, str]:
+    """Digests of the files that were played, by policy; none of named policies."""
+    pairs = {(row[side], row.get(f"{side}_files")) for row in rows for side in ("own", "opponent")}
+    return {name: digest for name, digest in sorted(pairs, key=str) if digest}
 
 
 def write_results(folder: Path, results: dict[str, Any], rows: Sequence[Row], records: Sequence[Any] = ()) -> Path:

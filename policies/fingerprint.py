@@ -51,7 +51,8 @@ def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
         if entry.name.startswith(".") or entry.name == "__pycache__":
             continue
         if not entry.is_dir():
-            yield path
+            if entry.is_file() or entry.is_symlink():  # no pipes and sockets: reading one may never end
+                yield path
         elif not any((path / name).exists() for name in (RUN_FILE, ENVIRONMENT_FILE)):
             yield from _files(path, seen)
 

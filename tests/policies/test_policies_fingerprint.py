@@ -1,5 +1,6 @@
 """Digests of policies' files."""
 
+import os
 import shutil
 
 import pytest
@@ -81,3 +82,9 @@ def test_of_an_archive_and_of_learned_weights_only_the_file_counts(tmp_path):
     assert policies.fingerprint(f"sb3:{model}") == policies.fingerprint(model) == first
     model.write_bytes(b"two")
     assert policies.fingerprint(model) != first
+
+
+def test_pipes_are_not_read(entry):
+    before = policies.fingerprint(entry)
+    os.mkfifo(entry / "orders")
+    assert policies.fingerprint(entry) == before

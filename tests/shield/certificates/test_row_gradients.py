@@ -147,13 +147,10 @@ def test_turn_and_speed_do_to_the_margin_by_table_what_its_row_says():
     pairs = np.array(found)
     told, measured = pairs[np.isfinite(pairs).all(axis=(1, 2))].transpose(1, 2, 0)
     assert told.shape[1] > 40
-    for axis in (0, 1):
-        steep = np.abs(measured[axis]) > 0.02
-        assert steep.sum() > 10
-        assert np.mean(np.sign(told[axis][steep]) == np.sign(measured[axis][steep])) > 0.9
-        error = np.abs(told[axis] - measured[axis])
-        assert np.median(error[steep] / np.abs(measured[axis][steep])) < 0.3
-        assert np.median(error[~steep]) < 0.005
+    turns, speeds = np.abs(told - measured)
+    assert np.median(np.abs(measured[0])) > 0.02
+    assert np.mean(turns < 0.002 + 0.05 * np.abs(measured[0])) > 0.9
+    assert np.mean(speeds < 0.002) > 0.9  # at full thrust a step's speed command has next to no effect on the speed
 
 
 def edge(y):
