@@ -30,6 +30,9 @@ CircleSpec = tuple[float, Point]
 
 CAPTURE_AT = ("own_side", "own_base")
 
+LONGEST_S = 1e7
+"""Games are at most this long, s: four months, far beyond any; a slip of the pen would never end."""
+
 
 @dataclass(frozen=True)
 class RewardWeights:
@@ -62,7 +65,7 @@ class GameConfig:
         team_size: boats per team; blue are agent_0.., red follow.
         env_bounds_m: width (x, east) and height (y, north) of the field, m.
         dt_s: length of a step, s.
-        max_time_s: length of a game, s.
+        max_time_s: length of a game, s, at most 10^7.
         max_score: captures that end the game.
         platforms: one platform (name or `Platform`) for all boats or one per boat.
         agent_radius_m: radius of a boat, m, one for all or one per boat; two boats collide when closer than the sum.
@@ -133,8 +136,9 @@ class GameConfig:
         object.__setattr__(self, name, value)
 
     def _check_numbers(self) -> None:
-        for name in ("dt_s", "max_time_s", "catch_radius_m"):
+        for name in ("dt_s", "catch_radius_m"):
             self._set(name, check_real(name, getattr(self, name), above=0.0))
+        self._set("max_time_s", check_real("max_time_s", self.max_time_s, above=0.0, high=LONGEST_S))
         for name in ("flag_keepout_m", "flag_radius_m", "tagging_cooldown_s", "oob_speed_frac"):
             self._set(name, check_real(name, getattr(self, name), low=0.0))
 

@@ -10,8 +10,10 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
 
-def check_real(name: str, value: Any, low: float | None = None, above: float | None = None) -> float:
-    """A finite number, ``>= low`` or ``> above`` where given."""
+def check_real(
+    name: str, value: Any, low: float | None = None, above: float | None = None, high: float | None = None
+) -> float:
+    """A finite number, ``>= low`` or ``> above`` and ``<= high`` where given."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ConfigError(f"{name} is {value!r}; give a number")
     number = float(value)
@@ -21,6 +23,8 @@ def check_real(name: str, value: Any, low: float | None = None, above: float | N
         raise ConfigError(f"{name} is {number}; it must be >= {low}")
     if above is not None and number <= above:
         raise ConfigError(f"{name} is {number}; it must be > {above}")
+    if high is not None and number > high:
+        raise ConfigError(f"{name} is {number}; it must be <= {high}")
     return number
 
 

@@ -105,6 +105,8 @@ class Fleet:
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
             state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
         teams = _whole("team", _shaped("team", team, (n,)))
+        if isinstance(names, str):
+            raise FleetError(f"names is the text {names!r}; give a list of names, one for each boat")
         fleet = cls(
             state=state,
             team=teams,

@@ -41,6 +41,7 @@ def fleet(**changes):
         ({"platforms": None}, "platforms is None"),
         ({"platforms": ["heron", ["heron"]]}, "platforms holds .*give names of platforms"),
         ({"names": ["a"]}, "names has 1 entries for 2 boats"),
+        ({"names": "ab"}, "names is the text 'ab'; give a list of names, one for each boat"),
         ({"names": ["a", "a"]}, "names holds 'a' more than once; give every boat a name of its own"),
         ({"controlled": [True]}, "controlled has shape"),
         ({"thrust": [1.0]}, "thrust has shape"),
