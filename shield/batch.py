@@ -19,7 +19,7 @@ from .platforms import layout as L
 from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import queue_commands, run_on_commands, steps_of_delay
+from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
 
 NOWHERE_M = -1e9
 """Radius of a circle that does not count, m: everywhere is far outside of it."""
@@ -58,6 +58,7 @@ def decide_games(
         for c in range(lifted.shape[1]):
             circles[first + c, 2] = NOWHERE_M if lifted[b, c] else fixed.circles[first + c, 2]
         ahead[:] = state[b]
+        fill_memory(ahead, boats.params)
         run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
         for i in range(n):
             asked[i] = wanted[b, i]
@@ -145,7 +146,7 @@ class BatchedShield:
         """Safe commands.
 
         Args:
-            state: (B, n, N_STATE) boat states.
+            state: (B, n, N_STATE) boat states; memory of the autopilot may be NaN where it is not known, as in `Fleet`.
             wanted: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
             lifted: (B, k) which of the surroundings' k ``stops`` do not count; None: all count.

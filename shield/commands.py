@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from .exceptions import FleetError
 from .jit import Array
 
+LARGEST_HEADING_RAD = 1e6
+"""Absolute headings beyond this are no directions, rad: turns so many that the angle left in the number is lost."""
+
 
 @dataclass(frozen=True)
 class Commands:
@@ -50,11 +53,14 @@ class Commands:
         return len(self.values)
 
     def as_relative_deg(self, heading_deg: Array) -> Array:
-        """Values as (speed m/s, relative heading deg); absolute headings give errors in [-180, 180)."""
+        """Values as (speed m/s, relative heading deg); absolute headings give errors in [-180, 180).
+
+        Absolute ones beyond `LARGEST_HEADING_RAD` become NaN, and the shield holds the boat.
+        """
         if self.relative:
             return self.values
-        with np.errstate(invalid="ignore", over="ignore"):  # an unusable heading stays NaN: the shield holds the boat
-            error = (np.degrees(self.values[:, 1]) - heading_deg + 180.0) % 360.0 - 180.0
+        heading_rad = np.where(np.abs(self.values[:, 1]) <= LARGEST_HEADING_RAD, self.values[:, 1], np.nan)
+        error = (np.degrees(heading_rad) - heading_deg + 180.0) % 360.0 - 180.0
         return np.stack([self.values[:, 0], error], axis=1)
 
     def absolute(self, i: int, heading_rad: float) -> tuple[float, float]:

@@ -29,7 +29,7 @@ class ShieldConfig:
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
-        margin_cap_m: margins above this shrink freely and are reported as infinite, m.
+        margin_cap_m: margins above this shrink freely and are reported as infinite, m, at most 50.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of
@@ -44,7 +44,7 @@ class ShieldConfig:
             is kept from the edge, obstacles and circles, the more the later. Boats near each other drift alike.
         track_error_mps: growth of a neighbour's position error with the age of its track, m/s.
         max_track_age_s: tracks older than this are refused, s.
-        delay_s: time from decision to effect, s: boats are run on by it before deciding.
+        delay_s: time from decision to effect, s, rounded up to whole steps: boats are run on by it before deciding.
         edge_m: distance to keep from the field edge, m; None: the edge is not kept.
         hull_m: distance to keep from walls of obstacles, m.
 
@@ -112,13 +112,15 @@ class ShieldConfig:
 _TEXTS = {"certificate", "coordination", "solver"}
 _POSITIVE = {"separation_m", "dt_s", "response_per_s", "table_response_per_s", "speed_weight", "horizon_s", "hunt_s"}
 _RANGES = {
+    "margin_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 1.0),
     "horizon_s": (0.0, 120.0),
     "hunt_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
     "delay_s": (0.0, 10.0),
 }
-"""Times for which a decision can be made at all: memory and work grow with them, and what is farther off is a guess."""
+"""What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
+cap of margins would weigh more than the field's edge."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
 _MAY_BE_INFINITE = {"response_per_s", "table_response_per_s", "max_track_age_s"}
 
@@ -143,4 +145,4 @@ def _check_number(name: str, value: object) -> None:
     low, high = _RANGES.get(name, (0.0, math.inf))
     if not low <= value <= high:
         first = "more than 0 and at most" if name in _POSITIVE and low == 0.0 else f"{low:g} to"
-        raise ConfigError(f"{name} is {value}; give {first} {high:g} s")
+        raise ConfigError(f"{name} is {value}; give {first} {high:g} {name.rsplit('_')[-1]}")

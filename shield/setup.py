@@ -105,7 +105,8 @@ def _horizons(
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.dt_s) for kind in kinds]
     hunt_s, static_s, thrust_s = list(horizon_s), [], []
     for i, limit in enumerate(limits):
-        static_s.append(min(limit.half_turn_s + STATIC_REACTION_S, horizon_s[i]))
+        turn_s = horizon_s[i] if certificate.braking else limit.half_turn_s + STATIC_REACTION_S
+        static_s.append(min(turn_s, horizon_s[i]))
         thrust_s.append(limit.thrust_s if hunters else 0.0)
         if hunters:
             hunt_s[i] = max(horizon_s[i], config.hunt_s or certificate.hunt_s(limit))

@@ -22,6 +22,7 @@ from .linearised import add_slack, build, check, pick_movers, take_answer
 from .plan import NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
+from .remembering import Known, Stayed, carry_over, meets_new
 from .scene import Boats, Fixed, Memory, Work, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
@@ -47,10 +48,12 @@ class Shield:
     Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it, and otherwise
     the least change that keeps one,
 
-        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
+        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair,
+                                                 h(x+) >= 0                     for every edge and obstacle,
 
     with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
-    of each boat; the same sequence of inputs from `reset` on gives the same bits. It decides for one thread at a time:
+    of each boat, its margins and the commands on their way, for as long as the boat (name, platform, team) is in the
+    fleet; the same sequence of inputs from `reset` on gives the same bits. It decides for one thread at a time:
     compiled code works on its arrays without the GIL.
 
     Args:
@@ -75,12 +78,12 @@ class Shield:
         self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
-        self._key: tuple[Any, ...] | None = None
+        self._known: Known | None = None
         self._pending = np.zeros((0, 0, 2))
 
     def reset(self) -> None:
         """Forget all escapes, as before a new game."""
-        self._key = None
+        self._known = None
 
     def warm_up(self, fleet: Fleet | None = None) -> None:
         """Compile what decisions run, so that the first one is as quick as any; the shield's memory is left alone.
@@ -150,18 +153,28 @@ class Shield:
         return wrap_policy(policy, self, read)
 
     def _scene(self, fleet: Fleet) -> Boats:
-        """Boat constants; fresh working memory when the fleet is not the one of the last call."""
-        key = (fleet.platforms, fleet.names, fleet.team.tobytes())
-        if key != self._key or self._boats is None:
+        """Boat constants; new working memory when the fleet is not the one of the last call."""
+        if self._boats is None or self._known is None or self._known != Known.of(fleet):
             fleet.check()
             self._boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
-            n = len(fleet)
-            seats = 1 if self.config.coordination == "team" else n
-            rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
-            samples = path_samples(self._boats)
-            self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(seats)]
-            self._key, self._pending = key, np.full((steps_of_delay(self.config), n, 2), np.nan)
+            self._seat(fleet, self._boats)
+            self._known = Known.of(fleet)
         return self._boats
+
+    def _seat(self, fleet: Fleet, boats: Boats) -> None:
+        """Make room for the boats of a fleet; those that were there before keep what is remembered of them."""
+        n, old, sent = len(fleet), self._seats, self._pending
+        rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
+        team, samples = self.config.coordination == "team", path_samples(boats)
+        self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(1 if team else n)]
+        self._pending = np.full((steps_of_delay(self.config), n, 2), np.nan)
+        stayed = Stayed.between(self._known, fleet)
+        if len(stayed.now) == 0:
+            return
+        self._pending[:, stayed.now] = sent[:, stayed.then]
+        met = meets_new(fleet, stayed, boats, self._tuning)
+        for i, k in [(0, 0)] if team else zip(*stayed, strict=True):
+            carry_over(old[k].memory, self._seats[i].memory, stayed, met)
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if surroundings not in self._packed:

@@ -10,6 +10,7 @@ from .config import ShieldConfig
 from .exceptions import FleetError
 from .fleet import Fleet
 from .jit import Array, BoolArray, kernel
+from .plan import LARGEST_COMMAND
 from .platforms import layout as L
 from .platforms.step import step_boat
 
@@ -56,12 +57,13 @@ def run_on_commands(state: Array, who: BoolArray, params: Array, pending: Array,
         who: (n,) boats whose commands are known.
         params: (n, N_PARAM) platform rows.
         pending: (steps, n, 2) speed m/s and absolute heading deg, the next to take effect first; NaN: none was sent,
-            the boat goes straight on.
+            the boat goes straight on, as it does for values no shield sends.
         dt_s: step, s.
     """
     for k in range(pending.shape[0]):
         for i in range(state.shape[0]):
-            if who[i] and not math.isnan(pending[k, i, 0]):
+            # what boats not ours were told may be anything
+            if who[i] and abs(pending[k, i, 0]) <= LARGEST_COMMAND and abs(pending[k, i, 1]) <= 2.0 * LARGEST_COMMAND:
                 error = (pending[k, i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
                 step_boat(params[i], state[i], pending[k, i, 0], error, dt_s)
             else:
@@ -83,8 +85,8 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
 
 
 def steps_of_delay(config: ShieldConfig) -> int:
-    """Decisions whose commands are on their way at any time."""
-    return round(config.delay_s / config.dt_s)
+    """Decisions whose commands are on their way at any time; a delay counts up to the next step."""
+    return math.ceil(config.delay_s / config.dt_s - 1e-9)
 
 
 def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -> tuple[Array, Array]:

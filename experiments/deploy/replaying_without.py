@@ -49,7 +49,7 @@ def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
     """
     states = tracks.states.copy()
     away = np.zeros(states.shape[:2], dtype=np.bool_)
-    late = round(delay_s / tracks.dt_s)
+    late = math.ceil(delay_s / tracks.dt_s - 1e-9)
     stretches = sum(_sail(tracks, int(i), late, states, away) for i in np.flatnonzero(tracks.ours))
     return Without(states, away, stretches)
 

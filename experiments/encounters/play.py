@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -129,4 +130,4 @@ def _check(sent: Array, step: int) -> None:
 
 def delay_steps(conditions: Conditions) -> int:
     """Steps from a command of an own boat to its effect."""
-    return round(conditions.delay_s / DT_S)
+    return math.ceil(conditions.delay_s / DT_S - 1e-9)

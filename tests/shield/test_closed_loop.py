@@ -98,6 +98,18 @@ def test_a_side_once_taken_is_kept():
     assert (np.diff(east) >= -1e-6).all() or (np.diff(east) <= 1e-6).all() or np.ptp(np.sign(np.round(east, 2))) <= 1
 
 
+@pytest.mark.parametrize("settings", [{}, {"margin_cap_m": 50.0}, {"certificate": "braking"}])
+def test_one_boat_alone_stays_in_the_field(settings):
+    fleet = fleet_of([(20, 5, 0, 2)], [0])
+    run = sail(
+        Shield(surroundings=Surroundings(field=(0, 0, 40, 40)), **settings),
+        fleet,
+        lambda step, state: [[2.0, 0.0]],
+        400,
+    )
+    assert 20 < run.position[:, 0, 1].max() < 40
+
+
 def test_one_boat_alone_stays_in_the_field_and_off_the_obstacle():
     around = Surroundings(field=(0, 0, 40, 40), circles=[(20, 30, 2)])
     fleet = fleet_of([(20, 10, 0, 2)], [0])

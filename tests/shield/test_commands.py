@@ -72,10 +72,16 @@ def test_headings_that_are_none_stay_none_without_a_warning(value):
     assert not math.isfinite(commands.absolute(0, 0.0)[1])
 
 
-@pytest.mark.parametrize("heading", [1e300, -1e300, 1.7e308])
-def test_huge_headings_are_directions_or_nothing(heading):
-    relative = Commands.absolute_rad([[1.0, heading]]).as_relative_deg(np.zeros(1))[0, 1]
-    assert not math.isfinite(relative) or -180.0 <= relative <= 180.0
+@pytest.mark.parametrize("heading", [1.1e6, -1.1e6, 1e15, 1e300, 1.7e308])
+def test_huge_headings_are_none(heading):
+    assert math.isnan(Commands.absolute_rad([[1.0, heading]]).as_relative_deg(np.zeros(1))[0, 1])
+
+
+@pytest.mark.parametrize("heading", [0.9e6, -0.9e6])
+def test_headings_of_many_turns_are_the_direction_that_is_told(heading):
+    commands = Commands.absolute_rad([[1.0, heading]])
+    relative = commands.as_relative_deg(np.zeros(1))[0, 1]
+    assert apart_rad(math.radians(relative), commands.absolute(0, 0.0)[1]) < 1e-8
 
 
 @pytest.mark.parametrize("make", [Commands.relative_deg, Commands.absolute_rad])

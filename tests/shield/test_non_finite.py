@@ -67,8 +67,6 @@ def test_what_comes_out_is_within_the_boats_limits_when_changed(data, form):
 def test_a_command_that_is_none_holds_the_boat(value, column, make):
     values = np.array([[1.0, 0.1], [1.0, 0.1]])
     values[0, column] = value
-    if make == Commands.absolute_rad and column == 1 and math.isfinite(value):
-        return  # headings wrap: any finite one is a direction
     fleet = fleet_of([(0, 0, 30.0, 1.0), (400, 0, 0, 1.0)], [0, 0])
     decision, other = Shield().decide(fleet, make(values))
     assert decision.reason is Reason.HELD
@@ -98,6 +96,22 @@ def test_a_batch_holds_too():
     assert (shield.reason[:, 0] == Reason.HELD).all()
     assert (sent[:, 0] == 0.0).all()
     assert bits(sent[:, 1]) == bits(wanted[:, 1])
+
+
+@pytest.mark.parametrize("column", [L.SPEED_INTEGRAL, L.HEADING_INTEGRAL, L.TURN_RATE, L.SPEED_ERROR, L.HEADING_ERROR])
+def test_a_batch_takes_unknown_memory_as_a_single_shield_does(column):
+    fleet = head_on(6.0)
+    fleet.state[:, [L.THRUST, L.RUDDER]] = 60.0, 0.0
+    fleet.state[:, column] = math.nan
+    state, wanted = fleet.state.copy(), relative((2.0, 0.0), (2.0, 0.0))
+    config = ShieldConfig(certificate="braking")
+    one = Shield(config).decide(fleet, wanted)
+    many = BatchedShield(config, 1, fleet.platforms, (0, 1))
+    sent = many.decide(state[None], wanted.values[None], fleet.controlled[None])
+    assert one.reason[0] == many.reason[0, 0] != Reason.PASSED
+    assert one.certificate_m[0] == pytest.approx(many.certificate_m[0, 0], abs=1e-9)
+    assert np.allclose(sent[0, 0], one.sent.values[0], atol=1e-6)
+    assert bits(state) == bits(fleet.state)
 
 
 @settings(parent=quick, max_examples=80)

@@ -154,8 +154,16 @@ def test_whole_numbers_are_kept_as_floats_for_compiled_code():
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("dt_s", 100), ("dt_s", 1e-9), ("hunt_s", 1e9), ("horizon_s", 121.0), ("tail_s", 1e4), ("delay_s", 1e4)],
+    [
+        ("dt_s", 100),
+        ("dt_s", 1e-9),
+        ("hunt_s", 1e9),
+        ("horizon_s", 121.0),
+        ("tail_s", 1e4),
+        ("delay_s", 1e4),
+        ("margin_cap_m", 51),
+    ],
 )
-def test_times_nothing_can_be_decided_for_are_refused(name, value):
-    with pytest.raises(ConfigError, match=rf"{name} is .*; give .* [0-9]+ s"):
+def test_what_nothing_can_be_decided_for_is_refused(name, value):
+    with pytest.raises(ConfigError, match=rf"{name} is .*; give .* [0-9]+ (s|m)$"):
         ShieldConfig(**{name: value})
