@@ -70,6 +70,10 @@ class Shield:
     ) -> None:
         if config is not None and settings:
             raise ConfigError("give either a ShieldConfig or single settings, not both")
+        if config is not None and not isinstance(config, ShieldConfig):
+            raise ConfigError(
+                f"config is a {type(config).__name__}; give a ShieldConfig, or settings: Shield(**settings)"
+            )
         self.config = config if config is not None else ShieldConfig.of(**settings)
         self.surroundings = surroundings
         self._tuning = tuning_of(self.config)
@@ -114,7 +118,9 @@ class Shield:
             One decision per boat, in the fleet's order.
 
         Raises:
-            FleetError: an argument is of another kind, shapes do not fit, a state is not finite or a track too old.
+            FleetError: fleet or commands are of another kind, shapes do not fit, a state is not finite or a track too
+                old.
+            ConfigError: the surroundings are of another kind or leave nothing of the field.
         """
         started = time.perf_counter()
         if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
@@ -177,6 +183,8 @@ class Shield:
             carry_over(old[k].memory, self._seats[i].memory, stayed, met)
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
+        if not isinstance(surroundings, Surroundings):
+            raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
         if surroundings not in self._packed:
             if len(self._packed) > 64:
                 self._packed.clear()

@@ -25,7 +25,11 @@ STRAIGHT_BASE = 300.0
 """Merit of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
 
 OBSTACLE_BASE = 50.0
-"""Merit of a manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it counts."""
+"""Merit of a hunted boat's manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it
+counts. Of another boat's that hardly touches one; deeper, less."""
+
+LOST_M = 0.8
+"""Depth, m, from which more is no worse for a boat that nobody hunts: most of the distance kept from walls."""
 
 DEEPEST_M = 10.0
 """Depth in an obstacle, m, from which one manoeuvre is as bad as another."""
@@ -57,20 +61,22 @@ def _rate_touching(
 ) -> float:
     """Merit of a path that touches an obstacle after that share of a half turn's time.
 
-    Where there may be a current a boat too near to one has to come away at once, and may fail at that with whatever it
-    does: among manoeuvres that touch at the same time the one that goes least deep is worth more.
+    A boat that is hunted had better be stopped late: who is stopped is caught. Among manoeuvres that touch at the same
+    time, as all do of a boat that is too near already and cannot but come nearer, the one that goes least deep is worth
+    more; of a boat that nobody hunts, always, and the later touch decides between those that are as deep or go through
+    a wall, of which samples on either side may tell less than the whole depth.
     """
-    merit = OBSTACLE_BASE * share
-    decided = share * (boats.static_samples[i] + 1.0)
-    if fixed.current_mps > 0.0:
-        clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
-        merit += max(0.0, 1.0 + work.spare2[MARGIN] / DEEPEST_M)
-        decided = np.inf
-    work.decided[slot] = decided
+    clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
+    depth_m = -work.spare2[MARGIN]
+    if work.hunted[i]:
+        merit = OBSTACLE_BASE * share + max(0.0, 1.0 - depth_m / DEEPEST_M)
+    else:
+        merit = OBSTACLE_BASE * max(0.0, 1.0 - depth_m / LOST_M) + share
+    work.decided[slot] = np.inf
     if merit <= best:
         return merit
     worst_hunter(i, slot, state, ours, boats, tuning, work, -FAR)
-    work.bound[slot], work.decided[slot] = FIXED_THING, decided
+    work.bound[slot], work.decided[slot] = FIXED_THING, np.inf
     return merit
 
 

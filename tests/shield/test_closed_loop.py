@@ -110,6 +110,21 @@ def test_one_boat_alone_stays_in_the_field(settings):
     assert 20 < run.position[:, 0, 1].max() < 40
 
 
+@pytest.mark.parametrize(
+    ("around", "start", "wall_y"),
+    [
+        (Surroundings(polygons=[[(-20, -20), (20, -20), (20, 20), (-20, 20)]]), (0.3, 18.2), 20.0),
+        (Surroundings(polygons=[[(-20, -20), (20, -20), (20, 20), (-20, 20)]]), (0.3, 18.5), 20.0),
+        (Surroundings(circles=[(0, 10, 3)]), (0.3, 6.4), 7.3),
+    ],
+    ids=["wall", "wall, nearer", "circle"],
+)
+def test_a_boat_that_cannot_keep_off_a_wall_any_more_turns_away_from_it(around, start, wall_y):
+    """A hull's width is lost for a moment, the wall itself is not touched, and the boat stays on its side."""
+    run = sail(Shield(surroundings=around), fleet_of([(*start, 0, 2)], [0]), lambda step, state: [[2.0, 0.0]], 60)
+    assert run.position[:, 0, 1].max() < wall_y
+
+
 def test_one_boat_alone_stays_in_the_field_and_off_the_obstacle():
     around = Surroundings(field=(0, 0, 40, 40), circles=[(20, 30, 2)])
     fleet = fleet_of([(20, 10, 0, 2)], [0])

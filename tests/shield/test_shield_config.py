@@ -106,6 +106,21 @@ def test_settings_and_config_together_are_refused():
         Shield(ShieldConfig(), separation_m=3.0)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            {"config": {"separation_m": 3.0}},
+            r"config is a dict; give a ShieldConfig, or settings: Shield\(\*\*settings\)",
+        ),
+        ({"surroundings": (0, 0, 10, 10)}, r"surroundings are a tuple; build them with Surroundings\("),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(arguments, told):
+    with pytest.raises(ConfigError, match=told):
+        Shield(**arguments)
+
+
 def test_a_config_cannot_be_changed_behind_the_shields_back():
     config = ShieldConfig()
     with pytest.raises(FrozenInstanceError):
