@@ -10,7 +10,7 @@ from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
-from .fleet import LARGEST
+from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .flow import decide_compiled
 from .jit import Array, BoolArray, IntArray, kernel
 from .plan import Plan, new_plan
@@ -168,6 +168,8 @@ class BatchedShield:
                 raise FleetError(f"{name} has shape {np.shape(array)}; expected {shape}")
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
+        if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
+            raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
         decide_games(
             state,
             wanted,

@@ -19,6 +19,10 @@ LARGEST = 1e9
 """Values beyond this (m, m/s, deg, percent) are faults of the source: squares of them lose the metres."""
 
 
+LARGEST_SPEED_MPS = 50.0
+"""Speeds beyond this are faults of the source, m/s: such a boat would jump over the radius within a step."""
+
+
 @kernel
 def sound(state: Array) -> bool:
     """Whether what is seen of every boat is finite and of a sensible size, and its memory is that or NaN."""
@@ -28,6 +32,8 @@ def sound(state: Array) -> bool:
                 return False
             if abs(state[i, column]) > LARGEST:
                 return False
+        if abs(state[i, L.SPEED]) > LARGEST_SPEED_MPS:
+            return False
     return True
 
 
@@ -77,7 +83,7 @@ class Fleet:
         Args:
             position_m: (n, 2) east and north, m.
             heading_rad: (n,) clockwise from north, rad.
-            speed_mps: (n,) m/s.
+            speed_mps: (n,) m/s, negative astern.
             team: (n,) integers.
             platforms: one platform for all, or n of them.
             controlled: (n,) bool; None: the boats of team 0.
@@ -157,11 +163,13 @@ class Fleet:
         size = np.abs(self.state)
         bad = size > LARGEST
         bad[:, _SEEN] |= ~np.isfinite(size[:, _SEEN])
+        bad[:, L.SPEED] |= size[:, L.SPEED] > LARGEST_SPEED_MPS
         i, column = np.argwhere(bad)[0]
         what = {L.X: "position", L.Y: "position", L.HEADING: "heading", L.SPEED: "speed"}.get(column, "memory")
         remedy = "give NaN where it is unknown" if what == "memory" else "leave boats without a track out"
+        most = f"{LARGEST_SPEED_MPS:g} m/s" if what == "speed" else f"{LARGEST:g}"
         raise FleetError(
-            f"{what} of boat {self.names[i]!r} is not finite or beyond {LARGEST:g} ({self.state[i, column]}); {remedy}"
+            f"{what} of boat {self.names[i]!r} is not finite or beyond {most} ({self.state[i, column]}); {remedy}"
         )
 
     @property

@@ -65,7 +65,7 @@ def meets_new(fleet: Fleet, stayed: Stayed, boats: Boats, tuning: Tuning) -> Boo
     fresh[stayed.now] = False
     samples = np.maximum(boats.samples, boats.hunt_samples + boats.thrust_samples).max() + 1
     horizon_s = samples * boats.sample_s + tuning.tail_s
-    top: Array = np.maximum(boats.fastest_mps, fleet.speed_mps)
+    top: Array = np.maximum(boats.fastest_mps, np.abs(fleet.speed_mps))
     apart = fleet.position_m[:, None] - fleet.position_m[None]
     gap_m = np.hypot(apart[..., 0], apart[..., 1])
     reach_m = tuning.radius_m + (top[:, None] + top[None]) * horizon_s

@@ -84,6 +84,12 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
         pending[last, i, 1] = state[i, L.HEADING] + commands[i, 1]
 
 
+def turn_round(state: Array, astern: BoolArray) -> None:
+    """Make boats that go astern go ahead the same way, in place: others' courses are followed ahead."""
+    state[astern, L.HEADING] = state[astern, L.HEADING] % 360.0 - 180.0
+    state[astern, L.SPEED] *= -1.0
+
+
 def steps_of_delay(config: ShieldConfig) -> int:
     """Decisions whose commands are on their way at any time; a delay counts up to the next step."""
     return math.ceil(config.delay_s / config.dt_s - 1e-9)
@@ -109,6 +115,7 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -
     """
     fleet.check()
     state = fleet.state.copy()
+    turn_round(state, ~fleet.controlled & (state[:, L.SPEED] < 0.0))
     fill_memory(state, params)
     n = len(state)
     margin = np.full(n, config.position_error_m)

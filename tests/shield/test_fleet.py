@@ -56,6 +56,7 @@ def fleet(**changes):
         ({"heading_rad": [0.0, math.inf]}, "heading of boat 'boat_1'"),
         ({"speed_mps": [math.inf, 0.0]}, "speed of boat 'boat_0'"),
         ({"speed_mps": [1e300, 0.0]}, "speed of boat 'boat_0'.*beyond"),
+        ({"speed_mps": [0.0, -51.0]}, r"speed of boat 'boat_1' is not finite or beyond 50 m/s \(-51.0\)"),
         ({"position_m": [[0.0, 0.0], [0.0, 1e300]]}, "position of boat 'boat_1'.*beyond"),
     ],
 )

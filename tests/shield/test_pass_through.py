@@ -93,3 +93,17 @@ def test_a_step_of_the_class_k_rate_is_no_excuse_to_touch_a_far_boat():
     """A finite response rate asks margins to shrink slowly; margins above the cap are left alone."""
     decisions = Shield(response_per_s=0.5).decide(far_apart(), relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0)))
     assert not decisions.intervened.any()
+
+
+@pytest.mark.parametrize(("gap_m", "speed_mps"), [(9.0, 2.0), (20.0, 8.0), (30.0, 20.0), (9.0, 49.0)])
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_mps):
+    ahead, astern = (
+        Shield().decide(
+            fleet_of([(0, 0, 0, 1.5), (0.3, gap_m, heading, speed)], [0, 1], platform), relative((1.5, 0.0), (1.0, 9.0))
+        )
+        for heading, speed in ((180.0, speed_mps), (0.0, -speed_mps))
+    )
+    assert ahead[0].reason == astern[0].reason != Reason.PASSED
+    np.testing.assert_allclose(ahead.sent.values, astern.sent.values, atol=1e-9)
+    assert ahead[0].certificate_m == pytest.approx(astern[0].certificate_m, abs=1e-9)
