@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.tracks import whole_steps
 
 MOST = {"delay_s": 2.0, "noise_m": 5.0, "current_mps": 2.0}
 """Largest value of each: s, m, m/s."""
 _WORDS = {"delay_s": "{:g} s delay", "noise_m": "{:g} m position noise", "current_mps": "{:g} m/s current"}
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Conditions:
 
     def delay_steps(self, dt_s: float) -> int:
         """Whole steps from a command to its effect."""
-        return math.ceil(self.delay_s / dt_s - _ROUNDING)
+        return whole_steps(self.delay_s, dt_s)
 
     def shield_settings(self, dt_s: float) -> dict[str, float]:
         """What a shield is told of them, as settings; nothing where there is nothing to tell."""

@@ -162,9 +162,9 @@ class Shield:
         """Boat constants; new working memory when the fleet is not the one of the last call."""
         if self._boats is None or self._known is None or self._known != Known.of(fleet):
             fleet.check()
-            self._boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
-            self._seat(fleet, self._boats)
-            self._known = Known.of(fleet)
+            boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
+            self._seat(fleet, boats)
+            self._boats, self._known = boats, Known.of(fleet)
         return self._boats
 
     def _seat(self, fleet: Fleet, boats: Boats) -> None:

@@ -90,9 +90,14 @@ def turn_round(state: Array, astern: BoolArray) -> None:
     state[astern, L.SPEED] *= -1.0
 
 
+def whole_steps(time_s: float, dt_s: float) -> int:
+    """Steps that a time takes, counted up but for its rounding."""
+    return math.ceil(time_s / dt_s - 1e-9)
+
+
 def steps_of_delay(config: ShieldConfig) -> int:
-    """Decisions whose commands are on their way at any time; a delay counts up to the next step."""
-    return math.ceil(config.delay_s / config.dt_s - 1e-9)
+    """Decisions whose commands are on their way at any time."""
+    return whole_steps(config.delay_s, config.dt_s)
 
 
 def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
+from steerclear.shield.tracks import whole_steps
 
 from .replaying_tracks import Array, Tracks
 
@@ -49,7 +50,7 @@ def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
     """
     states = tracks.states.copy()
     away = np.zeros(states.shape[:2], dtype=np.bool_)
-    late = math.ceil(delay_s / tracks.dt_s - 1e-9)
+    late = whole_steps(delay_s, tracks.dt_s)
     stretches = sum(_sail(tracks, int(i), late, states, away) for i in np.flatnonzero(tracks.ours))
     return Without(states, away, stretches)
 

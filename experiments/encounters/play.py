@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 
@@ -12,6 +11,7 @@ from steerclear.shield.exceptions import FleetError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.tracks import whole_steps
 
 from .guards import Guard, GuardMaker, build_guard
 from .motion import move, observe, reach_goals
@@ -130,4 +130,4 @@ def _check(sent: Array, step: int) -> None:
 
 def delay_steps(conditions: Conditions) -> int:
     """Steps from a command of an own boat to its effect."""
-    return math.ceil(conditions.delay_s / DT_S - 1e-9)
+    return whole_steps(conditions.delay_s, DT_S)
