@@ -21,9 +21,6 @@ from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
 
-NOWHERE_M = -1e9
-"""Radius of a circle that does not count, m: everywhere is far outside of it."""
-
 
 @kernel
 def decide_games(
@@ -32,7 +29,6 @@ def decide_games(
     ours: BoolArray,
     boats: Boats,
     fixed: Fixed,
-    lifted: BoolArray,
     plans: Array,
     tuning: Tuning,
     memory: Memory,
@@ -45,18 +41,10 @@ def decide_games(
     reason: IntArray,
     clearance_m: Array,
 ) -> None:
-    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
-
-    ``lifted`` (B, k) says which of the last k obstacle circles of ``fixed`` do not count in a game.
-    """
+    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis."""
     n = state.shape[1]
-    circles = fixed.circles.copy()
-    standing = Fixed(fixed.field, fixed.keep_out, circles, fixed.segments, fixed.segment_m, fixed.current_mps)
-    first = circles.shape[0] - lifted.shape[1]
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
-        for c in range(lifted.shape[1]):
-            circles[first + c, 2] = NOWHERE_M if lifted[b, c] else fixed.circles[first + c, 2]
         ahead[:] = state[b]
         fill_memory(ahead, boats.params)
         run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
@@ -74,7 +62,7 @@ def decide_games(
             memory.threat_m[b],
             memory.escaping[b],
         )
-        decide_compiled(ahead, asked, margin_m, ours[b], boats, standing, plans, tuning, own, work, plan)
+        decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
         for i in range(n):
             sent[b, i] = wanted[b, i]
             if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
@@ -98,7 +86,7 @@ class BatchedShield:
         platforms: platforms of the n boats.
         team: team of the n boats.
         surroundings: fixed things, the same for all games.
-        flag_of: team whose flag's circle the surroundings' ``stops`` are, see `filter_for`.
+        flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
 
     Raises:
         ConfigError: a setting that a batch cannot honour.
@@ -123,7 +111,6 @@ class BatchedShield:
         n = len(platforms)
         self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
         self._fixed = surroundings.pack(config)
-        self._lifted = np.zeros((games, len(surroundings.stops)), np.bool_)
         self._plans, self._tuning = plans_of(config), tuning_of(config)
         self._memory = new_memory(games, n)
         self._work = new_work(n, path_samples(self._boats))
@@ -142,14 +129,13 @@ class BatchedShield:
         self._memory.escaping[which] = False
         self._pending[which] = np.nan
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray, lifted: BoolArray | None = None) -> Array:
+    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
         """Safe commands.
 
         Args:
             state: (B, n, N_STATE) boat states; memory of the autopilot may be NaN where it is not known, as in `Fleet`.
             wanted: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
-            lifted: (B, k) which of the surroundings' k ``stops`` do not count; None: all count.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and safe ones, bit for bit as wanted. The array is
@@ -162,7 +148,6 @@ class BatchedShield:
             ("state", state, (*self.reason.shape, L.N_STATE)),
             ("wanted", wanted, self.sent.shape),
             ("ours", ours, self.reason.shape),
-            ("lifted", self._lifted if lifted is None else lifted, self._lifted.shape),
         ):
             if np.shape(array) != shape:
                 raise FleetError(f"{name} has shape {np.shape(array)}; expected {shape}")
@@ -176,7 +161,6 @@ class BatchedShield:
             ours,
             self._boats,
             self._fixed,
-            self._lifted if lifted is None else lifted,
             self._plans,
             self._tuning,
             self._memory,
@@ -194,8 +178,6 @@ class BatchedShield:
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
 
-        With ``flag_of`` the surroundings' ``stops`` count while that team's flag is home, without it always.
-
         Args:
             team: the team to shield.
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
@@ -209,9 +191,6 @@ class BatchedShield:
         def command_filter(core: Any, commands: Array) -> Array:
             ours = np.broadcast_to(core.team == team, core.driven.shape)
             ours = ours.copy() if shield_autopilot else ours & ~core.driven
-            if self.flag_of is None:
-                return self.decide(core.state, commands, ours)
-            taken = np.repeat(core.flag_taken[:, team : team + 1], self._lifted.shape[1], axis=1)
-            return self.decide(core.state, commands, ours, taken)
+            return self.decide(core.state, commands, ours)
 
         return command_filter

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from .autopilots import Autopilots
 from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .commands import Commands
@@ -84,6 +85,7 @@ class Shield:
         self._boats: Boats | None = None
         self._known: Known | None = None
         self._pending = np.zeros((0, 0, 2))
+        self._autopilots = Autopilots.of(0)
 
     def reset(self) -> None:
         """Forget all escapes, as before a new game."""
@@ -104,6 +106,7 @@ class Shield:
         twin = Shield(self.config)
         twin.decide(*tight_spot())
         if fleet is not None:
+            fleet.check()
             twin._scene(fleet)
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
@@ -128,10 +131,12 @@ class Shield:
                 f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
                 "them with Fleet.of(...) and Commands.absolute_rad(...) or Commands.relative_deg(...)"
             )
+        fleet.check()
         if wanted.values.shape != (len(fleet), 2):
             raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
         boats = self._scene(fleet)
-        state, margin = prepare(fleet, self.config, boats.params, self._pending)
+        seen, unknown = self._with_memory(fleet)
+        state, margin = prepare(seen, self.config, boats.params, self._pending)
         turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
         asked = _less_turn(wanted.as_relative_deg(fleet.state[:, L.HEADING]), turned)
         fixed = self._fixed(self.surroundings if surroundings is None else surroundings)
@@ -141,7 +146,9 @@ class Shield:
             answer = _Answer(seat.plan, seat.work, state)
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        return self._report(fleet, wanted, asked, turned, answer, started)
+        decisions = self._report(fleet, wanted, asked, turned, answer)
+        self._note_sent(seen, unknown, decisions.sent, boats)
+        return replace(decisions, solve_time_s=time.perf_counter() - started)
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
         """Put this shield around a policy.
@@ -161,7 +168,6 @@ class Shield:
     def _scene(self, fleet: Fleet) -> Boats:
         """Boat constants; new working memory when the fleet is not the one of the last call."""
         if self._boats is None or self._known is None or self._known != Known.of(fleet):
-            fleet.check()
             boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
             self._seat(fleet, boats)
             self._boats, self._known = boats, Known.of(fleet)
@@ -174,13 +180,38 @@ class Shield:
         team, samples = self.config.coordination == "team", path_samples(boats)
         self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(1 if team else n)]
         self._pending = np.full((steps_of_delay(self.config), n, 2), np.nan)
+        believed, self._autopilots = self._autopilots, Autopilots.of(n)
         stayed = Stayed.between(self._known, fleet)
         if len(stayed.now) == 0:
             return
+        self._autopilots.carry_over(believed, stayed)
         self._pending[:, stayed.now] = sent[:, stayed.then]
         met = meets_new(fleet, stayed, boats, self._tuning)
         for i, k in [(0, 0)] if team else zip(*stayed, strict=True):
             carry_over(old[k].memory, self._seats[i].memory, stayed, met)
+
+    def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray]:
+        """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it."""
+        unknown: BoolArray = fleet.controlled & np.isnan(fleet.state[:, L.THRUST])
+        if not unknown.any():
+            return fleet, unknown
+        fleet = replace(fleet, state=fleet.state.copy())
+        self._autopilots.fill(fleet.state, unknown, self.config.dt_s)
+        return fleet, unknown
+
+    def _note_sent(self, seen: Fleet, unknown: BoolArray, sent: Commands, boats: Boats) -> None:
+        """Queue what was sent, and run the autopilots nobody tells of through what works in this step."""
+        if len(self._pending) == 0 and not unknown.any():
+            return
+        heading_deg = seen.state[:, L.HEADING]
+        works = sent.as_relative_deg(heading_deg)
+        if len(self._pending) > 0:
+            first = self._pending[0].copy()
+            queue_commands(self._pending, seen.state, works)
+            works = first
+            works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
+        if unknown.any():
+            self._autopilots.go_on(seen.state, unknown, boats.params, works, self.config.dt_s)
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if not isinstance(surroundings, Surroundings):
@@ -237,15 +268,11 @@ class Shield:
             answer.take(int(i), seat.plan, seat.work, state)
         return answer
 
-    def _report(
-        self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer, started: float
-    ) -> Decisions:
+    def _report(self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer) -> Decisions:
         changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
         changed &= (answer.commands != asked).any(axis=1)
         seen_deg = fleet.state[:, L.HEADING]
         sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), seen_deg) if changed.any() else wanted
-        if len(self._pending) > 0:
-            queue_commands(self._pending, fleet.state, sent.as_relative_deg(seen_deg))
         return Decisions(
             fleet=fleet,
             wanted=wanted,
@@ -255,7 +282,7 @@ class Shield:
             certificate_m=answer.margin,
             slack_m=answer.slack,
             bound=answer.bound,
-            solve_time_s=time.perf_counter() - started,
+            solve_time_s=0.0,
         )
 
 

@@ -107,7 +107,7 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -
     the commands on their way. The error margin of a boat is its bound plus ``track_error_mps`` times age plus delay.
 
     Args:
-        fleet: what was seen.
+        fleet: what was seen, checked.
         config: settings.
         params: (n, N_PARAM) platform rows.
         pending: (steps of delay, n, 2) commands on their way, see `run_on_commands`.
@@ -116,9 +116,8 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -
         State (n, N_STATE), a copy, and margins (n,), m.
 
     Raises:
-        FleetError: shapes do not fit, a value is not finite, or a track is older than ``max_track_age_s``.
+        FleetError: a track is older than ``max_track_age_s``.
     """
-    fleet.check()
     state = fleet.state.copy()
     turn_round(state, ~fleet.controlled & (state[:, L.SPEED] < 0.0))
     fill_memory(state, params)

@@ -16,10 +16,11 @@ ROOM_M = 10.0
 
 
 class Water:
-    """The geofence, the game's obstacles, and the own flag's circle while the referee says that the flag is home.
+    """The geofence, the game's obstacles, and the own flag's circle while a referee keeps the game.
 
     The game stops a boat in its own flag's circle, and who is stopped is caught: on the water the shield is told of it
-    as in the simulator. Without a referee, or once he is silent for longer than the file allows, nobody stops boats.
+    as in the simulator, whether the flag is home or not, for it may come home at any time. Without a referee, or once
+    he is silent for longer than the file allows, nobody stops boats.
 
     Args:
         file: the file.
@@ -28,7 +29,6 @@ class Water:
     """
 
     def __init__(self, file: FleetFile, grounds: Surroundings = OPEN_WATER) -> None:
-        self._team = file.team_number
         self._game_max_age_s = file.limits.game.max_age_s
         home = replace(grounds, field=file.geofence.box)
         self._open = replace(home, stops=())
@@ -45,7 +45,7 @@ class Water:
             game: the state of the game; None: none yet.
             game_age_s: its age, s.
         """
-        fixed = self._home if self._is_home(game, game_age_s) else self._open
+        fixed = self._home if self._is_kept(game, game_age_s) else self._open
         own = fleet.position_m[fleet.controlled]
         if len(own) == 0 or fixed.field is None:
             return fixed
@@ -56,15 +56,13 @@ class Water:
             return fixed
         return replace(fixed, field=_wider(fixed.field, grown))
 
-    def _is_home(self, game: GameState | None, age_s: float) -> bool:
-        """Whether somebody keeps the game and says that our flag is home.
+    def _is_kept(self, game: GameState | None, age_s: float) -> bool:
+        """Whether somebody keeps the game.
 
         A referee silent for too long counts as none: the circle is a rule of the game, and nothing on the water stops
         a boat in it, so it must not press boats towards opponents on the word of nobody.
         """
-        if game is None or game.over or not age_s <= self._game_max_age_s:
-            return False
-        return not game.flags[self._team].taken
+        return game is not None and not game.over and age_s <= self._game_max_age_s
 
 
 def _wider(box: Sequence[float], grown: Sequence[float]) -> tuple[float, float, float, float]:

@@ -3,6 +3,9 @@
 Samples of a path that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times
 the way the boat goes from sample to sample, its drift included. What a current of unknown direction may do to a boat is
 a distance that grows with time: a clearance that is to hold is that much larger.
+
+Who goes through a wall is behind it from there on, by as much as it is off it: from sample to sample a boat may go from
+before a wall to behind it, and be near it at neither.
 """
 
 from __future__ import annotations
@@ -65,6 +68,23 @@ def _to_obstacle(
 
 
 @lean_kernel
+def _side(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """On which side of the line from a to b a point is: positive left, negative right."""
+    return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+
+
+@lean_kernel
+def _through(x0: float, y0: float, x1: float, y1: float, o: int, circles: Array, segments: Array) -> bool:
+    """Whether the way from one point to another goes through obstacle number o, a wall; never through a circle."""
+    if o < circles.shape[0]:
+        return False
+    ax, ay, bx, by = segments[o - circles.shape[0]]
+    if (_side(x0, y0, ax, ay, bx, by) > 0.0) == (_side(x1, y1, ax, ay, bx, by) > 0.0):
+        return False
+    return (_side(ax, ay, x0, y0, x1, y1) > 0.0) != (_side(bx, by, x0, y0, x1, y1) > 0.0)
+
+
+@lean_kernel
 def clear_of_rules(
     path: Array,
     near_samples: int,
@@ -117,7 +137,8 @@ def clear_of_obstacles(
     """Least clearance, m, of a path from circles and wall segments.
 
     A boat that is already too near to one has to come no nearer: its clearance there counts from where it is. With
-    ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
+    ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample. Nor is
+    it asked which side of such a wall it is on: positions are a little off, and it has to get back.
 
     Args:
         here: where the boat is now, m, shape (>= 2,).
@@ -135,12 +156,19 @@ def clear_of_obstacles(
     for o in range(circles.shape[0] + segments.shape[0]):
         excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
         fall_m = way_m + drift_m - excused * (1.0 - grace)
+        behind, x, y = False, here[0], here[1]
         k = 0
         while k <= samples:
             margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)
+            near_m = FAR if o < circles.shape[0] else margin + hull_m  # a wall farther off is not gone through
+            if excused == 0.0 and _through(x, y, path[k, 0], path[k, 1], o, circles, segments):
+                behind = not behind
+            if behind:
+                margin, nx, ny = -near_m - hull_m, -nx, -ny
             margin -= excused * grace**k + k * drift_m
             _lower(out, margin, k, nx, ny)
-            k += max(1, int((margin - out[MARGIN]) / fall_m))
+            x, y = path[k, 0], path[k, 1]
+            k += max(1, int(min(margin - out[MARGIN], near_m) / fall_m))
 
 
 @lean_kernel
@@ -160,11 +188,13 @@ def first_touch(
     for o in range(circles.shape[0] + segments.shape[0]):
         excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
         fall_m = way_m + drift_m - excused * (1.0 - grace)
+        x, y = here[0], here[1]
         k = 0
         while k < first:
             margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0]
             margin -= excused * grace**k + k * drift_m
-            if margin < 0.0:
+            if margin < 0.0 or (excused == 0.0 and _through(x, y, path[k, 0], path[k, 1], o, circles, segments)):
                 first = k
+            x, y = path[k, 0], path[k, 1]
             k += max(1, int(margin / fall_m))
     return first

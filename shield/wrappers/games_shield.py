@@ -19,7 +19,7 @@ def games_shield(
         core: the games.
         config: settings; None takes the defaults, with the games' step.
         team: "blue" or "red", the team that will be shielded, see `BatchedShield.filter_for`.
-        keep_out: keep clear of the own flag's circle while the flag is home; boats that enter it are stopped.
+        keep_out: keep clear of the own flag's circle; boats that enter it while the flag is home are stopped.
 
     Raises:
         ConfigError: unknown team, or a setting that a batch cannot honour.

@@ -39,12 +39,15 @@ class MctfReader:
         return decoded
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge and obstacles; the own flag's circle while the flag is home."""
-        return surroundings_of(self.env.core, team, keep_out and not bool(self.env.core.flag_taken[0, team]))
+        """Field edge, obstacles and the own flag's circle."""
+        return surroundings_of(self.env.core, team, keep_out)
 
 
 def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings:
-    """Fixed things of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle."""
+    """Fixed things of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle.
+
+    It counts while the flag is away as well: the game throws out who is inside when the flag comes home, at any time.
+    """
     return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), keep_out)
 
 
@@ -55,11 +58,11 @@ def _surroundings_cached(
     return Surroundings((0.0, 0.0, size[0], size[1]), circles, polygons, stops=keep_out)
 
 
-def _surroundings(config: Any, size: Any, flag: tuple[float, float], home: bool) -> Surroundings:
+def _surroundings(config: Any, size: Any, flag: tuple[float, float], keep_out: bool) -> Surroundings:
     circles, polygons = obstacles_of(config.obstacles)
     radius = config.agent_radius_m
     widest = max(radius) if isinstance(radius, (tuple, list)) else radius
     circle = ((float(flag[0]), float(flag[1]), float(config.flag_keepout_m + widest + KEEP_OUT_MARGIN_M)),)
     return _surroundings_cached(
-        (float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle if home else ()
+        (float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle if keep_out else ()
     )

@@ -28,7 +28,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         shield: the shield; it must not serve another game at the same time.
         team: "blue" or "red".
         shield_autopilot: also decide for boats the game drives (our env only).
-        keep_out: keep clear of the own flag's circle while the flag is home.
+        keep_out: keep clear of the own flag's circle, in which the game stops boats.
         reader: what reads the game, such as sensors that err; None: the env's own state, exact.
 
     Raises:

@@ -64,13 +64,13 @@ class PyquaticusReader:
         return top * float(share), float(heading)
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge and obstacles; the own flag's circle while the flag is home."""
+        """Field edge and obstacles; the own flag's circle, see `mctf.surroundings_of`."""
         env = self.env
         circles, polygons = obstacles_of(getattr(env, "config_dict", {}).get("obstacles"))
         size = np.asarray(env.env_size, dtype=np.float64)
         flag = env.flags[team]
         circle: tuple[tuple[float, float, float], ...] = ()
-        if keep_out and not flag.taken:
+        if keep_out:
             radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
         return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), stops=circle)

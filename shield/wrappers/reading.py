@@ -39,7 +39,7 @@ class GameReader(Protocol):
         """(n, 2) speed m/s and relative heading deg of the actions; NaN rows for boats without a usable one."""
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge, obstacles and (with ``keep_out``) the own flag's circle while the flag is home."""
+        """Field edge, obstacles and (with ``keep_out``) the own flag's circle."""
 
 
 def team_number(team: str | int) -> int:

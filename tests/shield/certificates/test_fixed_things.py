@@ -28,24 +28,49 @@ def distances_to(path, wall):
     return np.linalg.norm(path - start - parts[:, None] * way, axis=1)
 
 
+def behind(path, here, wall):
+    """At which samples a path that began clear of a wall is behind it: it went through it an odd number of times."""
+    crossings, before = [], here
+    for at in path:
+        # where the two lines meet, as shares of the step and of the wall
+        matrix = np.column_stack([at - before, wall[:2] - wall[2:]])
+        shares = np.linalg.solve(matrix, wall[:2] - before) if np.linalg.det(matrix) else np.array([2.0, 2.0])
+        crossings.append(((shares >= 0.0) & (shares <= 1.0)).all())
+        before = at
+    return np.cumsum(crossings) % 2 == 1
+
+
+def margins_of(path, here, wall, hull_m):
+    """Distance kept from a wall, m, negative behind it unless the boat was too near to it from the first."""
+    apart = distances_to(path, wall)
+    if distances_to(here[None], wall)[0] < hull_m:
+        return apart - hull_m
+    return np.where(behind(path, here, wall), -apart, apart) - hull_m
+
+
 @settings(max_examples=150, deadline=None)
-@given(wandering_paths(), st.integers(0, 10_000), st.sampled_from([(0.0, 1.0), (0.06, 0.6), (0.5, 0.9)]))
-def test_no_sample_that_counts_is_skipped(path, seed, current):
+@given(
+    wandering_paths(),
+    st.integers(0, 10_000),
+    st.sampled_from([(0.0, 1.0), (0.06, 0.6), (0.5, 0.9)]),
+    st.sampled_from([0.0, 0.2, 0.7]),
+)
+def test_no_sample_that_counts_is_skipped(path, seed, current, hull_m):
     drift_m, grace = current
     random = np.random.default_rng(seed)
     circles = np.column_stack([random.uniform(-20, 20, (3, 2)), random.uniform(0.0, 8.0, 3)])
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
     out = np.zeros(N_CLEARANCE)
-    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, circles, walls, 0.7, out)
+    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, circles, walls, hull_m, out)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
-    margins += [distances_to(path, wall) - 0.7 for wall in walls]
+    margins += [margins_of(path, path[0], wall, hull_m) for wall in walls]
     drift = drift_m * np.arange(last + 1)  # no less than any current of that speed can do
     left = [each - min(0.0, each[0]) * grace ** np.arange(last + 1) - drift for each in margins]
     assert out[MARGIN] == pytest.approx(min(each.min() for each in left), abs=1e-9)
     touched = np.any([each < 0.0 for each in left], axis=0)
     first = np.argmax(touched) if touched.any() else last + 1
-    assert first_touch(path[0], path, last, 1.0, drift_m, grace, circles, walls, 0.7) == first
+    assert first_touch(path[0], path, last, 1.0, drift_m, grace, circles, walls, hull_m) == first
     clear_of_rules(path, last, last, NO_EDGE, circles, 1.0, drift_m, out)
     assert out[MARGIN] == pytest.approx(min((each - drift).min() for each in margins[:3]), abs=1e-9)
     at = path[int(out[SAMPLE])]
@@ -66,6 +91,29 @@ def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
     assert out[MARGIN] == pytest.approx(-3.0)
     clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, 0.0, 1.0, circle, NO_WALL, 0.0, out)
     assert out[MARGIN] == pytest.approx(-4.0)  # outside so far: there is nothing to excuse
+
+
+WALL = np.array([[-5.0, 0.0, 5.0, 0.0]])
+
+
+def test_a_wall_that_no_sample_is_near_is_not_gone_through():
+    """Samples 0.5 m before a wall and 0.5 m behind it, of a boat of 0.2 m."""
+    path, out = np.array([[0.0, -1.5], [0.0, -0.5], [0.0, 0.5], [0.0, 1.5]]), np.zeros(N_CLEARANCE)
+    clear_of_obstacles(path[0], path, 3, 1.0, 0.0, 1.0, NONE, WALL, 0.2, out)
+    assert out[[MARGIN, SAMPLE, NORMAL_Y]] == pytest.approx([-1.7, 3, -1.0])
+    assert first_touch(path[0], path, 3, 1.0, 0.0, 1.0, NONE, WALL, 0.2) == 2
+    aside = path + np.array([5.5, 0.0])
+    clear_of_obstacles(aside[0], aside, 3, 1.0, 0.0, 1.0, NONE, WALL, 0.2, out)
+    assert out[MARGIN] > 0.0  # past its end
+    assert first_touch(aside[0], aside, 3, 1.0, 0.0, 1.0, NONE, WALL, 0.2) == 4
+
+
+def test_a_boat_seen_in_a_wall_may_leave_it_on_either_side():
+    out = np.zeros(N_CLEARANCE)
+    for way in (1.0, -1.0):
+        path = np.column_stack([np.zeros(20), way * np.linspace(-0.1, 6.0, 20)])
+        clear_of_obstacles(path[0], path, 19, 1.0, 0.0, 1.0, NONE, WALL, 0.7, out)
+        assert out[MARGIN] >= -0.1
 
 
 def test_the_edge_counts_only_as_long_as_it_is_looked_at():

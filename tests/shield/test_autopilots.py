@@ -1,0 +1,159 @@
+"""What own autopilots remember is kept by the shield where nobody tells it."""
+
+import math
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed, step_all
+from shield_scenes import fleet_of, relative
+from steerclear.shield import Commands, Fleet, Shield
+from steerclear.shield.autopilots import SURPRISE, Autopilots
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.remembering import Stayed
+
+STEPS = 150
+CROWD = [(0, 0, 0, 1.0), (4.0, 14.0, 180.0, 1.0), (-9.0, 5.0, 90.0, 1.2), (9.0, 6.0, -90.0, 1.4)]
+
+
+def hidden(fleet):
+    """The fleet as its users see it: place, heading and speed alone."""
+    return Fleet.of(
+        position_m=fleet.position_m,
+        heading_rad=fleet.heading_rad,
+        speed_mps=fleet.speed_mps,
+        team=fleet.team,
+        platforms=fleet.platforms,
+        names=fleet.names,
+    )
+
+
+def sailing(platforms):
+    """Four boats of ours, their autopilots new, under thrust for their speed."""
+    fleet = fleet_of(CROWD, [0] * len(CROWD), platforms)
+    fill(fleet.state, packed(fleet.platforms))
+    return fleet
+
+
+def loop(shield, fleet, see, absolute):
+    """Sent commands, reasons and certificates while the boats cross each other's way; ``see`` makes what is seen."""
+    state, params, told, late = fleet.state.copy(), packed(fleet.platforms), [], []
+    for step in range(STEPS):
+        now = Fleet(state.copy(), fleet.team, fleet.platforms, fleet.controlled, fleet.names)
+        heading = np.array([0.0, 180.0, 90.0, -90.0]) + 40.0 * (step // 60)
+        if absolute:
+            wanted = Commands.absolute_rad(np.stack([np.full(4, 1.6), np.radians(heading)], axis=1))
+        else:
+            error = (heading - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+            wanted = relative(*np.stack([np.full(4, 1.6), error], axis=1))
+        answer = shield.decide(see(now), wanted)
+        told.append(np.column_stack([answer.sent.values, answer.reason, answer.certificate_m]))
+        sent = answer.sent.as_relative_deg(state[:, L.HEADING])
+        late.append(np.stack([sent[:, 0], sent[:, 1] + state[:, L.HEADING]], axis=1))
+        steps = round(shield.config.delay_s / shield.config.dt_s)
+        if step < steps:
+            way = state[:, L.SPEED] * shield.config.dt_s
+            state[:, L.X] += way * np.sin(np.radians(state[:, L.HEADING]))
+            state[:, L.Y] += way * np.cos(np.radians(state[:, L.HEADING]))
+            continue
+        works = late[step - steps].copy()
+        works[:, 1] = (works[:, 1] - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+        step_all(params, state[None], works[None], shield.config.dt_s)
+    return np.array(told)
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+@pytest.mark.parametrize("platforms", ["heron", "surveyor"])
+def test_decisions_are_those_with_the_memory_told(platforms, delay_s, coordination):
+    fleet = sailing(platforms)
+    settings = {"delay_s": delay_s, "coordination": coordination}
+    known, unknown = (loop(Shield(**settings), fleet, see, True) for see in (lambda boats: boats, hidden))
+    assert (known[:, :, 2] != 0).any()
+    np.testing.assert_allclose(unknown, known, atol=1e-6)
+
+
+def test_relative_commands_too():
+    known, unknown = (loop(Shield(), sailing("heron"), see, False) for see in (lambda boats: boats, hidden))
+    np.testing.assert_allclose(unknown, known, atol=1e-6)
+
+
+def test_boats_that_come_and_go_do_not_make_it_forget_the_others():
+    """The order of boats seen changes at every step: what is believed goes with the boat."""
+    fleet = sailing("heron")
+
+    class Reordered(Shield):
+        turn = 0
+
+        def decide(self, boats, wanted, surroundings=None):
+            self.turn += 1
+            order = np.roll(np.arange(len(boats)), self.turn)
+            names, platforms = (tuple(entry[k] for k in order) for entry in (boats.names, boats.platforms))
+            mixed = Fleet(boats.state[order], boats.team[order], platforms, boats.controlled[order], names)
+            answer = super().decide(mixed, Commands(wanted.values[order], wanted.relative), surroundings)
+            back = np.argsort(order)
+            return type(answer)(
+                boats,
+                wanted,
+                Commands(answer.sent.values[back], answer.sent.relative),
+                *(value[back] for value in (answer.intervened, answer.reason, answer.certificate_m, answer.slack_m)),
+                bound=answer.bound[back],
+                solve_time_s=answer.solve_time_s,
+            )
+
+    known, unknown = (loop(Reordered(), fleet, see, True) for see in (lambda boats: boats, hidden))
+    np.testing.assert_allclose(unknown, known, atol=1e-6)
+
+
+def believed_after(fleet, commands, steps, obeys):
+    """What is believed of one boat after some steps; it does what it is told, or stays as it is."""
+    autopilots, state, params = Autopilots.of(1), fleet.state.copy(), packed(fleet.platforms)
+    for _ in range(steps):
+        seen = state.copy()
+        seen[:, L.THRUST :] = np.nan
+        autopilots.fill(seen, np.array([True]), 0.1)
+        autopilots.go_on(seen, np.array([True]), params, commands, 0.1)
+        if obeys:
+            step_all(params, state[None], commands[None], 0.1)
+    return autopilots, state
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("commands", [(1.5, 0.0), (0.5, 120.0)])
+def test_it_is_the_boats_own_memory_while_she_obeys(platform, commands):
+    fleet = fleet_of([(0, 0, 0, 0.5)], [0], platform)
+    fill(fleet.state, packed(fleet.platforms))
+    autopilots, state = believed_after(fleet, np.array([commands]), 40, True)
+    np.testing.assert_allclose(autopilots.row, state, atol=1e-9)
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("commands", [(2.0, 0.0), (0.5, 120.0)])
+def test_a_boat_that_does_not_obey_is_taken_for_what_her_speed_tells(platform, commands):
+    """Told to speed up or turn she lies still: a thrust built up in the model alone would promise her escapes."""
+    fleet = fleet_of([(0, 0, 0, 0.0)], [0], platform)
+    disobeying, _ = believed_after(fleet, np.array([commands]), 200, False)
+    obeying, _ = believed_after(fleet, np.array([commands]), 200, True)
+    assert (np.abs(disobeying.off) <= SURPRISE).all()  # found out again and again
+    assert disobeying.row[0, L.THRUST] < 0.7 * obeying.row[0, L.THRUST]
+
+
+def test_nothing_is_believed_of_boats_without_a_command():
+    fleet = fleet_of([(0, 0, 0, 1.0), (0, 20, 0, 1.0)], [0, 0], "heron")
+    autopilots = Autopilots.of(2)
+    commands = np.array([(math.nan, 0.0), (1.0, 0.0)])
+    autopilots.go_on(fleet.state, np.array([True, True]), packed(fleet.platforms), commands, 0.1)
+    assert np.isnan(autopilots.row[0]).all()
+    assert np.isfinite(autopilots.row[1]).all()
+    later = Autopilots.of(1)
+    later.carry_over(autopilots, Stayed(np.array([0]), np.array([1])))
+    np.testing.assert_array_equal(later.row[0], autopilots.row[1])
+
+
+def test_what_is_told_comes_before_what_is_believed():
+    autopilots, _ = believed_after(fleet_of([(0, 0, 0, 1.0)], [0], "heron"), np.array([(1.0, 5.0)]), 3, True)
+    seen = autopilots.row.copy()
+    seen[0, L.THRUST] = np.nan
+    seen[0, L.HEADING_ERROR] = -7.0
+    autopilots.fill(seen, np.array([True]), 0.1)
+    assert seen[0, L.HEADING_ERROR] == -7.0
+    assert seen[0, L.THRUST] == autopilots.row[0, L.THRUST]
