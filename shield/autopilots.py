@@ -32,7 +32,7 @@ _OTHER_MEMORY = [L.THRUST, L.RUDDER, L.SPEED_INTEGRAL, L.HEADING_INTEGRAL, L.TUR
 
 @dataclass
 class Autopilots:
-    """Believed states of n own boats one step after the last decision.
+    """Believed states of n own boats one step after the last decision, for the next one alone.
 
     Attributes:
         row: (n, N_STATE) state; NaN where nothing is believed.
@@ -54,19 +54,21 @@ class Autopilots:
     def fill(self, state: Array, unknown: BoolArray, dt_s: float) -> None:
         """Write what is believed into the memory of ``unknown`` boats, in place; errors that are given stay.
 
-        Boats that are not where the model has them (`SURPRISE`) are left as they are, and forgotten.
+        Boats that are not where the model has them (`SURPRISE`) are left as they are. Nothing is believed afterwards
+        until `go_on`, whatever becomes of the decision.
         """
-        apart = state[:, _SEEN] - self.row[:, _SEEN]
+        row, self.row = self.row, np.full_like(self.row, np.nan)
+        apart = state[:, _SEEN] - row[:, _SEEN]
         apart[:, 0] = (apart[:, 0] + 180.0) % 360.0 - 180.0
         self.off = self.off * math.exp(-dt_s / WINDOW_S) + np.nan_to_num(apart)
         lost = (np.abs(self.off) > SURPRISE).any(axis=1)
-        self.row[lost], self.off[lost] = np.nan, 0.0
-        who = unknown & ~np.isnan(self.row[:, L.THRUST])
+        self.off[lost] = 0.0
+        who = unknown & ~lost & ~np.isnan(row[:, L.THRUST])
         for column in _OTHER_MEMORY:
-            state[who, column] = self.row[who, column]
+            state[who, column] = row[who, column]
         for column in _ERRORS:
             missing = who & np.isnan(state[:, column])
-            state[missing, column] = self.row[missing, column]
+            state[missing, column] = row[missing, column]
 
     def go_on(self, state: Array, unknown: BoolArray, params: Array, commands: Array, dt_s: float) -> None:
         """Run ``unknown`` boats one step on from ``state`` (n, N_STATE); of the others nothing is believed.

@@ -88,7 +88,8 @@ class Fleet:
             platforms: one platform for all, or n of them.
             controlled: (n,) bool; None: the boats of team 0.
             names: n names; None: boat_0, boat_1, ...
-            thrust: (n,) thrust in percent where known, else NaN (taken from the speed).
+            thrust: (n,) thrust in percent where known, else NaN: of own boats it is then followed from what was
+                sent; at first, and of others, it is taken from the speed.
             heading_error_rad: (n,) last error the heading controller saw where known, else NaN.
             age_s: (n,) age of each track, s.
             position_error_m: (n,) bound on the position error, m.

@@ -53,8 +53,9 @@ class Shield:
                                                  h(x+) >= 0                     for every edge and obstacle,
 
     with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
-    of each boat, its margins and the commands on their way, for as long as the boat (name, platform, team) is in the
-    fleet; the same sequence of inputs from `reset` on gives the same bits. It decides for one thread at a time:
+    of each boat, its margins, the commands on their way and, where nobody tells it, its autopilot's memory, for as long
+    as the boat (name, platform, team) is in the fleet; the same sequence of inputs from `reset` on gives the same bits.
+    It takes one call per step of the settings, and boats that do what was sent. It decides for one thread at a time:
     compiled code works on its arrays without the GIL.
 
     Args:
@@ -194,6 +195,7 @@ class Shield:
         """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it."""
         unknown: BoolArray = fleet.controlled & np.isnan(fleet.state[:, L.THRUST])
         if not unknown.any():
+            self._autopilots = Autopilots.of(len(fleet))
             return fleet, unknown
         fleet = replace(fleet, state=fleet.state.copy())
         self._autopilots.fill(fleet.state, unknown, self.config.dt_s)

@@ -149,11 +149,32 @@ def test_nothing_is_believed_of_boats_without_a_command():
     np.testing.assert_array_equal(later.row[0], autopilots.row[1])
 
 
+def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it():
+    """Nor what was when a decision failed, or somebody else steered: only the step just past is known."""
+    fleet = fleet_of([(0, 0, 0, 1.0)], [0], "heron")
+    wanted = Commands.absolute_rad([[2.0, 0.0]])
+    shield, fresh = Shield(), Shield()
+    params = packed(fleet.platforms)
+    told = fleet.state.copy()
+    fill(told, params)
+    for _ in range(5):
+        shield.decide(fleet, wanted)
+    away = Fleet(fleet.state, fleet.team, fleet.platforms, np.array([False]), fleet.names)
+    for between in (Fleet(told, fleet.team, fleet.platforms, fleet.controlled, fleet.names), away):
+        shield.decide(fleet, wanted)
+        shield.decide(between, wanted)
+        assert np.isnan(shield._autopilots.row).all()
+    shield.decide(fleet, wanted)
+    fresh.decide(fleet, wanted)
+    np.testing.assert_array_equal(shield._autopilots.row, fresh._autopilots.row)
+
+
 def test_what_is_told_comes_before_what_is_believed():
     autopilots, _ = believed_after(fleet_of([(0, 0, 0, 1.0)], [0], "heron"), np.array([(1.0, 5.0)]), 3, True)
-    seen = autopilots.row.copy()
+    seen, thrust = autopilots.row.copy(), autopilots.row[0, L.THRUST]
     seen[0, L.THRUST] = np.nan
     seen[0, L.HEADING_ERROR] = -7.0
     autopilots.fill(seen, np.array([True]), 0.1)
     assert seen[0, L.HEADING_ERROR] == -7.0
-    assert seen[0, L.THRUST] == autopilots.row[0, L.THRUST]
+    assert seen[0, L.THRUST] == thrust
+    assert np.isnan(autopilots.row).all()
