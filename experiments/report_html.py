@@ -29,7 +29,7 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         results: ``settings`` (with ``separation_m``, its own or in ``shield``; 2.5 m when left out), ``versions``,
             ``pairings`` (as `summary.summarise` returns them), ``games`` (rows of games); and, where there are any,
             ``bars`` (as `ablation.ablation_bars`), ``warnings`` (sentences shown first), ``machine``, ``title``,
-            ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen from the
+            ``quick``, ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen from the
             report). Further figures are shown, further keys ignored.
         path: File to write.
 
@@ -109,6 +109,7 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
     parts.append(f"{count} game{'' if count == 1 else 's'}, {_played(settings)[1]}")
     parts.append(f"separation {separation_m:g} m")
     parts.append(words_of(settings.get("conditions") or {}))
+    parts.append("small version (--quick): its intervals are wide" if results.get("quick") else "")
     return " · ".join(filter(None, parts))
 
 

@@ -72,6 +72,13 @@ def test_the_report_says_which_states_were_played(states, title, played, results
     assert f"7 games, {played} ·" in text
 
 
+@pytest.mark.parametrize("quick", [True, False])
+def test_the_small_version_is_called_so(quick, results, tmp_path):
+    results["quick"] = quick
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert ("small version (--quick)" in text) is quick
+
+
 def test_the_report_shows_what_it_was_given(results, tmp_path):
     text = write_report(results, tmp_path / "deep" / "report.html").read_text()
     hits, teammates, captures, closest, changed, reasons = plots_in(text)
