@@ -29,8 +29,8 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         results: ``settings`` (with ``separation_m``, its own or in ``shield``; 2.5 m when left out), ``versions``,
             ``pairings`` (as `summary.summarise` returns them), ``games`` (rows of games); and, where there are any,
             ``bars`` (as `ablation.ablation_bars`), ``warnings`` (sentences shown first), ``machine``, ``title``,
-            ``quick``, ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen from the
-            report). Further figures are shown, further keys ignored.
+            ``quick``, ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen
+            from the report). Further figures are shown, further keys ignored.
         path: File to write.
 
     Returns:
