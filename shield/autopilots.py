@@ -1,8 +1,8 @@
 """What the autopilots of own boats remember, where nobody tells: the model is run along with the commands sent.
 
 A heading controller's last error and a boat's thrust decide what the next command does, and no telemetry tells them.
-The boats' model, stepped through the command that worked since the last decision, does, for as long as what is seen
-agrees with it.
+The boats' model, stepped through the command that worked since the last decision, does, for as long as it predicts what
+is seen better than the same step without that memory: another autopilot than the model's is soon found out.
 """
 
 from __future__ import annotations
@@ -25,64 +25,115 @@ WINDOW_S = 5.0
 SURPRISE = np.array([25.0, 0.2])
 """Sums of differences (deg, m/s) beyond which a boat did not do what it was told: its memory is not known any more."""
 
+JUMP_M = 1.5
+"""A boat so far from where it was predicted, m, and what its position may be off, was not steered by what was sent."""
+
+NO_WORSE = np.array([1e-3, 1e-5])
+"""Differences of such sums (deg, m/s) that are rounding."""
+
 _SEEN = [L.HEADING, L.SPEED]
-_ERRORS = [L.SPEED_ERROR, L.HEADING_ERROR]
-_OTHER_MEMORY = [L.THRUST, L.RUDDER, L.SPEED_INTEGRAL, L.HEADING_INTEGRAL, L.TURN_RATE]
+_HEADING, _SPEED = range(2)
+_MEMORY = (
+    (_HEADING, L.HEADING_ERROR, (L.HEADING_ERROR, L.HEADING_INTEGRAL, L.RUDDER)),
+    (_HEADING, L.TURN_RATE, (L.TURN_RATE,)),
+    (_SPEED, L.THRUST, (L.THRUST,)),
+    (_SPEED, L.SPEED_ERROR, (L.SPEED_ERROR, L.SPEED_INTEGRAL)),
+)
+"""Which sum of differences judges what: a column that says whether it is told, and those that go with it."""
+
+
+def unknown_memory(state: Array) -> BoolArray:
+    """Boats, (n,), of whose autopilots something that counts is not told."""
+    return np.asarray(np.isnan(state[:, [L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]]).any(axis=1))
 
 
 @dataclass
 class Autopilots:
-    """Believed states of n own boats one step after the last decision, for the next one alone.
+    """Two predictions of n own boats one step after the last decision: with the memory believed, and without any.
 
     Attributes:
-        row: (n, N_STATE) state; NaN where nothing is believed.
-        off: (n, 2) summed differences of heading, deg, and speed, m/s, see `WINDOW_S`.
+        start: (2, n, N_STATE) states they were made from.
+        after: (2, n, N_STATE) states predicted; NaN where there is no prediction.
+        off: (n, 2) summed differences of heading, deg, and speed, m/s, of the first, see `WINDOW_S`.
+        wrong: (2, n, 2) sums of the amounts of both.
     """
 
-    row: Array
+    start: Array
+    after: Array
     off: Array
+    wrong: Array
 
     @classmethod
     def of(cls, boats: int) -> Autopilots:
         """Nothing known yet of so many boats."""
-        return cls(np.full((boats, L.N_STATE), np.nan), np.zeros((boats, 2)))
+        nothing = np.full((2, boats, L.N_STATE), np.nan)
+        return cls(nothing, nothing.copy(), np.zeros((boats, 2)), np.zeros((2, boats, 2)))
 
     def carry_over(self, old: Autopilots, stayed: Stayed) -> None:
         """Take over what was believed of boats that stayed."""
-        self.row[stayed.now], self.off[stayed.now] = old.row[stayed.then], old.off[stayed.then]
+        now, then = stayed
+        self.after[:, now], self.off[now], self.wrong[:, now] = old.after[:, then], old.off[then], old.wrong[:, then]
 
-    def fill(self, state: Array, unknown: BoolArray, dt_s: float) -> None:
-        """Write what is believed into the memory of ``unknown`` boats, in place; errors that are given stay.
+    def fill(self, state: Array, unknown: BoolArray, dt_s: float, error_m: float = 0.0) -> None:
+        """Write what is believed into the memory of ``unknown`` boats, in place, where it is not told.
 
-        Boats that are not where the model has them (`SURPRISE`) are left as they are. Nothing is believed afterwards
+        Boats that are not where the model has them are left as they are, and so is the part of the memory, that of the
+        heading or that of the speed, with which the model predicts worse than without. Nothing is believed afterwards
         until `go_on`, whatever becomes of the decision.
-        """
-        row, self.row = self.row, np.full_like(self.row, np.nan)
-        apart = state[:, _SEEN] - row[:, _SEEN]
-        apart[:, 0] = (apart[:, 0] + 180.0) % 360.0 - 180.0
-        self.off = self.off * math.exp(-dt_s / WINDOW_S) + np.nan_to_num(apart)
-        lost = (np.abs(self.off) > SURPRISE).any(axis=1)
-        self.off[lost] = 0.0
-        who = unknown & ~lost & ~np.isnan(row[:, L.THRUST])
-        for column in _OTHER_MEMORY:
-            state[who, column] = row[who, column]
-        for column in _ERRORS:
-            missing = who & np.isnan(state[:, column])
-            state[missing, column] = row[missing, column]
-
-    def go_on(self, state: Array, unknown: BoolArray, params: Array, commands: Array, dt_s: float) -> None:
-        """Run ``unknown`` boats one step on from ``state`` (n, N_STATE); of the others nothing is believed.
 
         Args:
-            state: where they are, with what was believed filled in.
-            unknown: (n,) own boats whose memory nobody tells.
+            state: (n, N_STATE) what is seen and told.
+            unknown: (n,) own boats whose memory is not told, see `unknown_memory`.
+            dt_s: time since the last decision, s.
+            error_m: bound on the error of positions, m.
+        """
+        after, self.after = self.after, np.full_like(self.after, np.nan)
+        fade, apart = math.exp(-dt_s / WINDOW_S), _apart(state, after)
+        self.off = self.off * fade + apart[0]
+        self.wrong = self.wrong * fade + np.abs(apart)
+        gap_m = np.hypot(state[:, L.X] - after[0, :, L.X], state[:, L.Y] - after[0, :, L.Y])
+        lost = (np.abs(self.off) > SURPRISE).any(axis=1) | (gap_m > JUMP_M + 2.0 * error_m)
+        self.off[lost] = 0.0
+        known = unknown & ~lost & np.isfinite(after[0, :, L.X])
+        better = self.wrong[0] <= self.wrong[1] + NO_WORSE
+        self.start = np.stack([state, state])
+        _write(after[0], known[:, None] & np.array([True, True]), self.start[0])
+        _write(after[0], known[:, None] & better, state)
+
+    def go_on(self, unknown: BoolArray, params: Array, commands: Array, dt_s: float) -> None:
+        """Run ``unknown`` boats one step on from where they were at `fill`; of the others nothing is believed.
+
+        Args:
+            unknown: (n,) own boats whose memory is not told.
             params: (n, N_PARAM) platform rows.
             commands: (n, 2) the command that works in this step, speed m/s and relative heading deg, or NaN.
             dt_s: step, s.
         """
-        self.row[:] = state
-        fill_memory(self.row, params)
         who = unknown & (np.abs(commands) <= LARGEST_COMMAND).all(axis=1)
-        for i in np.flatnonzero(who):
-            step_boat(params[i], self.row[i], commands[i, 0], commands[i, 1], dt_s)
-        self.row[~who] = np.nan
+        for rows, start in zip(self.after, self.start, strict=True):
+            rows[:] = start
+            fill_memory(rows, params)
+            for i in np.flatnonzero(who):
+                step_boat(params[i], rows[i], commands[i, 0], commands[i, 1], dt_s)
+            rows[~who] = np.nan
+
+
+def _write(believed: Array, who: BoolArray, state: Array) -> None:
+    """Write memory into states, in place, where it is not told, for the parts of ``who`` (n, 2): heading and speed."""
+    for part, sign, columns in _MEMORY:
+        missing = who[:, part] & ~_told(sign, state)
+        for column in columns:
+            state[missing, column] = believed[missing, column]
+
+
+def _told(sign: int, state: Array) -> BoolArray:
+    """Boats, (n,), of which that column is told; a turn rate of 0 is what fleets say that know none."""
+    column = state[:, sign]
+    return np.asarray(~np.isnan(column) & ((sign != L.TURN_RATE) | (column != 0.0)))
+
+
+def _apart(state: Array, after: Array) -> Array:
+    """Differences of heading, deg, and speed, m/s, (2, n, 2), from two predictions; 0 where there is none."""
+    apart = state[:, _SEEN] - after[:, :, _SEEN]
+    apart[:, :, 0] = (apart[:, :, 0] + 180.0) % 360.0 - 180.0
+    return np.nan_to_num(apart)

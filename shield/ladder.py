@@ -21,6 +21,9 @@ from .scene import Boats, Fixed, Memory, Tuning, Work
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
 
+WORSE_BY_FIXED = 1e-6
+"""The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
+
 
 @lean_kernel
 def worst_merit(ours: BoolArray, work: Work) -> float:
@@ -113,7 +116,7 @@ def ladder(
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     after = worst_merit(ours, work)
-    if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - CLEARLY)):
+    if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - WORSE_BY_FIXED)):
         for m in range(count):
             i = plan.movers[m]
             copy_row(plan.commands[i], plan.answer[i])

@@ -83,6 +83,7 @@ class Fixed(NamedTuple):
         circles: (c, 3) the same of obstacles.
         segments: (s, 4): ends x0, y0, x1, y1, m.
         segment_m: distance to keep from segments, m.
+        side_m: distance from a segment within which it is not known on which side of it a boat is, m.
         current_mps: bound on the speed of a current whose direction is not known, m/s.
     """
 
@@ -91,6 +92,7 @@ class Fixed(NamedTuple):
     circles: Array
     segments: Array
     segment_m: float
+    side_m: float
     current_mps: float
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .autopilots import Autopilots
+from .autopilots import Autopilots, unknown_memory
 from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .commands import Commands
@@ -193,12 +193,14 @@ class Shield:
 
     def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray]:
         """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it."""
-        unknown: BoolArray = fleet.controlled & np.isnan(fleet.state[:, L.THRUST])
+        unknown: BoolArray = fleet.controlled & unknown_memory(fleet.state)
+        if fleet.age_s is not None:  # what was sent since is not in what is seen
+            unknown &= fleet.age_s <= 0.5 * self.config.dt_s
         if not unknown.any():
             self._autopilots = Autopilots.of(len(fleet))
             return fleet, unknown
         fleet = replace(fleet, state=fleet.state.copy())
-        self._autopilots.fill(fleet.state, unknown, self.config.dt_s)
+        self._autopilots.fill(fleet.state, unknown, self.config.dt_s, self.config.position_error_m)
         return fleet, unknown
 
     def _note_sent(self, seen: Fleet, unknown: BoolArray, sent: Commands, boats: Boats) -> None:
@@ -213,7 +215,7 @@ class Shield:
             works = first
             works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
         if unknown.any():
-            self._autopilots.go_on(seen.state, unknown, boats.params, works, self.config.dt_s)
+            self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if not isinstance(surroundings, Surroundings):

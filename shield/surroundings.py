@@ -77,6 +77,7 @@ class Surroundings:
             circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
             segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
             segment_m=config.hull_m + off_m,
+            side_m=off_m,
             current_mps=float(config.current_mps),
         )
 

@@ -43,7 +43,8 @@ def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, 
     """
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
     drift_m = fixed.current_mps * boats.sample_s
-    clear_of_rules(path, boats.static_samples[i], last, fixed.field, fixed.keep_out, way_m, drift_m, out)
+    near = boats.static_samples[i]
+    clear_of_rules(state[i], path, near, last, fixed.field, fixed.keep_out, way_m, drift_m, boats.sample_s, out)
     clear_of_obstacles(
         state[i],
         path,
@@ -54,6 +55,7 @@ def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, 
         fixed.circles,
         fixed.segments,
         fixed.segment_m,
+        fixed.side_m,
         work.spare2,
     )
     if work.spare2[MARGIN] < out[MARGIN]:
@@ -75,6 +77,7 @@ def clear_of_near_obstacles(
         fixed.circles,
         fixed.segments,
         fixed.segment_m,
+        fixed.side_m,
         out,
     )
 
@@ -85,5 +88,6 @@ def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fix
     last = boats.static_samples[i]
     way_m = way_per_sample(i, state, boats)
     path, leave = work.path[slot], grace(boats, fixed)
-    first = first_touch(state[i], path, last, way_m, 0.0, leave, fixed.circles, fixed.segments, fixed.segment_m)
+    circles, walls, hull_m = fixed.circles, fixed.segments, fixed.segment_m
+    first = first_touch(state[i], path, last, way_m, 0.0, leave, circles, walls, hull_m, fixed.side_m)
     return first / (last + 1.0)

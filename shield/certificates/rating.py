@@ -31,8 +31,8 @@ counts. Of another boat's that hardly touches one; deeper, less."""
 LATER_WORTH = 0.1
 """Merit of the share of a half turn's time before a touch, for a boat that nobody hunts: 2 cm of depth."""
 
-DEEPEST_M = 10.0
-"""Depth in an obstacle, m, from which one manoeuvre is as bad as another."""
+DEEP_M = 10.0
+"""Depth in an obstacle, m, at whose half merit begins to fall off more slowly; it never ends, behind walls."""
 
 FIXED_THING = -2
 """In the place of the neighbour that binds: a fixed thing does."""
@@ -68,7 +68,7 @@ def _rate_touching(
     """
     clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
     depth_m = -work.spare2[MARGIN]
-    shallow = max(0.0, 1.0 - depth_m / DEEPEST_M)
+    shallow = 1.0 - depth_m / DEEP_M if depth_m < 0.5 * DEEP_M else 0.25 * DEEP_M / depth_m
     merit = OBSTACLE_BASE * shallow + LATER_WORTH * share
     if work.hunted[i]:
         merit = OBSTACLE_BASE * share + shallow

@@ -15,6 +15,18 @@ import math
 from ..jit import Array, lean_kernel
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 
+RETURN_S = 30.0
+"""How long a boat outside the field is followed straight on from the end of its path, s."""
+
+HOME_M = 10.0
+"""A path that leads so far inside by then leads back, m."""
+
+FARTHEST_M = 1000.0
+"""Falling short of that by more is no worse, m."""
+
+RETURN_WORTH = 0.01
+"""What a metre of a path outside the field counts beside a metre that the boat is outside now."""
+
 
 @lean_kernel
 def _lower(out: Array, margin: float, k: int, nx: float, ny: float) -> None:
@@ -23,13 +35,43 @@ def _lower(out: Array, margin: float, k: int, nx: float, ny: float) -> None:
 
 
 @lean_kernel
-def _edges(x: float, y: float, k: int, drift_m: float, field: Array, out: Array) -> None:
-    """Distance inside a rectangle (xmin, ymin, xmax, ymax), less k drifts; infinite sides are none."""
-    off = k * drift_m
-    _lower(out, x - field[0] - off, k, 1.0, 0.0)
-    _lower(out, y - field[1] - off, k, 0.0, 1.0)
-    _lower(out, field[2] - x - off, k, -1.0, 0.0)
-    _lower(out, field[3] - y - off, k, 0.0, -1.0)
+def _inside(side: int, x: float, y: float, field: Array) -> float:
+    """How far inside one side of a rectangle (left, low, right, high) a point is, m; infinite where there is none."""
+    at = x if side % 2 == 0 else y
+    return at - field[side] if side < 2 else field[side] - at
+
+
+@lean_kernel
+def _within(side: int, path: Array, samples: int, drift_m: float, field: Array, out: Array) -> None:
+    """Distance inside a side along a path, less the drift until then."""
+    nx, ny = _inwards(side)
+    for k in range(samples + 1):
+        _lower(out, _inside(side, path[k, 0], path[k, 1], field) - k * drift_m, k, nx, ny)
+
+
+@lean_kernel
+def _inwards(side: int) -> tuple[float, float]:
+    """Unit vector away from a side."""
+    sign = 1.0 if side < 2 else -1.0
+    return (sign, 0.0) if side % 2 == 0 else (0.0, sign)
+
+
+@lean_kernel
+def _way_back(side: int, here: Array, path: Array, last: int, sample_s: float, field: Array, out: Array) -> None:
+    """The same of a boat that is beyond that side: how far, and a trifle for where the path leads.
+
+    It is followed straight on from its end. One that leads back is worth most, even if it leads farther out at first:
+    lying still outside is none. Of those that lead back, the one that goes out least.
+    """
+    x, y = path[last, 0], path[last, 1]
+    after = RETURN_S / sample_s
+    end_m = _inside(side, x + after * (x - path[last - 1, 0]), y + after * (y - path[last - 1, 1]), field)
+    now_m, least_m = _inside(side, here[0], here[1], field), FAR
+    for k in range(last + 1):
+        least_m = min(least_m, _inside(side, path[k, 0], path[k, 1], field))
+    short_m = min(FARTHEST_M, max(0.0, HOME_M - end_m))
+    nx, ny = _inwards(side)
+    _lower(out, now_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m)), last, nx, ny)
 
 
 @lean_kernel
@@ -86,6 +128,7 @@ def _through(x0: float, y0: float, x1: float, y1: float, o: int, circles: Array,
 
 @lean_kernel
 def clear_of_rules(
+    here: Array,
     path: Array,
     near_samples: int,
     samples: int,
@@ -93,13 +136,16 @@ def clear_of_rules(
     keep_out: Array,
     way_m: float,
     drift_m: float,
+    sample_s: float,
     out: Array,
 ) -> None:
     """Least clearance, m, of a path from the field edge and from circles kept by rule.
 
-    The edge is looked at only until a half turn could be over, since every straight run ends beyond it.
+    The edge is looked at only until a half turn could be over, since every straight run ends beyond it. A boat that is
+    beyond it has to come back, see `_way_back`.
 
     Args:
+        here: where the boat is now, m, shape (>= 2,).
         path: positions, m, shape (>= samples + 1, 2).
         near_samples: last sample at which the edge counts.
         samples: last sample.
@@ -107,11 +153,15 @@ def clear_of_rules(
         keep_out: shape (k, 3): centre x, y and radius, m.
         way_m: most the boat moves through the water from sample to sample, m.
         drift_m: most a current carries it meanwhile, m.
+        sample_s: time from sample to sample, s.
         out: clearance row.
     """
     out[MARGIN] = FAR
-    for k in range(near_samples + 1):
-        _edges(path[k, 0], path[k, 1], k, drift_m, field, out)
+    for side in range(4):
+        if _inside(side, here[0], here[1], field) < 0.0:
+            _way_back(side, here, path, samples, sample_s, field, out)
+        else:
+            _within(side, path, near_samples, drift_m, field, out)
     for c in range(keep_out.shape[0]):
         k = 0
         while k <= samples:
@@ -132,13 +182,14 @@ def clear_of_obstacles(
     circles: Array,
     segments: Array,
     hull_m: float,
+    side_m: float,
     out: Array,
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
 
     A boat that is already too near to one has to come no nearer: its clearance there counts from where it is. With
-    ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample. Nor is
-    it asked which side of such a wall it is on: positions are a little off, and it has to get back.
+    ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample. Going
+    through a wall is not excused, unless it is not known which side of it the boat is on.
 
     Args:
         here: where the boat is now, m, shape (>= 2,).
@@ -150,22 +201,25 @@ def clear_of_obstacles(
         circles: shape (c, 3): centre x, y and radius, m.
         segments: shape (s, 4): ends x0, y0, x1, y1, m.
         hull_m: distance the boat's centre keeps from segments, m.
+        side_m: distance from a segment within which it is not known on which side of it the boat is, m.
         out: clearance row.
     """
     out[MARGIN] = FAR
     for o in range(circles.shape[0] + segments.shape[0]):
-        excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        apart_m = _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0]
+        excused, known = min(0.0, apart_m), apart_m + hull_m >= side_m
         fall_m = way_m + drift_m - excused * (1.0 - grace)
         behind, x, y = False, here[0], here[1]
         k = 0
         while k <= samples:
             margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)
             near_m = FAR if o < circles.shape[0] else margin + hull_m  # a wall farther off is not gone through
-            if excused == 0.0 and _through(x, y, path[k, 0], path[k, 1], o, circles, segments):
+            if known and _through(x, y, path[k, 0], path[k, 1], o, circles, segments):
                 behind = not behind
             if behind:
-                margin, nx, ny = -near_m - hull_m, -nx, -ny
-            margin -= excused * grace**k + k * drift_m
+                margin, nx, ny = -near_m - hull_m - k * drift_m, -nx, -ny
+            else:
+                margin -= excused * grace**k + k * drift_m
             _lower(out, margin, k, nx, ny)
             x, y = path[k, 0], path[k, 1]
             k += max(1, int(min(margin - out[MARGIN], near_m) / fall_m))
@@ -182,18 +236,20 @@ def first_touch(
     circles: Array,
     segments: Array,
     hull_m: float,
+    side_m: float,
 ) -> int:
     """First sample of a path that is too near to an obstacle, ``samples + 1`` for none; arguments as above."""
     first = samples + 1
     for o in range(circles.shape[0] + segments.shape[0]):
-        excused = min(0.0, _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0])
+        apart_m = _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0]
+        excused, known = min(0.0, apart_m), apart_m + hull_m >= side_m
         fall_m = way_m + drift_m - excused * (1.0 - grace)
         x, y = here[0], here[1]
         k = 0
         while k < first:
             margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0]
             margin -= excused * grace**k + k * drift_m
-            if margin < 0.0 or (excused == 0.0 and _through(x, y, path[k, 0], path[k, 1], o, circles, segments)):
+            if margin < 0.0 or (known and _through(x, y, path[k, 0], path[k, 1], o, circles, segments)):
                 first = k
             x, y = path[k, 0], path[k, 1]
             k += max(1, int(margin / fall_m))

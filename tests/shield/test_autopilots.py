@@ -1,6 +1,7 @@
 """What own autopilots remember is kept by the shield where nobody tells it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from shield_loops import fill, packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.autopilots import SURPRISE, Autopilots
+from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.remembering import Stayed
 
@@ -61,6 +63,24 @@ def loop(shield, fleet, see, absolute):
     return np.array(told)
 
 
+def part_hidden(*columns):
+    """What is seen when some columns of the memory are not told."""
+
+    def see(fleet):
+        fleet.state[:, columns] = np.nan
+        return fleet
+
+    return see
+
+
+@pytest.mark.parametrize("columns", [(L.THRUST,), (L.HEADING_ERROR,), (L.SPEED_ERROR, L.HEADING_ERROR)])
+def test_what_alone_is_not_told_is_known_as_well(columns):
+    """Thrust told without the last heading error must not be worse than neither."""
+    fleet = sailing("heron")
+    known, unknown = (loop(Shield(), fleet, see, True) for see in (lambda boats: boats, part_hidden(*columns)))
+    np.testing.assert_allclose(unknown, known, atol=1e-6)
+
+
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
 @pytest.mark.parametrize("delay_s", [0.0, 0.3])
 @pytest.mark.parametrize("platforms", ["heron", "surveyor"])
@@ -111,7 +131,7 @@ def believed_after(fleet, commands, steps, obeys):
         seen = state.copy()
         seen[:, L.THRUST :] = np.nan
         autopilots.fill(seen, np.array([True]), 0.1)
-        autopilots.go_on(seen, np.array([True]), params, commands, 0.1)
+        autopilots.go_on(np.array([True]), params, commands, 0.1)
         if obeys:
             step_all(params, state[None], commands[None], 0.1)
     return autopilots, state
@@ -123,7 +143,7 @@ def test_it_is_the_boats_own_memory_while_she_obeys(platform, commands):
     fleet = fleet_of([(0, 0, 0, 0.5)], [0], platform)
     fill(fleet.state, packed(fleet.platforms))
     autopilots, state = believed_after(fleet, np.array([commands]), 40, True)
-    np.testing.assert_allclose(autopilots.row, state, atol=1e-9)
+    np.testing.assert_allclose(autopilots.after[0], state, atol=1e-9)
 
 
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
@@ -134,19 +154,60 @@ def test_a_boat_that_does_not_obey_is_taken_for_what_her_speed_tells(platform, c
     disobeying, _ = believed_after(fleet, np.array([commands]), 200, False)
     obeying, _ = believed_after(fleet, np.array([commands]), 200, True)
     assert (np.abs(disobeying.off) <= SURPRISE).all()  # found out again and again
-    assert disobeying.row[0, L.THRUST] < 0.7 * obeying.row[0, L.THRUST]
+    assert disobeying.after[0, 0, L.THRUST] < 0.7 * obeying.after[0, 0, L.THRUST]
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("gains", [{"kd": 0.0}, {"kp": 2.0, "kd": 0.0}])
+def test_another_autopilot_than_the_models_is_found_out(platform, gains):
+    """Without a derivative the last error says nothing: commands would be inverted for a kick that is not there."""
+    kind = get_platform(platform)
+    other = replace(kind, heading_pid=replace(kind.heading_pid, **gains)).pack()[None]
+    fleet = fleet_of([(0, 0, 0, 1.0)], [0], platform)
+    fill(fleet.state, packed(fleet.platforms))
+    autopilots, state, params, ours = Autopilots.of(1), fleet.state.copy(), packed(fleet.platforms), np.array([True])
+    believed = []
+    for step in range(100):
+        seen = state.copy()
+        seen[:, L.THRUST :] = np.nan
+        autopilots.fill(seen, ours, 0.1)
+        believed.append(not np.isnan(seen[0, L.HEADING_ERROR]))
+        commands = np.array([[1.0, 40.0 * np.sin(0.3 * step)]])
+        autopilots.go_on(ours, params, commands, 0.1)
+        step_all(other, state[None], commands[None], 0.1)
+    assert not any(believed[12:])
+
+
+def test_a_boat_that_jumped_is_not_believed_to_be_the_one_before():
+    fleet = fleet_of([(0, 0, 0, 1.0)], [0], "heron")
+    autopilots, state = believed_after(fleet, np.array([(1.0, 20.0)]), 10, True)
+    seen = state.copy()
+    seen[:, L.THRUST :] = np.nan
+    seen[0, L.X] += 1.6
+    autopilots.fill(seen, np.array([True]), 0.1)
+    assert np.isnan(seen[0, L.THRUST :]).all()
+
+
+def test_of_old_tracks_nothing_is_believed():
+    fleet = fleet_of([(0, 0, 0, 1.0)], [0], "heron", age_s=[0.3])
+    shield = Shield()
+    for _ in range(3):
+        shield.decide(fleet, Commands.absolute_rad([[2.0, 0.0]]))
+    assert np.isnan(shield._autopilots.after).all()
 
 
 def test_nothing_is_believed_of_boats_without_a_command():
     fleet = fleet_of([(0, 0, 0, 1.0), (0, 20, 0, 1.0)], [0, 0], "heron")
     autopilots = Autopilots.of(2)
     commands = np.array([(math.nan, 0.0), (1.0, 0.0)])
-    autopilots.go_on(fleet.state, np.array([True, True]), packed(fleet.platforms), commands, 0.1)
-    assert np.isnan(autopilots.row[0]).all()
-    assert np.isfinite(autopilots.row[1]).all()
+    both = np.array([True, True])
+    autopilots.fill(fleet.state.copy(), both, 0.1)
+    autopilots.go_on(both, packed(fleet.platforms), commands, 0.1)
+    assert np.isnan(autopilots.after[:, 0]).all()
+    assert np.isfinite(autopilots.after[:, 1]).all()
     later = Autopilots.of(1)
     later.carry_over(autopilots, Stayed(np.array([0]), np.array([1])))
-    np.testing.assert_array_equal(later.row[0], autopilots.row[1])
+    np.testing.assert_array_equal(later.after[:, 0], autopilots.after[:, 1])
 
 
 def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it():
@@ -156,6 +217,7 @@ def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it()
     shield, fresh = Shield(), Shield()
     params = packed(fleet.platforms)
     told = fleet.state.copy()
+    told[:, [L.SPEED_ERROR, L.HEADING_ERROR]] = 0.0
     fill(told, params)
     for _ in range(5):
         shield.decide(fleet, wanted)
@@ -163,18 +225,20 @@ def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it()
     for between in (Fleet(told, fleet.team, fleet.platforms, fleet.controlled, fleet.names), away):
         shield.decide(fleet, wanted)
         shield.decide(between, wanted)
-        assert np.isnan(shield._autopilots.row).all()
+        assert np.isnan(shield._autopilots.after).all()
     shield.decide(fleet, wanted)
     fresh.decide(fleet, wanted)
-    np.testing.assert_array_equal(shield._autopilots.row, fresh._autopilots.row)
+    np.testing.assert_array_equal(shield._autopilots.after, fresh._autopilots.after)
 
 
 def test_what_is_told_comes_before_what_is_believed():
-    autopilots, _ = believed_after(fleet_of([(0, 0, 0, 1.0)], [0], "heron"), np.array([(1.0, 5.0)]), 3, True)
-    seen, thrust = autopilots.row.copy(), autopilots.row[0, L.THRUST]
+    fleet = fleet_of([(0, 0, 0, 1.0)], [0], "heron")
+    fill(fleet.state, packed(fleet.platforms))
+    autopilots, _ = believed_after(fleet, np.array([(1.0, 5.0)]), 3, True)
+    seen, thrust = autopilots.after[0].copy(), autopilots.after[0, 0, L.THRUST]
     seen[0, L.THRUST] = np.nan
     seen[0, L.HEADING_ERROR] = -7.0
     autopilots.fill(seen, np.array([True]), 0.1)
     assert seen[0, L.HEADING_ERROR] == -7.0
     assert seen[0, L.THRUST] == thrust
-    assert np.isnan(autopilots.row).all()
+    assert np.isnan(autopilots.after).all()
