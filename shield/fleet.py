@@ -167,7 +167,11 @@ class Fleet:
         bad[:, L.SPEED] |= size[:, L.SPEED] > LARGEST_SPEED_MPS
         i, column = np.argwhere(bad)[0]
         what = {L.X: "position", L.Y: "position", L.HEADING: "heading", L.SPEED: "speed"}.get(column, "memory")
-        remedy = "give NaN where it is unknown" if what == "memory" else "leave boats without a track out"
+        remedy = (
+            "give NaN where it is unknown"
+            if what == "memory"
+            else "give the last fix with its age_s; leave out boats that never had one"
+        )
         most = f"{LARGEST_SPEED_MPS:g} m/s" if what == "speed" else f"{LARGEST:g}"
         raise FleetError(
             f"{what} of boat {self.names[i]!r} is not finite or beyond {most} ({self.state[i, column]}); {remedy}"

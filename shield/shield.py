@@ -11,6 +11,7 @@ import numpy as np
 
 from .autopilots import Autopilots, unknown_memory
 from .certificates.manoeuvre import told_margin
+from .certificates.rating import FIXED_THING
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -20,7 +21,7 @@ from .fleet import Fleet
 from .flow import PASSES, ROUNDS, TO_SOLVE, begin, finish
 from .jit import Array, BoolArray
 from .linearised import add_slack, build, check, pick_movers, take_answer
-from .plan import NOT_COVERED, PASSED, Plan, new_plan
+from .plan import HELD, NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
@@ -275,6 +276,8 @@ class Shield:
     def _report(self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer) -> Decisions:
         changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
         changed &= (answer.commands != asked).any(axis=1)
+        alone = changed & (answer.bound < 0) & (answer.reason != HELD)
+        bound = np.where(alone, FIXED_THING, answer.bound)  # nothing else changes commands
         seen_deg = fleet.state[:, L.HEADING]
         sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), seen_deg) if changed.any() else wanted
         return Decisions(
@@ -285,7 +288,7 @@ class Shield:
             reason=answer.reason,
             certificate_m=answer.margin,
             slack_m=answer.slack,
-            bound=answer.bound,
+            bound=bound,
             solve_time_s=0.0,
         )
 

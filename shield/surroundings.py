@@ -28,7 +28,7 @@ class Surroundings:
     Attributes:
         field: (xmin, ymin, xmax, ymax) to stay inside, or None.
         circles: (x, y, radius) of round obstacles.
-        polygons: corner lists of polygonal obstacles.
+        polygons: corner lists; their edges are walls, which boats stay outside of, or inside.
         keep_out: (x, y, radius) the boat's centre stays out of, by rule.
         stops: (x, y, radius) at which the boat's centre is stopped, such as the own flag's circle in the games: an
             obstacle without a hull.
@@ -55,7 +55,7 @@ class Surroundings:
         if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out, *self.stops)):
             raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
         if any(len(polygon) < 3 for polygon in self.polygons):
-            raise ConfigError("a polygon has fewer than three corners")
+            raise ConfigError("a polygon has fewer than three corners; give [(x, y), (x, y), (x, y), ...] in m")
         if self.field is not None and not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
             raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 

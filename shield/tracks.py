@@ -143,5 +143,5 @@ def _check_age(fleet: Fleet, config: ShieldConfig) -> None:
     if age[worst] > config.max_track_age_s:
         raise FleetError(
             f"track of {fleet.names[worst]!r} is {age[worst]:.2f} s old, limit {config.max_track_age_s} s; "
-            "refresh it or leave the boat out"
+            "refresh it, raise max_track_age_s, or leave the boat out: then nobody keeps clear of it"
         )

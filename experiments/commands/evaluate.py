@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Annotated
 
 import typer
+from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings
 from ..ablation import quick as small_version
@@ -52,12 +53,16 @@ def evaluate(
 
     Exit status: 0 done, 2 bad input, 130 interrupted.
     """
+    wanted = o.shield_settings(separation, certificate, solver, shield_set)
+    unused = [name for name in wanted if name != "separation_m"]  # at that radius breaches are counted anyhow
+    if unused and not shield:
+        raise ConfigError(f"the shield is off, and {', '.join(unused)} would change nothing; add --shield")
     settings = AblationSettings(
         preset=preset,
         own=policy,
         opponents=o.split_names(opponents, "--opponents"),
         seed=seed,
-        shield=o.shield_settings(separation, certificate, solver, shield_set),
+        shield=wanted,
         states=(shield,),
         shield_autopilot=not no_shield_autopilot,
         rules=o.game_settings(max_time, platform, rules),

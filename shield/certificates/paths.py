@@ -12,7 +12,7 @@ import math
 
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
-from ..platforms.actuator import actuate, full_turn
+from ..platforms.actuator import actuate, full_turn, held_rudder
 from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 
 SAG_M = 0.022
@@ -157,7 +157,7 @@ def _trace_usv(
     thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
     heading = math.radians(row[L.HEADING])
     ux, uy = math.sin(heading), math.cos(heading)
-    most = min(params[L.MAX_RUDDER], 100.0) * abs(side)
+    most = held_rudder(params) * abs(side)
     sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0

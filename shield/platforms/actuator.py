@@ -15,12 +15,21 @@ from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
+FARTHEST_DEG = 179.0
+"""Largest heading error commanded, deg: of a half turn nobody can tell the side once it is an absolute heading."""
+
+
+@lean_kernel
+def held_rudder(params: Array) -> float:
+    """Rudder, percent, that the heading controller can hold: without its derivative, at the largest error there is."""
+    return min(min(params[L.MAX_RUDDER], 100.0), params[L.HEADING_KP] * FARTHEST_DEG)
+
 
 @lean_kernel
 def largest_turn(params: Array, state: Array, dt_s: float) -> float:
-    """Largest turn, deg, that one step can make with the present thrust (or turn-rate limit)."""
+    """Largest turn, deg, that step after step can make with the present thrust (or turn-rate limit)."""
     if params[L.KIND] == L.KIND_USV:
-        return abs(turn_of_rudder(params, state[L.THRUST], min(params[L.MAX_RUDDER], 100.0), dt_s))
+        return abs(turn_of_rudder(params, state[L.THRUST], held_rudder(params), dt_s))
     if params[L.KIND] == L.KIND_SINGLE_INTEGRATOR:
         return params[L.MAX_TURN_RATE] * dt_s
     reach = abs(state[L.TURN_RATE]) + params[L.MAX_ANGULAR_ACC] * dt_s
@@ -38,16 +47,16 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
 
 @lean_kernel
 def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
-    """Largest turn, deg, that this step can make under a speed command."""
+    """Largest turn, deg, that this step and any after it can make under a speed command."""
     if params[L.KIND] == L.KIND_USV:
         thrust = thrust_after(params, state, speed_mps, dt_s)
-        return turn_of_rudder(params, thrust, min(params[L.MAX_RUDDER], 100.0), dt_s)
+        return turn_of_rudder(params, thrust, held_rudder(params), dt_s)
     return params[L.MAX_TURN_RATE] * dt_s
 
 
 @lean_kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
-    """Advance one step turning by ``turn_deg`` as nearly as the actuators allow; changes ``state`` in place.
+    """Advance one step turning by ``turn_deg`` as nearly as a rudder that can be held allows; changes ``state``.
 
     The heading controller's memory is left alone: a prediction made of such steps needs none.
     """
@@ -56,7 +65,7 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
         full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
         rudder = 0.0
         if full > 0.0:
-            rudder = clamp(100.0 * turn_deg / full, -100.0, 100.0)
+            rudder = clamp(100.0 * turn_deg / full, -held_rudder(params), held_rudder(params))
         actuate_usv(params, state, speed_mps, rudder, dt_s)
     elif kind == L.KIND_SINGLE_INTEGRATOR:
         step_single_integrator(params, state, speed_mps, turn_deg, dt_s)
@@ -66,14 +75,14 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
 
 @lean_kernel
 def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> float:
-    """Heading error, deg in [-180, 180], that makes the autopilot turn the boat by ``turn_deg`` in this step.
+    """Heading error, deg, that makes the autopilot turn the boat by ``turn_deg`` in this step.
 
     For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e, where e0 and I are
     the controller's memory (derivative 0 when it has none). Without thrust there is no rudder to command and the
-    error returned is 0. An answer beyond +-180 deg is cut there: the turn is then the nearest one possible.
+    error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there: the turn is then the nearest one possible.
     """
     if params[L.KIND] != L.KIND_USV:
-        return clamp(turn_deg, -180.0, 180.0)
+        return clamp(turn_deg, -FARTHEST_DEG, FARTHEST_DEG)
     full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
     if not full > 0.0:
         return 0.0
@@ -99,4 +108,4 @@ def _error_for_rudder(params: Array, state: Array, rudder: float, dt_s: float) -
     integral = state[L.HEADING_INTEGRAL] + step * error
     if abs(integral) > limit and gain > 0.0:
         error = (rudder - offset - clamp(integral, -limit, limit)) / gain
-    return clamp(error, -180.0, 180.0)
+    return clamp(error, -FARTHEST_DEG, FARTHEST_DEG)

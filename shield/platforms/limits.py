@@ -33,7 +33,8 @@ class Limits:
         top_speed_mps: top speed, m/s.
         acceleration_mps2: highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2.
         turn_rate_dps: highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it).
-        half_turn_s: time of a 180 deg turn at full rudder and full speed command, begun at top speed, s.
+        half_turn_s: time of a 180 deg turn at the rudder the autopilot can hold and full speed command, begun at top
+            speed, s.
         turn_loss: share of top speed lost in a long turn at full rudder and full speed command.
         turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
         thrust: thrust at top speed, percent; 0 without a thrust model.
@@ -72,7 +73,7 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
 def _acceleration(platform: Platform, dt_s: float) -> float:
     """The larger of a start from rest and a rudder let go after a long hard turn, which gives its speed back."""
     rest = fresh_state(0.0, 0.0, 0.0)
-    params, turning = cruise(platform, dt_s)
+    params, turning = _any_rudder(*cruise(platform, dt_s))
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, turning, platform.max_speed_mps, 2.0 * largest_turn(params, turning, dt_s) + 1e-9, dt_s)
     return max(_gain(platform, start, dt_s) for start in (rest, turning))
@@ -100,9 +101,16 @@ def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
     return params, state
 
 
+def _any_rudder(params: Array, state: Array) -> tuple[Array, Array]:
+    """The same boat with all of its rudder to hold: what others are granted hangs on no autopilot."""
+    params = params.copy()
+    params[L.HEADING_KP] = np.inf
+    return params, state
+
+
 def _turn_rate(platform: Platform, dt_s: float) -> float:
     """Highest turn rate, deg/s: the speed controller answers the speed lost in a turn with thrust, and so with turn."""
-    params, state = cruise(platform, dt_s)
+    params, state = _any_rudder(*cruise(platform, dt_s))
     fastest = 0.0
     for _ in range(int(LONGEST_S / dt_s)):
         before = state[L.HEADING]
@@ -113,7 +121,7 @@ def _turn_rate(platform: Platform, dt_s: float) -> float:
 
 def _speeds_in_turn(platform: Platform, dt_s: float) -> Array:
     """Speeds, m/s, over a turn of `LONGEST_S` begun at top speed."""
-    params, state = cruise(platform, dt_s)
+    params, state = _any_rudder(*cruise(platform, dt_s))
     speeds = [float(state[L.SPEED])]
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)

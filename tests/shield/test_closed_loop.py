@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import qpsolvers
-from shield_loops import sail, sail_games
+from shield_loops import packed, sail, sail_games
 from shield_scenes import distances, fleet_of, head_on
-from steerclear.shield import Shield, ShieldConfig, Surroundings
-from steerclear.shield.platforms import fresh_state, get_platform
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
+from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
 GAMES = 24
@@ -127,6 +127,38 @@ def test_a_boat_that_cannot_but_hit_a_wall_meets_it_as_gently_as_it_can():
     way = np.diff(run.position[:, 0], axis=0)[-1]
     assert run.position[-1, 0, 1] > 18.5
     assert abs(np.degrees(np.arctan2(way[0], way[1]))) > 30.0
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor", "mctf2024_sim"])
+@pytest.mark.parametrize("around", [{"field": (0, 0, 80, 80)}, {"polygons": [[(0, 0), (80, 0), (80, 80), (0, 80)]]}])
+def test_a_boat_sent_out_for_ever_stays_in_by_absolute_headings(name, around):
+    """Half a turn commanded is one to the other side once it is an absolute heading."""
+    params, state = packed([name])[0], np.zeros(L.N_STATE)
+    state[[L.X, L.Y, L.SPEED_ERROR, L.HEADING_ERROR]] = 40.0, 50.0, np.nan, np.nan
+    shield, highest = Shield(surroundings=Surroundings(**around), hull_m=0.2), 0.0
+    for _ in range(600):
+        now = Fleet(state[None].copy(), np.array([0]), (name,), np.array([True]), ("a",))
+        sent = shield.decide(now, Commands.absolute_rad([[params[L.MAX_SPEED], 0.0]]))[0]
+        error = (np.degrees(sent.sent_heading_rad) - state[L.HEADING] + 180.0) % 360.0 - 180.0
+        step_boat(params, state, sent.sent_speed_mps, error, 0.1)
+        highest = max(highest, state[L.Y])
+    assert 79.0 < highest < 80.0
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor"])
+@pytest.mark.parametrize("goal_deg", [0.0, 180.0])
+def test_a_boat_outside_the_field_comes_back_whatever_is_wanted(name, goal_deg):
+    """At rest 3 m out with its bow outwards it has to go farther out to turn: staying there is not better."""
+    fleet = fleet_of([(40, 43, 0, 0.0)], [0], name)
+    run = sail(
+        Shield(surroundings=Surroundings(field=(0, 0, 80, 40))),
+        fleet,
+        lambda step, state: np.array([[2.0, goal_deg - state[0, L.HEADING]]]),
+        400,
+    )
+    north = run.position[:, 0, 1]
+    assert north.max() < 45.0
+    assert (north[300:] < 40.0).all()
 
 
 def test_a_boat_that_cannot_keep_off_a_circle_any_more_hardly_goes_into_it():

@@ -71,7 +71,7 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
     drift = drift_m * np.arange(last + 1)  # no less than any current of that speed can do
     left = [each - drift for each in left]
     assert out[MARGIN] == pytest.approx(min(each.min() for each in left), abs=1e-9)
-    touched = np.any([each < 0.0 for each in left], axis=0)
+    touched = np.any([each < -1e-12 for each in left], axis=0)
     first = np.argmax(touched) if touched.any() else last + 1
     assert first_touch(path[0], path, last, 1.0, drift_m, grace, circles, walls, hull_m, side_m) == first
     clear_of_rules(path[0], path, last, last, NO_EDGE, circles, 1.0, drift_m, 0.5, out)

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.platforms.actuator import actuate, command_for_turn, largest_turn
+from steerclear.shield.platforms.actuator import FARTHEST_DEG, actuate, command_for_turn, largest_turn
 
 NAMES = sorted(PLATFORMS)
 
@@ -49,8 +49,8 @@ def test_the_autopilot_makes_exactly_the_turn_asked_for(name, data):
     before = row.copy()
     error = command_for_turn(params, row, speed, turn, 0.1)
     assert row.tobytes() == before.tobytes(), "the inverse must not advance the controllers"
-    assert -180.0 <= error <= 180.0
-    assume(abs(error) < 180.0)
+    assert -FARTHEST_DEG <= error <= FARTHEST_DEG
+    assume(abs(error) < FARTHEST_DEG)
     assert turn_made(params, row, speed, error) == pytest.approx(turn, rel=0, abs=1e-9)
 
 
@@ -60,9 +60,9 @@ def test_the_autopilot_makes_exactly_the_turn_asked_for(name, data):
 def test_beyond_the_limits_the_nearest_turn_is_made(name, data, turn):
     params, row, speed, _ = data.draw(situations(name))
     error = command_for_turn(params, row, speed, turn, 0.1)
-    assert -180.0 <= error <= 180.0
+    assert -FARTHEST_DEG <= error <= FARTHEST_DEG
     made = turn_made(params, row, speed, error)
-    for other in np.linspace(-180.0, 180.0, 25):
+    for other in np.linspace(-FARTHEST_DEG, FARTHEST_DEG, 25):
         assert abs(made - turn) <= abs(turn_made(params, row, speed, other) - turn) + 1e-9
 
 
@@ -73,7 +73,7 @@ def test_driving_the_hull_and_driving_the_autopilot_go_to_the_same_place(name, d
     params, row, speed, share = data.draw(situations(name))
     turn = reachable_turn(params, row, speed, share)
     error = command_for_turn(params, row, speed, turn, 0.1)
-    assume(abs(error) < 180.0)
+    assume(abs(error) < FARTHEST_DEG)
     piloted, driven = row.copy(), row.copy()
     step_boat(params, piloted, speed, error, 0.1)
     actuate(params, driven, speed, turn, 0.1)
