@@ -269,6 +269,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --set max_tme_s=3", "did you mean max_time_s"),
         ("ablate --set nothing", "KEY=VALUE"),
         ("ablate --shield-set seperation_m=3", "did you mean 'separation_m'"),
+        ("evaluate medium --shield-set margin_cap_m=1", "add --shield"),
         ("ablate --resume", "--out"),
         ("ablate --own keyboard", "steerclear play --own keyboard"),
         ("evaluate medium --opponents keyboard", "steerclear play --own keyboard"),
