@@ -42,6 +42,12 @@ _MEMORY = (
 """Which sum of differences judges what: a column that says whether it is told, and those that go with it."""
 
 
+def all_told(state: Array) -> bool:
+    """Whether no memory of any boat is unknown: the quick answer, which simulators' states give at every step."""
+    told: float = state[:, L.THRUST : L.HEADING_ERROR + 1].sum()
+    return not math.isnan(told)
+
+
 def unknown_memory(state: Array) -> BoolArray:
     """Boats, (n,), of whose autopilots something that counts is not told."""
     return np.asarray(np.isnan(state[:, [L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]]).any(axis=1))

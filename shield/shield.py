@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .autopilots import Autopilots, unknown_memory
+from .autopilots import Autopilots, all_told, unknown_memory
 from .certificates.manoeuvre import told_margin
 from .certificates.rating import FIXED_THING
 from .certificates.values import WAYS
@@ -19,7 +19,7 @@ from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
 from .flow import PASSES, ROUNDS, TO_SOLVE, begin, finish
-from .jit import Array, BoolArray
+from .jit import Array, BoolArray, IntArray
 from .linearised import add_slack, build, check, pick_movers, take_answer
 from .plan import HELD, NOT_COVERED, PASSED, Plan, new_plan
 from .platforms import layout as L
@@ -87,7 +87,7 @@ class Shield:
         self._boats: Boats | None = None
         self._known: Known | None = None
         self._pending = np.zeros((0, 0, 2))
-        self._autopilots = Autopilots.of(0)
+        self._autopilots: Autopilots | None = None
 
     def reset(self) -> None:
         """Forget all escapes, as before a new game."""
@@ -148,9 +148,19 @@ class Shield:
             answer = _Answer(seat.plan, seat.work, state)
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        decisions = self._report(fleet, wanted, asked, turned, answer)
-        self._note_sent(seen, unknown, decisions.sent, boats)
-        return replace(decisions, solve_time_s=time.perf_counter() - started)
+        sent, changed, bound = _sent(fleet, wanted, asked, turned, answer)
+        self._note_sent(seen, unknown, sent, boats)
+        return Decisions(
+            fleet=fleet,
+            wanted=wanted,
+            sent=sent,
+            intervened=changed,
+            reason=answer.reason,
+            certificate_m=answer.margin,
+            slack_m=answer.slack,
+            bound=bound,
+            solve_time_s=time.perf_counter() - started,
+        )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
         """Put this shield around a policy.
@@ -182,31 +192,37 @@ class Shield:
         team, samples = self.config.coordination == "team", path_samples(boats)
         self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(1 if team else n)]
         self._pending = np.full((steps_of_delay(self.config), n, 2), np.nan)
-        believed, self._autopilots = self._autopilots, Autopilots.of(n)
+        believed, self._autopilots = self._autopilots, None
         stayed = Stayed.between(self._known, fleet)
         if len(stayed.now) == 0:
             return
-        self._autopilots.carry_over(believed, stayed)
+        if believed is not None:
+            self._autopilots = Autopilots.of(n)
+            self._autopilots.carry_over(believed, stayed)
         self._pending[:, stayed.now] = sent[:, stayed.then]
         met = meets_new(fleet, stayed, boats, self._tuning)
         for i, k in [(0, 0)] if team else zip(*stayed, strict=True):
             carry_over(old[k].memory, self._seats[i].memory, stayed, met)
 
-    def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray]:
-        """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it."""
+    def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray | None]:
+        """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it, if any."""
+        if self._autopilots is None and all_told(fleet.state):
+            return fleet, None
         unknown: BoolArray = fleet.controlled & unknown_memory(fleet.state)
         if fleet.age_s is not None:  # what was sent since is not in what is seen
             unknown &= fleet.age_s <= 0.5 * self.config.dt_s
         if not unknown.any():
+            self._autopilots = None
+            return fleet, None
+        if self._autopilots is None:
             self._autopilots = Autopilots.of(len(fleet))
-            return fleet, unknown
         fleet = replace(fleet, state=fleet.state.copy())
         self._autopilots.fill(fleet.state, unknown, self.config.dt_s, self.config.position_error_m)
         return fleet, unknown
 
-    def _note_sent(self, seen: Fleet, unknown: BoolArray, sent: Commands, boats: Boats) -> None:
+    def _note_sent(self, seen: Fleet, unknown: BoolArray | None, sent: Commands, boats: Boats) -> None:
         """Queue what was sent, and run the autopilots nobody tells of through what works in this step."""
-        if len(self._pending) == 0 and not unknown.any():
+        if len(self._pending) == 0 and unknown is None:
             return
         heading_deg = seen.state[:, L.HEADING]
         works = sent.as_relative_deg(heading_deg)
@@ -215,7 +231,7 @@ class Shield:
             queue_commands(self._pending, seen.state, works)
             works = first
             works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
-        if unknown.any():
+        if unknown is not None and self._autopilots is not None:
             self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
     def _fixed(self, surroundings: Surroundings) -> Fixed:
@@ -273,24 +289,18 @@ class Shield:
             answer.take(int(i), seat.plan, seat.work, state)
         return answer
 
-    def _report(self, fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer) -> Decisions:
-        changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
-        changed &= (answer.commands != asked).any(axis=1)
-        alone = changed & (answer.bound < 0) & (answer.reason != HELD)
-        bound = np.where(alone, FIXED_THING, answer.bound)  # nothing else changes commands
-        seen_deg = fleet.state[:, L.HEADING]
-        sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), seen_deg) if changed.any() else wanted
-        return Decisions(
-            fleet=fleet,
-            wanted=wanted,
-            sent=sent,
-            intervened=changed,
-            reason=answer.reason,
-            certificate_m=answer.margin,
-            slack_m=answer.slack,
-            bound=bound,
-            solve_time_s=0.0,
-        )
+
+def _sent(
+    fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer
+) -> tuple[Commands, BoolArray, IntArray]:
+    """Commands to send, which of them are changed, and what binds each boat."""
+    changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
+    changed &= (answer.commands != asked).any(axis=1)
+    if not changed.any():
+        return wanted, changed, answer.bound
+    sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), fleet.state[:, L.HEADING])
+    alone = changed & (answer.bound < 0) & (answer.reason != HELD)
+    return sent, changed, np.where(alone, FIXED_THING, answer.bound)  # nothing else changes commands
 
 
 def _less_turn(commands: Array, turned_deg: Array) -> Array:
