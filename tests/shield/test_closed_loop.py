@@ -145,6 +145,15 @@ def test_a_boat_sent_out_for_ever_stays_in_by_absolute_headings(name, around):
     assert 79.0 < highest < 80.0
 
 
+def test_a_command_changed_for_an_edge_alone_says_so():
+    fleet = fleet_of([(40, 79.78, 85, 1.5), (40, -500, 0, 1.5)], [0, 0])
+    decisions = Shield(surroundings=Surroundings(field=(0, -600, 80, 80))).decide(
+        fleet, Commands.relative_deg([[2.0, -85.0], [1.5, 0.0]])
+    )
+    assert list(decisions.intervened) == [True, False]
+    assert [each.binding for each in decisions] == [("field",), ()]
+
+
 @pytest.mark.parametrize("name", ["heron", "surveyor"])
 @pytest.mark.parametrize("goal_deg", [0.0, 180.0])
 def test_a_boat_outside_the_field_comes_back_whatever_is_wanted(name, goal_deg):
