@@ -60,6 +60,7 @@ def decide_games(
             memory.speed_mps[b],
             memory.margin_m[b],
             memory.threat_m[b],
+            memory.fixed_m[b],
             memory.escaping[b],
         )
         decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)

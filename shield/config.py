@@ -27,7 +27,7 @@ class ShieldConfig:
         opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
             takes opponents to hold course and speed.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
-        table_response_per_s: the same for boats whose opponents are looked up in value tables.
+        table_response_per_s: the same of margins from boats, for those whose opponents are looked up in value tables.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are reported as infinite, m, at most 50.
         tail_s: how long courses are run on straight beyond the horizon, s.

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from .certificates.clearance import MARGIN
+from .certificates.rating import FIXED_LOST
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
@@ -51,6 +52,7 @@ def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Wo
             )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
+        memory.fixed_m[i] = work.fixed[i, MARGIN] if work.merit[i] >= FIXED_LOST else 0.0
         if boats.look[i] > 0:
             copy_row(memory.threat_m[i], work.threats_m[i])
         else:

@@ -9,8 +9,9 @@ import numpy as np
 from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
 from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_LOST, PAIR_SAFE
+from .certificates.rating import FIXED_LOST, only_fixed, worst_merit
 from .certificates.values import run_opponents
+from .easing import WORSE_BY_FIXED, ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check
 from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
@@ -20,19 +21,6 @@ from .scene import Boats, Fixed, Memory, Tuning, Work
 
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
-
-WORSE_BY_FIXED = 1e-6
-"""The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
-
-
-@lean_kernel
-def worst_merit(ours: BoolArray, work: Work) -> float:
-    """Least merit of any boat of ours."""
-    worst = 2.0 * PAIR_SAFE
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            worst = min(worst, work.merit[i])
-    return worst
 
 
 @lean_kernel
@@ -99,14 +87,16 @@ def ladder(
     Escapes are searched from the present state, the one under way first. When even the best leaves somebody short
     (reason BEST_EFFORT) it is still carried out: avoidance does not switch itself off. A program's answer that
     leaves a better worst margin than any escape is kept (reason QP_RELAXED). When only fixed things are at stake and
-    no escape does better by them than the program's answer or the wanted command, that one is sent.
+    no escape does better by them than the program's answer or the wanted command, that one is sent; an escape that
+    keeps them is carried out only as far as they ask for, see `easing`.
     """
-    before = worst_merit(ours, work)
+    before, eases = worst_merit(ours, work), only_fixed(ours, work)
     look = 1
     for m in range(count):
         i = plan.movers[m]
         work.target[i] = 0.0
         work.threat_target_m[i, :] = 0.0
+        work.fixed_target_m[i] = 0.0
         hold(i, plan.held, work)
         look = max(look, boats.look[i])
     run_opponents(look, ours, state, boats, tuning, work, work.ways)
@@ -124,6 +114,8 @@ def ladder(
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
         mark_relaxed(count, state, work, plan)
         return
+    if good and eases:
+        ease(count, state, ours, boats, fixed, tuning, memory, work, plan)
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT

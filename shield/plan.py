@@ -23,6 +23,7 @@ class Plan(NamedTuple):
     held: Array
     answer: Array
     answer_held: Array
+    eased: Array
     movers: IntArray
     place: IntArray
     moving: BoolArray
@@ -47,6 +48,7 @@ def new_plan(boats: int, rows: int) -> Plan:
         held=np.zeros((boats, 3)),
         answer=np.zeros((boats, 2)),
         answer_held=np.zeros((boats, 3)),
+        eased=np.zeros((boats, 2)),
         movers=np.zeros(boats, np.int64),
         place=np.full(boats, -1, np.int64),
         moving=np.zeros(boats, np.bool_),

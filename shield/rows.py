@@ -32,6 +32,9 @@ from .scene import Boats, Fixed, Tuning, Work
 AIM_M = 0.02
 """Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""
 
+FIXED_AIM_M = 1e-3
+"""The same of fixed things: a boat along an edge is not to be sent away from it for more."""
+
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 
@@ -195,12 +198,12 @@ def _table_row(
 
 @lean_kernel
 def _fixed_row(
-    i: int, m: int, tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int
+    i: int, m: int, target_m: float, tuning: Tuning, work: Work, gain: Array, z_now: Array, C: Array, d: Array, r: int
 ) -> bool:
     """Row of boat i (mover m) about the clearance from fixed things in ``work.out``."""
     if work.out[MARGIN] >= FAR:
         return False
-    lack = AIM_M - work.out[MARGIN]
+    lack = target_m + FIXED_AIM_M - work.out[MARGIN]
     C[r, :] = 0.0
     at, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
     _add_effect(C, r, i, 1.0, at, nx, ny, work.path[i], 2 * m, gain, work)
@@ -277,11 +280,11 @@ def build_rows(
                 kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, j
                 r += 1
         clear_of_near_obstacles(i, i, state, boats, fixed, work, work.out)
-        if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
+        if _fixed_row(i, m, 0.0, tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = PAIR_ROW, i, NOBODY
             r += 1
         clear_of_fixed(i, i, state, boats, fixed, work, work.out)
-        if _fixed_row(i, m, tuning, work, gain, z_now, C, d, r):
+        if _fixed_row(i, m, work.fixed_target_m[i], tuning, work, gain, z_now, C, d, r):
             kind[r], label[r, 0], label[r, 1] = FIXED_ROW, i, NOBODY
             r += 1
     return _box_rows(movers, tuning, C, d, kind, label, r)

@@ -107,6 +107,7 @@ class Tuning(NamedTuple):
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
+        fixed_decay: factor by which a margin from fixed things may shrink in one step.
     """
 
     dt_s: float
@@ -116,6 +117,7 @@ class Tuning(NamedTuple):
     hysteresis_m: float
     margin_cap_m: float
     speed_weight: float
+    fixed_decay: float
 
 
 class Memory(NamedTuple):
@@ -128,6 +130,7 @@ class Memory(NamedTuple):
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
         threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
+        fixed_m: the same from fixed things, 0 where it was not looked at.
         escaping: whether the boat was carrying it out at the last decision.
     """
 
@@ -137,6 +140,7 @@ class Memory(NamedTuple):
     speed_mps: Array
     margin_m: Array
     threat_m: Array
+    fixed_m: Array
     escaping: BoolArray
 
 
@@ -157,6 +161,7 @@ class Work(NamedTuple):
         fails: (n + 1,) whether one of these is below what must be kept.
         target: (n,) margin the boat must keep, m.
         threat_target_m: (n, n) margin it must keep against each hunting opponent, m.
+        fixed_target_m: (n,) margin it must keep from fixed things, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         hunted: (n,) whether some opponent that may hunt the boat is near.
@@ -195,6 +200,7 @@ class Work(NamedTuple):
     fails: BoolArray
     target: Array
     threat_target_m: Array
+    fixed_target_m: Array
     bound: IntArray
     near: BoolArray
     hunted: BoolArray
@@ -226,9 +232,9 @@ def path_samples(boats: Boats) -> int:
 def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
     kept, escaping = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    target_deg, speed_mps, margin_m = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    target_deg, speed_mps, margin_m, fixed_m = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     threat_m = np.zeros((*shape, shape[-1]))
-    return Memory(kept, np.ones(shape), target_deg, speed_mps, margin_m, threat_m, escaping)
+    return Memory(kept, np.ones(shape), target_deg, speed_mps, margin_m, threat_m, fixed_m, escaping)
 
 
 def new_work(boats: int, samples: int) -> Work:
@@ -249,6 +255,7 @@ def new_work(boats: int, samples: int) -> Work:
         fails=np.zeros(boats + 1, np.bool_),
         target=np.zeros(boats),
         threat_target_m=np.zeros((boats, boats)),
+        fixed_target_m=np.zeros(boats),
         bound=np.full(boats + 1, -1, np.int64),
         near=np.zeros((boats, boats), np.bool_),
         hunted=np.zeros(boats, np.bool_),

@@ -32,7 +32,7 @@ def _most_told(i: int, j: int, boats: Boats, work: Work) -> float:
 
 
 @lean_kernel
-def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> None:
+def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work) -> None:
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
     What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
@@ -41,8 +41,10 @@ def set_targets(ours: BoolArray, boats: Boats, memory: Memory, work: Work) -> No
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
         work.threat_target_m[i, :] = 0.0
+        work.fixed_target_m[i] = 0.0
         if ours[i] and memory.kept[i]:
             work.target[i] = boats.decay[i] * max(0.0, min(memory.margin_m[i], boats.cap_m[i]))
+            work.fixed_target_m[i] = tuning.fixed_decay * max(0.0, min(memory.fixed_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):
                 most = min(boats.cap_m[i], _most_told(i, j, boats, work))
                 work.threat_target_m[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
@@ -69,7 +71,7 @@ def screen(
     """
     n = state.shape[0]
     look_around(state, margin_m, ours, boats, tuning, work)
-    set_targets(ours, boats, memory, work)
+    set_targets(ours, boats, tuning, memory, work)
     for i in range(n):
         copy_row(plan.commands[i], wanted[i])
         plan.slack_m[i] = 0.0

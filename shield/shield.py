@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from .answer import Answer, less_turn, to_send
 from .autopilots import Autopilots, all_told, unknown_memory
-from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_THING
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -19,9 +18,9 @@ from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
 from .flow import PASSES, ROUNDS, TO_SOLVE, begin, finish
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray
 from .linearised import add_slack, build, check, pick_movers, take_answer
-from .plan import HELD, NOT_COVERED, PASSED, Plan, new_plan
+from .plan import Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
@@ -50,8 +49,7 @@ class Shield:
     Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it, and otherwise
     the least change that keeps one,
 
-        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair,
-                                                 h(x+) >= 0                     for every edge and obstacle,
+        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
     with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
     of each boat, its margins, the commands on their way and, where nobody tells it, its autopilot's memory, for as long
@@ -83,6 +81,7 @@ class Shield:
         self._plans = plans_of(self.config)
         self._packed: dict[Surroundings, Fixed] = {}
         self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
+        self._kept_from: Fixed | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
         self._known: Known | None = None
@@ -140,15 +139,15 @@ class Shield:
         seen, unknown = self._with_memory(fleet)
         state, margin = prepare(seen, self.config, boats.params, self._pending)
         turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
-        asked = _less_turn(wanted.as_relative_deg(fleet.state[:, L.HEADING]), turned)
-        fixed = self._fixed(self.surroundings if surroundings is None else surroundings)
+        asked = less_turn(wanted.as_relative_deg(fleet.state[:, L.HEADING]), turned)
+        fixed = self._around(self.surroundings if surroundings is None else surroundings)
         if self.config.coordination == "team":
             seat = self._seats[0]
             self._run(seat, state, asked, margin, fleet.controlled, boats, fixed)
-            answer = _Answer(seat.plan, seat.work, state)
+            answer = Answer(seat.plan, seat.work, state)
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        sent, changed, bound = _sent(fleet, wanted, asked, turned, answer)
+        sent, changed, bound = to_send(fleet, wanted, asked, turned, answer)
         self._note_sent(seen, unknown, sent, boats)
         return Decisions(
             fleet=fleet,
@@ -234,6 +233,15 @@ class Shield:
         if unknown is not None and self._autopilots is not None:
             self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
+    def _around(self, surroundings: Surroundings) -> Fixed:
+        """Fixed things now; what was kept from others is no measure for these."""
+        fixed = self._fixed(surroundings)
+        if fixed is not self._kept_from:
+            self._kept_from = fixed
+            for seat in self._seats:
+                seat.memory.fixed_m[:] = 0.0
+        return fixed
+
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if not isinstance(surroundings, Surroundings):
             raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
@@ -276,9 +284,9 @@ class Shield:
 
     def _each(
         self, state: Array, wanted: Array, margin: Array, controlled: BoolArray, boats: Boats, fixed: Fixed
-    ) -> _Answer:
+    ) -> Answer:
         """One program per boat: it knows its own wanted command and takes team-mates to hold theirs."""
-        answer = _Answer.empty(len(state))
+        answer = Answer.empty(len(state))
         straight = np.zeros_like(wanted)
         straight[:, 0] = state[:, L.SPEED]
         for i in np.flatnonzero(controlled):
@@ -288,51 +296,3 @@ class Shield:
             self._run(seat, state, asked, margin, controlled, boats, fixed)
             answer.take(int(i), seat.plan, seat.work, state)
         return answer
-
-
-def _sent(
-    fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: _Answer
-) -> tuple[Commands, BoolArray, IntArray]:
-    """Commands to send, which of them are changed, and what binds each boat."""
-    changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
-    changed &= (answer.commands != asked).any(axis=1)
-    if not changed.any():
-        return wanted, changed, answer.bound
-    sent = wanted.replaced(changed, _less_turn(answer.commands, -turned), fleet.state[:, L.HEADING])
-    alone = changed & (answer.bound < 0) & (answer.reason != HELD)
-    return sent, changed, np.where(alone, FIXED_THING, answer.bound)  # nothing else changes commands
-
-
-def _less_turn(commands: Array, turned_deg: Array) -> Array:
-    """Commands (speed, relative heading deg) as seen after a turn; those of boats that do not turn bit for bit."""
-    if not turned_deg.any():
-        return commands
-    return np.stack([commands[:, 0], commands[:, 1] - turned_deg], axis=1)
-
-
-class _Answer:
-    """Arrays of an answer, copied out of working memory."""
-
-    def __init__(self, plan: Plan, work: Work, state: Array) -> None:
-        n = len(state)
-        self.commands = plan.commands.copy()
-        self.reason = plan.reason.copy()
-        self.slack = plan.slack_m.copy()
-        self.margin = np.where(self.reason == NOT_COVERED, np.inf, work.clear[:n, 0])
-        for i in np.flatnonzero(work.breach.any(axis=1) & (self.reason != NOT_COVERED)):
-            self.margin[i] = told_margin(int(i), state, work)
-        self.bound = work.bound[:n].copy()
-
-    @classmethod
-    def empty(cls, n: int) -> _Answer:
-        """An answer that covers nobody."""
-        answer = cls.__new__(cls)
-        answer.commands, answer.slack = np.zeros((n, 2)), np.zeros(n)
-        answer.reason, answer.bound = np.full(n, NOT_COVERED), np.full(n, -1)
-        answer.margin = np.full(n, np.inf)
-        return answer
-
-    def take(self, i: int, plan: Plan, work: Work, state: Array) -> None:
-        """Take boat i's row of another decider's answer."""
-        self.commands[i], self.reason[i], self.slack[i] = plan.commands[i], plan.reason[i], plan.slack_m[i]
-        self.margin[i], self.bound[i] = told_margin(i, state, work), work.bound[i]

@@ -14,6 +14,9 @@ from .manoeuvre import worst_clearance
 PAIR_SAFE = 1e3
 """Merit from which a manoeuvre keeps clear of everybody, whatever they are granted, and of fixed things."""
 
+SPARE_WORTH = 1e-3
+"""Merit of a metre to spare from boats; a manoeuvre short of fixed things is worth less than any that is not."""
+
 FIXED_LOST = 500.0
 """Merit from which it keeps clear of all boats and of obstacles near in time, but not of all fixed things."""
 
@@ -127,7 +130,28 @@ def rate_path(
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
     work.decided[slot] = np.inf
     clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
-    if work.fixed[slot, MARGIN] < 0.0:
-        work.bound[slot] = FIXED_THING
-    spare = 1e-3 * min(clear[MARGIN], tuning.margin_cap_m)
-    return PAIR_SAFE + max(FIXED_LOST - PAIR_SAFE, min(work.fixed[slot, MARGIN], 0.0)) + spare
+    to_spare_m = work.fixed[slot, MARGIN] - work.fixed_target_m[i]
+    spare = SPARE_WORTH * min(clear[MARGIN], tuning.margin_cap_m)
+    if to_spare_m >= 0.0:
+        return PAIR_SAFE + spare
+    work.bound[slot] = FIXED_THING
+    return max(FIXED_LOST, PAIR_SAFE + to_spare_m - SPARE_WORTH * tuning.margin_cap_m) + spare
+
+
+@lean_kernel
+def worst_merit(ours: BoolArray, work: Work) -> float:
+    """Least merit of any boat of ours."""
+    worst = 2.0 * PAIR_SAFE
+    for i in range(ours.shape[0]):
+        if ours[i]:
+            worst = min(worst, work.merit[i])
+    return worst
+
+
+@lean_kernel
+def only_fixed(ours: BoolArray, work: Work) -> bool:
+    """Whether all that some boat of ours is short of concerns fixed things."""
+    for i in range(ours.shape[0]):
+        if ours[i] and work.merit[i] < PAIR_SAFE and work.bound[i] != FIXED_THING:
+            return False
+    return True

@@ -67,7 +67,7 @@ def screened_with_all_pairs(at, wanted):
     left_out = ~at.work.near & ~np.eye(n, dtype=bool)
     at.work.radius[left_out] = at.tuning.radius_m
     at.work.near[left_out] = True
-    screening.set_targets(at.ours, at.boats, at.memory, at.work)
+    screening.set_targets(at.ours, at.boats, at.tuning, at.memory, at.work)
     for i in range(n):
         at.plan.commands[i] = wanted[i]
         at.plan.slack_m[i], at.plan.moving[i] = 0.0, False

@@ -1,0 +1,93 @@
+"""Boats that want through an edge or a wall for ever sail along it, steadily and without losing their speed."""
+
+import numpy as np
+import pytest
+from shield_loops import sail_games, scattered
+from steerclear.shield import ShieldConfig, Surroundings
+from steerclear.shield.certificates.paths import SAG_M
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+
+STEPS, SETTLED, GAMES = 900, 500, 12
+COURSE = np.linspace(-180.0, 150.0, GAMES)
+FIELD = (0.0, 0.0, 160.0, 80.0)
+EDGE_M, HULL_M = 0.2, 1.0
+
+
+def press(platform, start, course, surroundings, **settings):
+    """Positions (T+1, B, 2), turns (T, B) deg and the speed (B,) at the end of boats that hold to a course (B,)."""
+    top, headings, speeds = get_platform(platform).max_speed_mps, [], []
+
+    def wanted(step, state):
+        headings.append(state[:, 0, L.HEADING].copy())
+        speeds.append(state[:, 0, L.SPEED].copy())
+        error = (course(state[:, 0]) - state[:, 0, L.HEADING] + 180.0) % 360.0 - 180.0
+        return np.stack([np.full(len(state), top), error], axis=-1)[:, None]
+
+    config = ShieldConfig(edge_m=EDGE_M, hull_m=HULL_M, **settings)
+    run = sail_games(config, start, [platform], [0], wanted, STEPS, surroundings=surroundings)
+    turns = (np.diff(headings, axis=0) + 180.0) % 360.0 - 180.0
+    return run.position[:, :, 0], turns, np.array(speeds)
+
+
+def flips_per_min(turns):
+    """How often the turn of a boat changes sides from one step to the next, per minute."""
+    side = np.sign(np.where(np.abs(turns) < 0.2, 0.0, turns))
+    return (side[1:] * side[:-1] < 0.0).sum(axis=0) * 600.0 / len(turns)
+
+
+def begin(platform, x_m, y_m):
+    """States of `GAMES` boats at random about a place."""
+    state = scattered(np.random.default_rng(3), GAMES, [platform], 1.0, speed=(0.3, 1.0))
+    random = np.random.default_rng(4)
+    state[:, 0, 0] = random.uniform(*x_m, GAMES)
+    state[:, 0, 1] = random.uniform(*y_m, GAMES)
+    return state
+
+
+@pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.7)])
+def test_along_the_edge_of_the_field(platform, share):
+    start = begin(platform, (40.0, 120.0), (25.0, 55.0))
+    position, turns, speed = press(platform, start, lambda boats: COURSE, Surroundings(field=FIELD))
+    inside = np.minimum(position - FIELD[:2], np.array(FIELD[2:]) - position).min(axis=(0, 2))
+    assert inside.min() >= EDGE_M - SAG_M - 1e-3
+    assert np.median(flips_per_min(turns[SETTLED:])) < 60.0
+    assert np.mean(speed[SETTLED:]) > share * get_platform(platform).max_speed_mps
+
+
+@pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.9)])
+def test_along_a_wall(platform, share):
+    quay = Surroundings(polygons=[[(-900.0, 0.0), (900.0, 0.0), (900.0, -5.0), (-900.0, -5.0)]])
+    start, course = begin(platform, (-50.0, 50.0), (20.0, 45.0)), np.linspace(105.0, 255.0, GAMES)
+    position, turns, speed = press(platform, start, lambda boats: course, quay)
+    assert position[:, :, 1].min() >= HULL_M - SAG_M - 1e-3
+    assert np.median(flips_per_min(turns[SETTLED:])) < 60.0
+    assert np.mean(speed[SETTLED:]) > share * get_platform(platform).max_speed_mps
+
+
+@pytest.mark.parametrize("rule", ["circles", "keep_out"])
+def test_round_a_circle_it_wants_into(rule):
+    radius_m = 14.0 + (HULL_M if rule == "keep_out" else 0.0)
+    start = begin("heron", (-40.0, 40.0), (20.0, 45.0))
+
+    def inwards(boats):
+        return np.degrees(np.arctan2(-boats[:, 0], -boats[:, 1]))
+
+    position, turns, speed = press("heron", start, inwards, Surroundings(**{rule: [(0.0, 0.0, radius_m)]}))
+    assert np.hypot(*np.moveaxis(position, -1, 0)).min() >= 14.0 + HULL_M - SAG_M - 1e-3
+    assert np.median(flips_per_min(turns[SETTLED:])) < 60.0
+    assert np.mean(speed[SETTLED:]) > 1.8
+
+
+def test_what_was_kept_from_other_things_is_not_asked_of_new_ones():
+    """A keep-out circle that appears near a boat asks for no more than its escape, not for a margin it never had."""
+    from shield_scenes import fleet_of
+    from steerclear.shield import Commands, Shield
+
+    fleet, wanted = fleet_of([(0.0, 0.0, 0.0, 2.0)], [0], "heron"), Commands.relative_deg([[2.0, 0.0]])
+    near, far = ({"keep_out": [(0.0, y, 3.0)]} for y in (7.0, 60.0))
+    shield = Shield(ShieldConfig())
+    shield.decide(fleet, wanted, Surroundings(**far))
+    assert not shield.decide(fleet, wanted, Surroundings(**near)).intervened[0]
+    kept = Shield(ShieldConfig(), Surroundings(**near))
+    assert not kept.decide(fleet, wanted).intervened[0]
