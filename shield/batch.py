@@ -134,7 +134,8 @@ class BatchedShield:
         """Safe commands.
 
         Args:
-            state: (B, n, N_STATE) boat states; memory of the autopilot may be NaN where it is not known, as in `Fleet`.
+            state: (B, n, N_STATE) boat states; memory of the autopilot that is NaN is filled from the speed, not
+                followed as `Shield` does.
             wanted: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
 

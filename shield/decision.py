@@ -27,7 +27,8 @@ class Reason(IntEnum):
     QP_RELAXED = plan.QP_RELAXED
     """Not all rows could hold; the program's answer with reported slack, better than any escape."""
     ESCAPE = plan.ESCAPE
-    """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats."""
+    """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats, or as much
+    of it as fixed things ask for."""
     BEST_EFFORT = plan.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
     HELD = plan.HELD

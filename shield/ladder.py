@@ -39,13 +39,19 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
 
 
 @lean_kernel
+def _given_up(i: int, state: Array, work: Work) -> float:
+    """What boat i is short of its distance from boats and fixed things, m."""
+    return max(0.0, -min(told_margin(i, state, work), work.fixed[i, MARGIN]))
+
+
+@lean_kernel
 def mark_relaxed(count: int, state: Array, work: Work, plan: Plan) -> None:
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
         i = plan.movers[m]
         if plan.reason[i] == PASSED or not unchanged(i, plan):
             plan.reason[i] = QP_RELAXED
-        plan.slack_m[i] = max(0.0, -min(told_margin(i, state, work), work.fixed[i, MARGIN]))
+        plan.slack_m[i] = _given_up(i, state, work)
 
 
 @lean_kernel
@@ -119,4 +125,4 @@ def ladder(
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
-        plan.slack_m[i] = max(0.0, -told_margin(i, state, work))
+        plan.slack_m[i] = _given_up(i, state, work)

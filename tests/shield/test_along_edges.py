@@ -85,7 +85,7 @@ def test_what_was_kept_from_other_things_is_not_asked_of_new_ones():
     from steerclear.shield import Commands, Shield
 
     fleet, wanted = fleet_of([(0.0, 0.0, 0.0, 2.0)], [0], "heron"), Commands.relative_deg([[2.0, 0.0]])
-    near, far = ({"keep_out": [(0.0, y, 3.0)]} for y in (7.0, 60.0))
+    near, far = ({"keep_out": [(0.0, y, 3.0)]} for y in (5.8, 60.0))
     shield = Shield(ShieldConfig())
     shield.decide(fleet, wanted, Surroundings(**far))
     assert not shield.decide(fleet, wanted, Surroundings(**near)).intervened[0]
