@@ -27,7 +27,8 @@ class ShieldConfig:
         opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
             takes opponents to hold course and speed.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
-        table_response_per_s: the same of margins from boats, for those whose opponents are looked up in value tables.
+        table_response_per_s: the same for boats whose opponents are looked up in value tables.
+        fixed_response_per_s: the same of margins from the edge, obstacles and circles.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are reported as infinite, m, at most 50.
         tail_s: how long courses are run on straight beyond the horizon, s.
@@ -61,6 +62,7 @@ class ShieldConfig:
     opponent_share: float = 1.0
     response_per_s: float = 1.0
     table_response_per_s: float = 0.3
+    fixed_response_per_s: float = 2.0
     table_margin_m: float = 0.45
     margin_cap_m: float = 2.0
     tail_s: float = 5.0
@@ -110,7 +112,8 @@ class ShieldConfig:
 
 
 _TEXTS = {"certificate", "coordination", "solver"}
-_POSITIVE = {"separation_m", "dt_s", "response_per_s", "table_response_per_s", "speed_weight", "horizon_s", "hunt_s"}
+_RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
+_POSITIVE = _RATES | {"separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 1.0),
@@ -122,7 +125,7 @@ _RANGES = {
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = {"response_per_s", "table_response_per_s", "max_track_age_s"}
+_MAY_BE_INFINITE = _RATES | {"max_track_age_s"}
 
 
 def _check_number(name: str, value: object) -> None:

@@ -6,21 +6,21 @@ the program, which are linear, then find no answer, and a boat that wants throug
 
 from __future__ import annotations
 
-from .certificates.rating import worst_merit
-from .jit import Array, BoolArray, copy_row, lean_kernel
+from .certificates.rating import PAIR_SAFE, worst_merit
+from .jit import Array, BoolArray, lean_kernel
 from .linearised import check
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
 from .platforms.usv import wrap_degrees
 from .scene import Boats, Fixed, Memory, Tuning, Work
+from .screening import set_targets
 
-HALVINGS = 5
-"""Looks for the least share of an escape: all but a twentieth of what is to be had."""
+LOOKS = 6
+"""Looks for the least share of an escape, the first at none of it: to a 32nd of the way."""
 
-WORSE_BY_FIXED = 1e-6
-"""Difference of merit that counts where only fixed things are at stake: rounding, since what is given away is so in
-every step."""
+NO_WORSE = 1e-9
+"""Difference of merit that is rounding: a micrometre of distance."""
 
 
 @lean_kernel
@@ -30,19 +30,62 @@ def _mildest_turn(i: int, plan: Plan) -> float:
     As much against it as is allowed in this step would have to be taken back in the next.
     """
     wanted, escape = plan.wanted_turn[i], plan.eased[i, 0]
-    return wanted if wanted * escape > 0.0 and abs(wanted) < abs(escape) else 0.0
+    if wanted * escape <= 0.0:
+        return 0.0
+    return wanted if abs(wanted) < abs(escape) else escape
 
 
 @lean_kernel
-def _go_back(share: float, count: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> None:
-    """Commands of the movers that share of the way back from their escapes, ``plan.eased``: turn deg, speed m/s."""
-    for m in range(count):
-        i = plan.movers[m]
-        turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
-        speed = plan.eased[i, 1] + share * (plan.kept_commands[i, 0] - plan.eased[i, 1])
-        speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
-        plan.commands[i, 0] = speed
-        plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, turn, tuning.dt_s)
+def _go_back(share: float, i: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> None:
+    """Command of boat i that share of the way back from its escape, ``plan.eased``."""
+    turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
+    speed = plan.eased[i, 1] + share * (plan.kept_commands[i, 0] - plan.eased[i, 1])
+    speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
+    plan.commands[i, 0] = speed
+    plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, turn, tuning.dt_s)
+
+
+@lean_kernel
+def _no_worse(ours: BoolArray, work: Work, plan: Plan) -> bool:
+    """Whether no boat of ours has less than with all escapes."""
+    worse = False
+    for i in range(ours.shape[0]):
+        worse = worse or (ours[i] and work.merit[i] < plan.eased[i, 2] - NO_WORSE)
+    return not worse
+
+
+@lean_kernel
+def _ease_one(
+    i: int,
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> None:
+    """Bring boat i's command as near to the wanted one as is no worse for any boat of ours."""
+    speed, heading = plan.commands[i, 0], plan.commands[i, 1]
+    kept, too_far, at = 0.0, 2.0, 0.0
+    for _ in range(LOOKS):
+        at = 0.5 * (kept + too_far)
+        _go_back(at, i, state, boats, tuning, plan)
+        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        if _no_worse(ours, work, plan):
+            kept = at
+        else:
+            too_far = at
+        if kept == 1.0:
+            return
+    if at == kept:
+        return
+    _go_back(kept, i, state, boats, tuning, plan)
+    if kept == 0.0:
+        plan.commands[i, 0], plan.commands[i, 1] = speed, heading
+    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
 
 
 @lean_kernel
@@ -57,28 +100,20 @@ def ease(
     work: Work,
     plan: Plan,
 ) -> None:
-    """Take back of the movers' escapes, checked as they are, what is not needed to keep what they keep."""
-    level = worst_merit(ours, work) - WORSE_BY_FIXED
+    """Take back of the movers' escapes, boat by boat, what is not needed to keep what they keep.
+
+    Margins from boats are those that have to be kept, as when the wanted commands were screened; escapes that do not
+    keep them are carried out as they are. Of fixed things only their distance is asked for.
+    """
+    set_targets(ours, boats, tuning, memory, work)
+    work.fixed_target_m[:] = 0.0
+    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+    if worst_merit(ours, work) < PAIR_SAFE:
+        return
+    for i in range(ours.shape[0]):
+        plan.eased[i, 2] = work.merit[i]
     for m in range(count):
         i = plan.movers[m]
         plan.eased[i, 0] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
         plan.eased[i, 1] = plan.commands[i, 0]
-        copy_row(plan.answer[i], plan.commands[i])
-    kept, too_far, at = 0.0, 2.0, 0.0
-    for _ in range(HALVINGS):
-        at = 0.5 * (kept + too_far)  # all the way first
-        _go_back(at, count, state, boats, tuning, plan)
-        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        if worst_merit(ours, work) >= level:
-            kept = at
-        else:
-            too_far = at
-        if kept == 1.0:
-            return
-    if at == kept:
-        return
-    _go_back(kept, count, state, boats, tuning, plan)
-    if kept == 0.0:
-        for m in range(count):
-            copy_row(plan.commands[plan.movers[m]], plan.answer[plan.movers[m]])
-    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        _ease_one(i, count, state, ours, boats, fixed, tuning, memory, work, plan)

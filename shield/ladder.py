@@ -8,10 +8,11 @@ import numpy as np
 
 from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
+from .certificates.fixed_things import clear_of_near_obstacles
 from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_LOST, only_fixed, worst_merit
+from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, only_fixed, worst_merit
 from .certificates.values import run_opponents
-from .easing import WORSE_BY_FIXED, ease
+from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check
 from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
@@ -21,6 +22,9 @@ from .scene import Boats, Fixed, Memory, Tuning, Work
 
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
+
+WORSE_BY_FIXED = 1e-6
+"""The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
 
 
 @lean_kernel
@@ -39,19 +43,23 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
 
 
 @lean_kernel
-def _given_up(i: int, state: Array, work: Work) -> float:
+def _given_up(i: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> float:
     """What boat i is short of its distance from boats and fixed things, m."""
-    return max(0.0, -min(told_margin(i, state, work), work.fixed[i, MARGIN]))
+    least = min(told_margin(i, state, work), work.fixed[i, MARGIN])
+    if work.merit[i] < FIXED_LOST and work.bound[i] == FIXED_THING:  # of an obstacle near in time nothing is noted
+        clear_of_near_obstacles(i, i, state, boats, fixed, work, work.spare2)
+        least = min(least, work.spare2[MARGIN])
+    return max(0.0, -least)
 
 
 @lean_kernel
-def mark_relaxed(count: int, state: Array, work: Work, plan: Plan) -> None:
+def mark_relaxed(count: int, state: Array, boats: Boats, fixed: Fixed, work: Work, plan: Plan) -> None:
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
         i = plan.movers[m]
         if plan.reason[i] == PASSED or not unchanged(i, plan):
             plan.reason[i] = QP_RELAXED
-        plan.slack_m[i] = _given_up(i, state, work)
+        plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
 
 
 @lean_kernel
@@ -118,11 +126,11 @@ def ladder(
             copy_row(plan.commands[i], plan.answer[i])
             copy_row(plan.held[i], plan.answer_held[i])
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        mark_relaxed(count, state, work, plan)
+        mark_relaxed(count, state, boats, fixed, work, plan)
         return
-    if good and eases:
-        ease(count, state, ours, boats, fixed, tuning, memory, work, plan)
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
-        plan.slack_m[i] = _given_up(i, state, work)
+        plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
+    if good and eases and after >= PAIR_SAFE:
+        ease(count, state, ours, boats, fixed, tuning, memory, work, plan)

@@ -13,7 +13,7 @@ from .jit import Array, BoolArray, copy_row, lean_kernel
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
-from .rows import BOX_ROW, build_rows, inputs_of
+from .rows import FIXED_ROW, PAIR_ROW, build_rows, inputs_of
 from .scene import Boats, Fixed, Memory, Tuning, Work
 from .screening import predict
 
@@ -90,15 +90,22 @@ def build(
 
 
 @lean_kernel
-def add_slack(count: int, rows: int, plan: Plan) -> None:
-    """Give boat rows and fixed-thing rows one slack input each (the last two columns), limits none."""
-    n = 2 * count
+def add_slack(count: int, rows: int, plan: Plan) -> int:
+    """Give rows their slack inputs, the last columns; returns the number of all inputs.
+
+    Boat rows share one. Rows of fixed things have one for each boat, so that none is let off by what another cannot
+    do. Limits have none.
+    """
+    first, inputs = 2 * count, 3 * count + 1
     for r in range(rows):
-        for s in range(2):
-            plan.C[r, n + s] = 0.0
-        if plan.kind[r] != BOX_ROW:
-            plan.C[r, n + plan.kind[r]] = 1.0 / math.sqrt(SLACK_COST[plan.kind[r]])
-    plan.z0[n], plan.z0[n + 1] = 0.0, 0.0
+        for s in range(first, inputs):
+            plan.C[r, s] = 0.0
+        if plan.kind[r] == PAIR_ROW:
+            plan.C[r, first] = 1.0 / math.sqrt(SLACK_COST[PAIR_ROW])
+        elif plan.kind[r] == FIXED_ROW:
+            plan.C[r, first + 1 + plan.place[plan.label[r, 0]]] = 1.0 / math.sqrt(SLACK_COST[FIXED_ROW])
+    plan.z0[first:inputs] = 0.0
+    return inputs
 
 
 @lean_kernel
@@ -108,8 +115,7 @@ def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
     status = project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n])
     if status == OPTIMAL:
         return True
-    add_slack(count, rows, plan)
-    n += 2
+    n = add_slack(count, rows, plan)
     return project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n]) == OPTIMAL
 
 

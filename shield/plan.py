@@ -15,7 +15,10 @@ LARGEST_COMMAND = 1e6
 
 
 class Plan(NamedTuple):
-    """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows)."""
+    """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows).
+
+    ``eased`` holds of each escape the turn, deg, the speed, m/s, and the merit, see `easing`.
+    """
 
     commands: Array
     kept_commands: Array
@@ -48,15 +51,15 @@ def new_plan(boats: int, rows: int) -> Plan:
         held=np.zeros((boats, 3)),
         answer=np.zeros((boats, 2)),
         answer_held=np.zeros((boats, 3)),
-        eased=np.zeros((boats, 2)),
+        eased=np.zeros((boats, 3)),
         movers=np.zeros(boats, np.int64),
         place=np.full(boats, -1, np.int64),
         moving=np.zeros(boats, np.bool_),
         gain=np.zeros((boats, 3)),
-        z_now=np.zeros(2 * boats + 2),
-        z0=np.zeros(2 * boats + 2),
-        z=np.zeros(2 * boats + 2),
-        C=np.zeros((rows, 2 * boats + 2)),
+        z_now=np.zeros(3 * boats + 1),
+        z0=np.zeros(3 * boats + 1),
+        z=np.zeros(3 * boats + 1),
+        C=np.zeros((rows, 3 * boats + 1)),
         d=np.zeros(rows),
         kind=np.zeros(rows, np.int64),
         label=np.zeros((rows, 2), np.int64),

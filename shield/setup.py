@@ -49,7 +49,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
         hysteresis_m=config.hysteresis_m,
         margin_cap_m=config.margin_cap_m,
         speed_weight=config.speed_weight,
-        fixed_decay=_decay(config.response_per_s, config),
+        fixed_decay=_decay(config.fixed_response_per_s, config),
     )
 
 

@@ -278,8 +278,7 @@ class Shield:
         z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
         if z is not None:
             return z
-        add_slack(count, rows, plan)
-        n += 2
+        n = add_slack(count, rows, plan)
         return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
 
     def _each(

@@ -55,6 +55,29 @@ def test_along_the_edge_of_the_field(platform, share):
     assert np.mean(speed[SETTLED:]) > share * get_platform(platform).max_speed_mps
 
 
+@pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.6)])
+def test_what_one_boat_cannot_do_does_not_make_others_weave(platform, share):
+    """Three boats far apart, each at an edge of its own."""
+    top, games = get_platform(platform).max_speed_mps, 6
+    state = scattered(np.random.default_rng(7), games, [platform] * 3, 1.0, gap_m=0.0, speed=(0.3, 1.0))
+    places = np.array([[0.0, 270.0], [270.0, 0.0], [0.0, -270.0]])
+    state[..., :2] = places + np.random.default_rng(8).uniform(-8.0, 8.0, (games, 3, 2))
+    outwards, headings, speeds = np.array([10.0, 80.0, 170.0]), [], []
+
+    def wanted(step, state):
+        headings.append(state[..., L.HEADING].copy())
+        speeds.append(state[..., L.SPEED].copy())
+        error = (outwards - state[..., L.HEADING] + 180.0) % 360.0 - 180.0
+        return np.stack([np.full(error.shape, top), error], axis=-1)
+
+    around = Surroundings(field=(-300.0, -300.0, 300.0, 300.0))
+    run = sail_games(ShieldConfig(edge_m=EDGE_M), state, [platform] * 3, [0] * 3, wanted, 700, surroundings=around)
+    assert np.abs(run.position).max() <= 300.0 - EDGE_M + 2.0 * SAG_M
+    turns = (np.diff(headings, axis=0) + 180.0) % 360.0 - 180.0
+    assert np.median(flips_per_min(turns[300:])) < 60.0
+    assert np.mean(speeds[300:]) > share * top
+
+
 @pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.9)])
 def test_along_a_wall(platform, share):
     quay = Surroundings(polygons=[[(-900.0, 0.0), (900.0, 0.0), (900.0, -5.0), (-900.0, -5.0)]])

@@ -23,7 +23,7 @@ def remembered(rows, team, platform):
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
     seat = shield._seats[0]
     boats = boats_of(shield.config, fleet.platforms, tuple(team))
-    set_targets(fleet.controlled, boats, seat.memory, seat.work)
+    set_targets(fleet.controlled, boats, shield._tuning, seat.memory, seat.work)
     return decisions, seat.memory, seat.work
 
 

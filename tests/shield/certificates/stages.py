@@ -124,7 +124,6 @@ def _answer(at, count, rows, solver):
     n, plan = 2 * count, at.plan
     z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
     if z is None:
-        linearised.add_slack(count, rows, plan)
-        n += 2
+        n = linearised.add_slack(count, rows, plan)
         z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
     return z

@@ -71,7 +71,8 @@ class Linearised:
         at, r, n = self.at, self.row, 2 * self.count
         C, d = at.plan.C[r, :n].copy(), at.plan.d[r]
         target = at.work.target[at.plan.label[r, 0]] if at.plan.kind[r] == rows.PAIR_ROW else 0.0
-        lack = target + rows.AIM_M - self.margin(self.z)
+        aim_m = rows.AIM_M if at.plan.label[r, 1] >= 0 else rows.FIXED_AIM_M
+        lack = target + aim_m - self.margin(self.z)
         scale = lack / (d - C @ self.z)
         steps = STEP * np.eye(n)
         slopes = [(self.margin(self.z + step) - self.margin(self.z - step)) / (2.0 * STEP) for step in steps]
