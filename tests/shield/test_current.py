@@ -8,7 +8,7 @@ from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
-GAMES, STEPS, CURRENT_MPS, RADIUS = 12, 250, 0.5, 4.0
+GAMES, STEPS, CURRENT_MPS, RADIUS = 12, 250, 0.3, 4.0
 EDGE = 60.0
 
 
