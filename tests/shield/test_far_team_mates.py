@@ -1,0 +1,39 @@
+"""What a boat is told to do does not hang on team-mates that have nothing to do with it."""
+
+import numpy as np
+import pytest
+from shield_loops import sail
+from shield_scenes import fleet_of
+from steerclear.shield import Shield, ShieldConfig, Surroundings
+from steerclear.shield.platforms import layout as L
+
+FIELD = (0.0, 0.0, 900.0, 80.0)
+STEPS = 250
+
+
+def chased(mates, ahead_m, course_deg):
+    """Run of a heron that presses on the upper edge with a hunter behind it, and of its two team-mates far away."""
+    rows = [(100.0, 70.0, 60.0, 2.0), (100.0 - ahead_m, 62.0, 60.0, 2.0)]
+    rows += [(500.0, 20.0, 90.0, 1.5), (500.0, 22.58, 90.0, 1.5)] if mates else []
+    fleet = fleet_of(rows, [0, 1, 0, 0][: len(rows)], "heron")
+    fleet.state[:, L.THRUST] = 100.0
+
+    def wanted(step, state):
+        commands = np.zeros((len(state), 2))
+        commands[:, 0], commands[2:, 0] = 2.0, 1.5
+        to_boat = state[0, :2] - state[1, :2]
+        courses = [course_deg, np.degrees(np.arctan2(*to_boat)), 90.0, 90.0]
+        commands[:, 1] = (np.array(courses[: len(state)]) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+        return commands
+
+    config = ShieldConfig(edge_m=0.2)
+    return sail(Shield(config, Surroundings(field=FIELD)), fleet, wanted, STEPS)
+
+
+@pytest.mark.parametrize("ahead_m", [6.0, 9.0, 14.0])
+@pytest.mark.parametrize("course_deg", [20.0, 70.0])
+def test_a_boat_chased_along_an_edge_does_what_it_does_alone(ahead_m, course_deg):
+    alone, together = chased(False, ahead_m, course_deg), chased(True, ahead_m, course_deg)
+    assert (alone.reason[:, 0] > 0).any()  # or there would be nothing to hang on anything
+    assert together.closest(np.array([False, False, True, True])) < 2.6  # mates with next to nothing to spare
+    np.testing.assert_allclose(together.position[:, 0], alone.position[:, 0], atol=1e-6)
