@@ -14,9 +14,18 @@ from steerclear.shield.setup import boats_of
 
 TEXTS = ("certificate", "coordination", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
-NOT_ZERO = ["separation_m", "dt_s", "response_per_s", "table_response_per_s", "speed_weight", "horizon_s", "hunt_s"]
+NOT_ZERO = [
+    "separation_m",
+    "dt_s",
+    "response_per_s",
+    "table_response_per_s",
+    "fixed_response_per_s",
+    "speed_weight",
+    "horizon_s",
+    "hunt_s",
+]
 MAY_BE_NONE = ["horizon_s", "hunt_s", "edge_m"]
-MAY_BE_INFINITE = ["response_per_s", "table_response_per_s", "max_track_age_s"]
+MAY_BE_INFINITE = ["response_per_s", "table_response_per_s", "fixed_response_per_s", "max_track_age_s"]
 
 
 @pytest.mark.parametrize("name", NUMBERS)
