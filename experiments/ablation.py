@@ -117,8 +117,18 @@ def ablation_bars(rows: Sequence[Row], separation_m: float) -> list[dict[str, An
         {"name": f"hits with team-mates at {separation_m:g} m, shielded, all games", **zero},
         {"name": f"hits with opponents at {separation_m:g} m, on / off", **_ratio(pairs, opponent, "<=", 0.1)},
         {"name": "captures, on / off", **_ratio(pairs, "captures", ">=", 0.9)},
+        *_deadlock_bar(pairs),
         *_avoidable_bar(rows, separation_m),
     ]
+
+
+def _deadlock_bar(pairs: Sequence[tuple[Row, Row]]) -> list[dict[str, Any]]:
+    """No bar where rows are of a version that did not count them."""
+    if not all("deadlocks" in on for _, on in pairs):
+        return []
+    rate = count_interval(sum(int(on["deadlocks"]) for _, on in pairs), len(pairs))
+    limits = {"value": rate.value, "low": rate.low, "high": rate.high}
+    return [{"name": "deadlocks, shielded, per game", **limits, "sense": "<=", "limit": 0.0, "met": rate.value == 0.0}]
 
 
 def _avoidable_bar(rows: Sequence[Row], separation_m: float) -> list[dict[str, Any]]:

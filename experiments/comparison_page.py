@@ -57,9 +57,8 @@ def _intro(versions: Sequence[str]) -> str:
         "encounters. *Breached* counts encounters in which an own boat came within the radius of another boat, "
         "*avoidable* those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % "
         "upper limit of the probability. *Time to goal* is that without a guard times the number. The filters of the "
-        "literature are [`experiments/textbook`](../experiments/textbook/__init__.py), with gains chosen by "
-        "their own sweep on these platforms; `reach` is [`experiments/reach_guard`]"
-        "(../experiments/reach_guard/__init__.py), the value tables alone."
+        "literature are those of `steerclear.experiments.textbook`, with gains chosen by their own sweep on these "
+        "platforms; `reach` is `steerclear.experiments.reach_guard`, the value tables alone."
     )
 
 

@@ -64,6 +64,7 @@ GAME_COLUMNS = {
     "mean_heading_change_deg": "mean |sent - wanted| heading over changed steps, deg",
     "mean_speed_change_mps": "mean |sent - wanted| speed over changed steps, m/s",
     "reversals_per_boat_minute": "changes of the commanded side of turn (beyond 5 deg) per boat and minute",
+    "deadlocks": "pairs of own boats that want to move and stood still for over 10 s",
     "decision_p50_us": "median time of a team's decision, us",
     "decision_p99_us": "99th percentile of it, us",
     "decision_max_us": "longest, us",

@@ -93,6 +93,7 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
         Metric("closest_of_all_m", "closest of all, m", _closest_of_all),
         Metric("changed_share", "steps changed, %", partial(_changed_percent, seed), only_on=True),
         *_shield_means(seed),
+        Metric("deadlocks", "deadlocks", partial(_count, "deadlocks"), partial(_number, "deadlocks")),
         *(
             Metric(name, label, partial(_mean, name, seed), partial(_number, name))
             for name, label in (
@@ -140,7 +141,9 @@ def _present(name: str, rows: Sequence[Row]) -> list[float]:
 
 
 def _count(name: str, rows: Sequence[Row]) -> Interval:
-    return count_interval(int(sum(_present(name, rows))), len(rows))
+    """Mean per game over the rows that have the column: an older version's may lack it."""
+    counts, nan = _present(name, rows), float("nan")
+    return count_interval(int(sum(counts)), len(counts)) if counts else Interval(nan, nan, nan)
 
 
 def _mean(name: str, seed: int, rows: Sequence[Row]) -> Interval:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from steerclear.env.record import NOT_COVERED, Record, read_meta
 
 from .breaches import PairDistances, count_breaches, team_pairs
+from .deadlocks import count_deadlocks
 from .reversals import count_reversals, heading_change_deg
 
 RADII_M = (2.5, 4.0)
@@ -26,14 +27,16 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
 
     Returns:
         Flat columns: ``breaches_teammate_2.5m`` and so on, ``closest_*_m`` (None without such a pair),
-        ``collisions`` (what the game's score counts), and the columns of `shield_columns`.
+        ``collisions`` (what the game's score counts), the columns of `shield_columns` and ``deadlocks``.
     """
     meta = read_meta(record)
     distances = PairDistances.of(record["position"])
+    own, dt_s = np.asarray(meta["team"]) == side, float(meta["dt_s"])
     return {
         **_breach_columns(distances, meta, side, radii_m),
         "collisions": scored_collisions(distances, meta, side),
-        **shield_columns(record, np.asarray(meta["team"]) == side, float(meta["dt_s"])),
+        **shield_columns(record, own, dt_s),
+        "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
     }
 
 

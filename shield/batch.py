@@ -16,7 +16,7 @@ from .jit import Array, BoolArray, IntArray, kernel
 from .plan import Plan, new_plan
 from .platforms import Platform
 from .platforms import layout as L
-from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work, path_samples
+from .scene import Boats, Fixed, Memory, Tuning, Work, memory_of, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
@@ -53,16 +53,7 @@ def decide_games(
             margin_m[i] = error_m[i] if ours[b, i] else error_m[i] + late_m
             if ahead[i, L.HEADING] != state[b, i, L.HEADING]:
                 asked[i, 1] += state[b, i, L.HEADING] - ahead[i, L.HEADING]
-        own = Memory(
-            memory.kept[b],
-            memory.side[b],
-            memory.target_deg[b],
-            memory.speed_mps[b],
-            memory.margin_m[b],
-            memory.threat_m[b],
-            memory.fixed_m[b],
-            memory.escaping[b],
-        )
+        own = memory_of(memory, b)
         decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
         for i in range(n):
             sent[b, i] = wanted[b, i]

@@ -29,6 +29,8 @@ class ShieldConfig:
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         fixed_response_per_s: the same of margins from the edge, obstacles and circles.
+        give_way_after_s: time a team-mate alongside may keep a boat from turning where it wants before one of the
+            two gives way, s; inf never.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are reported as infinite, m, at most 50.
         tail_s: how long courses are run on straight beyond the horizon, s.
@@ -63,6 +65,7 @@ class ShieldConfig:
     response_per_s: float = 1.0
     table_response_per_s: float = 0.3
     fixed_response_per_s: float = 2.0
+    give_way_after_s: float = 3.0
     table_margin_m: float = 0.45
     margin_cap_m: float = 2.0
     tail_s: float = 5.0
@@ -125,7 +128,7 @@ _RANGES = {
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = _RATES | {"max_track_age_s"}
+_MAY_BE_INFINITE = _RATES | {"max_track_age_s", "give_way_after_s"}
 
 
 def _check_number(name: str, value: object) -> None:

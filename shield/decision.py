@@ -35,6 +35,8 @@ class Reason(IntEnum):
     """The wanted command was not finite or absurdly large; the boat is told to stop on its course."""
     NOT_COVERED = plan.NOT_COVERED
     """The shield does not decide for this boat."""
+    RIGHT_OF_WAY = plan.RIGHT_OF_WAY
+    """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
 
 
 FALLBACKS = {Reason.ESCAPE: "escape manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}

@@ -18,6 +18,7 @@ from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
+from .right_of_way import note_pressing
 from .scene import Boats, Fixed, Memory, Tuning, Work
 from .screening import lost, screen
 
@@ -32,7 +33,7 @@ LEAST_TURN_DEG = 1e-3
 
 
 @lean_kernel
-def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Work, plan: Plan) -> None:
+def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work, plan: Plan) -> None:
     """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
 
     Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
@@ -58,6 +59,7 @@ def commit(state: Array, ours: BoolArray, boats: Boats, memory: Memory, work: Wo
         else:
             memory.threat_m[i, :] = work.threat_m[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
+        note_pressing(i, state, ours, tuning, memory, work, plan)
 
 
 @lean_kernel
@@ -80,7 +82,7 @@ def finish(
     else:
         count = pick_movers(ours, work, plan)
         ladder(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-    commit(state, ours, boats, memory, work, plan)
+    commit(state, ours, boats, tuning, memory, work, plan)
 
 
 @lean_kernel

@@ -14,7 +14,7 @@ from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, only_fixed,
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
-from .linearised import check
+from .linearised import check, pick_movers
 from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn, full_turn
@@ -84,6 +84,33 @@ def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan
 
 
 @lean_kernel
+def _assign_escapes(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> bool:
+    """Escapes of the movers from the present state; whether all boats of ours then keep clear."""
+    look = 1
+    for m in range(count):
+        i = plan.movers[m]
+        work.target[i] = 0.0
+        work.threat_target_m[i, :] = 0.0
+        work.fixed_target_m[i] = 0.0
+        look = max(look, boats.look[i])
+    run_opponents(look, ours, state, boats, tuning, work, work.ways)
+    good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
+    run_opponents(1, ours, state, boats, tuning, work, work.ways)
+    return good
+
+
+@lean_kernel
 def ladder(
     count: int,
     state: Array,
@@ -103,19 +130,22 @@ def ladder(
     leaves a better worst margin than any escape is kept (reason QP_RELAXED). When only fixed things are at stake and
     no escape does better by them than the program's answer or the wanted command, that one is sent; an escape that
     keeps them is carried out only as far as they ask for, see `easing`.
+
+    Boats that passed have escapes that fit the others' after the wanted commands, maybe not those they had: where
+    an escape would bring a mover into one of them, that boat is a mover, too. All together had escapes that fit at the
+    last decision, and these are what is tried first.
     """
     before, eases = worst_merit(ours, work), only_fixed(ours, work)
-    look = 1
-    for m in range(count):
-        i = plan.movers[m]
-        work.target[i] = 0.0
-        work.threat_target_m[i, :] = 0.0
-        work.fixed_target_m[i] = 0.0
-        hold(i, plan.held, work)
-        look = max(look, boats.look[i])
-    run_opponents(look, ours, state, boats, tuning, work, work.ways)
-    good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
-    run_opponents(1, ours, state, boats, tuning, work, work.ways)
+    for i in range(ours.shape[0]):
+        if ours[i]:
+            hold(i, plan.held, work)
+    good = False
+    for _ in range(ours.shape[0]):
+        good = _assign_escapes(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        movers = count if good or worst_merit(ours, work) >= 0.0 else pick_movers(ours, work, plan)
+        if movers == count:
+            break
+        count = movers
     for m in range(count):
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)

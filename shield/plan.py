@@ -8,7 +8,7 @@ import numpy as np
 
 from .jit import Array, BoolArray, IntArray
 
-PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED = range(7)
+PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY = range(8)
 
 LARGEST_COMMAND = 1e6
 """Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""

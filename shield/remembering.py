@@ -53,7 +53,18 @@ def carry_over(old: Memory, new: Memory, stayed: Stayed, met: BoolArray) -> None
     it is asked for no more than a margin of 0, and its escape is kept.
     """
     now, then = stayed
-    for name in ("kept", "side", "target_deg", "speed_mps", "margin_m", "fixed_m", "escaping"):
+    for name in (
+        "kept",
+        "side",
+        "target_deg",
+        "speed_mps",
+        "margin_m",
+        "fixed_m",
+        "escaping",
+        "pressed_s",
+        "pressed_deg",
+        "gives_way",
+    ):
         getattr(new, name)[now] = getattr(old, name)[then]
     new.margin_m[met] = np.minimum(new.margin_m[met], 0.0)
     new.threat_m[np.ix_(now, now)] = old.threat_m[np.ix_(then, then)]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .certificates.clearance import N_CLEARANCE
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
 from .tables.lookup import Tables
 
@@ -108,6 +108,7 @@ class Tuning(NamedTuple):
         margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
+        give_way_after_s: time a boat is kept from turning by a team-mate alongside before one of them gives way, s.
     """
 
     dt_s: float
@@ -118,6 +119,7 @@ class Tuning(NamedTuple):
     margin_cap_m: float
     speed_weight: float
     fixed_decay: float
+    give_way_after_s: float
 
 
 class Memory(NamedTuple):
@@ -132,6 +134,11 @@ class Memory(NamedTuple):
         threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
         fixed_m: the same from fixed things, 0 where it was not looked at.
         escaping: whether the boat was carrying it out at the last decision.
+        pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
+            given way to it, see `right_of_way`.
+        pressed_deg: heading it had when that began.
+        blocked_by: that team-mate, -1 for none.
+        gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
     """
 
     kept: BoolArray
@@ -142,6 +149,10 @@ class Memory(NamedTuple):
     threat_m: Array
     fixed_m: Array
     escaping: BoolArray
+    pressed_s: Array
+    pressed_deg: Array
+    blocked_by: IntArray
+    gives_way: Array
 
 
 class Work(NamedTuple):
@@ -231,10 +242,39 @@ def path_samples(boats: Boats) -> int:
 
 def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
-    kept, escaping = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    target_deg, speed_mps, margin_m, fixed_m = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    threat_m = np.zeros((*shape, shape[-1]))
-    return Memory(kept, np.ones(shape), target_deg, speed_mps, margin_m, threat_m, fixed_m, escaping)
+    return Memory(
+        kept=np.zeros(shape, np.bool_),
+        side=np.ones(shape),
+        target_deg=np.zeros(shape),
+        speed_mps=np.zeros(shape),
+        margin_m=np.zeros(shape),
+        threat_m=np.zeros((*shape, shape[-1])),
+        fixed_m=np.zeros(shape),
+        escaping=np.zeros(shape, np.bool_),
+        pressed_s=np.zeros(shape),
+        pressed_deg=np.zeros(shape),
+        blocked_by=np.full(shape, -1, np.int64),
+        gives_way=np.zeros(shape),
+    )
+
+
+@kernel
+def memory_of(memory: Memory, game: int) -> Memory:
+    """Memory of one of many games, not copied."""
+    return Memory(
+        memory.kept[game],
+        memory.side[game],
+        memory.target_deg[game],
+        memory.speed_mps[game],
+        memory.margin_m[game],
+        memory.threat_m[game],
+        memory.fixed_m[game],
+        memory.escaping[game],
+        memory.pressed_s[game],
+        memory.pressed_deg[game],
+        memory.blocked_by[game],
+        memory.gives_way[game],
+    )
 
 
 def new_work(boats: int, samples: int) -> Work:

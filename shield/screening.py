@@ -11,6 +11,7 @@ from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L
 from .platforms.step import step_boat
 from .platforms.usv import wrap_degrees
+from .right_of_way import apply_right_of_way
 from .scene import Boats, Fixed, Memory, Tuning, Work
 from .tables.grid import CAP
 
@@ -82,6 +83,7 @@ def screen(
         if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
+        apply_right_of_way(i, state, ours, tuning, memory, work, plan)
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):

@@ -50,6 +50,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
         margin_cap_m=config.margin_cap_m,
         speed_weight=config.speed_weight,
         fixed_decay=_decay(config.fixed_response_per_s, config),
+        give_way_after_s=config.give_way_after_s,
     )
 
 

@@ -35,6 +35,7 @@ WHY = {
     Reason.BEST_EFFORT: ("best eff.", "bold red"),
     Reason.HELD: ("held", "magenta"),
     Reason.NOT_COVERED: ("-", "dim"),
+    Reason.RIGHT_OF_WAY: ("way", "cyan"),
 }
 
 

@@ -10,13 +10,12 @@ from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..deadlocks import DEADLOCK_S, deadlocks
 from ..jit import kernel
 from ..reversals import DEAD_BAND_DEG
 from .play import Film
 from .scenes import DT_S
 
-STILL_MPS = 0.2
-DEADLOCK_S = 10.0
 Columns = dict[str, NDArray[np.float64]]
 
 
@@ -79,37 +78,6 @@ def command_columns(state: Array, wanted: Array, sent: Array, team: IntArray, ou
                     side = now
 
 
-@kernel
-def deadlocks(state: Array, wanted: Array, team: IntArray, longest: int, out: Array) -> None:
-    """Count pairs of team-mates that both want to move and both stay below `STILL_MPS` for over ``longest`` steps.
-
-    Args:
-        state: (T+1, B, n, N_STATE).
-        wanted: (T, B, n, 2).
-        team: (n,).
-        longest: steps that are still no deadlock.
-        out: (B,) written.
-    """
-    n = state.shape[2]
-    for b in range(state.shape[1]):
-        out[b] = 0.0
-        still = np.zeros((n, n), np.int64)
-        for t in range(wanted.shape[0]):
-            for i in range(n):
-                if team[i] != 0:
-                    continue
-                stuck = state[t + 1, b, i, L.SPEED] < STILL_MPS and wanted[t, b, i, 0] > STILL_MPS
-                for j in range(i):
-                    if team[j] != 0:
-                        continue
-                    if stuck and state[t + 1, b, j, L.SPEED] < STILL_MPS and wanted[t, b, j, 0] > STILL_MPS:
-                        still[i, j] += 1
-                        if still[i, j] == longest + 1:
-                            out[b] += 1.0
-                    else:
-                        still[i, j] = 0
-
-
 def tally(film: Film) -> Columns:
     """Count for every game of a film.
 
@@ -124,7 +92,8 @@ def tally(film: Film) -> Columns:
     pairs, commands, stuck = np.empty((scenes.games, 4)), np.empty((scenes.games, 4)), np.empty(scenes.games)
     pair_columns(film.state, scenes.team, film.conditions.radius_m, pairs)
     command_columns(film.state, film.wanted, film.sent, scenes.team, commands)
-    deadlocks(film.state, film.wanted, scenes.team, round(DEADLOCK_S / DT_S), stuck)
+    speeds_mps = np.ascontiguousarray(film.state[1:, ..., L.SPEED]), np.ascontiguousarray(film.wanted[..., 0])
+    deadlocks(*speeds_mps, scenes.own, round(DEADLOCK_S / DT_S), stuck)
     boats, changed = scenes.own.sum(), np.where(commands[:, 0] > 0.0, commands[:, 0], np.nan)
     goal_s = film.first_goal_s[:, scenes.own]
     return {

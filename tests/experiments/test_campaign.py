@@ -135,11 +135,15 @@ def test_bars_judge_pairs_of_all_pairings(played):
     _, games = played
     rows = [{**hits(row, 10, 1), "captures": 4, "breaches_teammate_2.5m": 0} for row in games.rows]
     bars = ablation_bars(rows, 2.5)
-    assert [bar["met"] for bar in bars] == [True, True, True, True]
+    assert [bar["met"] for bar in bars] == [True, True, True, True, True]
     assert bars[1]["value"] == pytest.approx(0.1)
     worse = [{**hits(row, 10, 2), "captures": 3 if row["shielded"] else 4, "breaches_teammate_2.5m": 1} for row in rows]
-    assert [bar["met"] for bar in ablation_bars(worse, 2.5)] == [False, False, False, True]
+    assert [bar["met"] for bar in ablation_bars(worse, 2.5)] == [False, False, False, True, True]
     assert ablation_bars(worse, 2.5)[0]["value"] == 4
+    stuck = [{**row, "deadlocks": 1 if row["shielded"] else 0} for row in rows]
+    assert [bar["met"] for bar in ablation_bars(stuck, 2.5)] == [True, True, True, False, True]
+    older = [{name: value for name, value in row.items() if name != "deadlocks"} for row in rows]
+    assert len(ablation_bars(older, 2.5)) == 4
     nothing = [{**row, "captures": 0} for row in rows]
     assert ablation_bars(nothing, 2.5)[2]["met"] is None
     assert ablation_bars([row for row in rows if row["shielded"]], 2.5) == []

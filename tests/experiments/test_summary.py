@@ -31,6 +31,7 @@ def row(game, shielded, **columns):
         "decision_p50_us": 80.0 if shielded else None,
         "decision_p99_us": 200.0 if shielded else None,
         "reversals_per_boat_minute": 4.0,
+        "deadlocks": 1 if shielded else 0,
         "primary": 0.5,
         "secondary": 2.0,
         "reason_PASSED": 270 if shielded else 0,
@@ -135,3 +136,11 @@ def test_a_long_name_of_a_bar_takes_nothing_from_its_figures():
     for words in ("measured", "1,234 <= 0.00 not met", "1,234 <= 0.00 no data"):
         assert words in shown
     assert shown.split().count("words") == 12
+
+
+def test_a_column_that_rows_of_an_older_version_lack_counts_over_the_others():
+    rows = [row(0, True), row(1, True)]
+    del rows[1]["deadlocks"]
+    assert summarise(rows, (2.5, 4.0))["metrics"]["deadlocks"]["on"]["value"] == pytest.approx(1.0)
+    del rows[0]["deadlocks"]
+    assert math.isnan(summarise(rows, (2.5, 4.0))["metrics"]["deadlocks"]["on"]["value"])

@@ -9,7 +9,7 @@ from steerclear.experiments.score import check_penalty, scores
 from steerclear.experiments.tally import reason_counts, tally
 from steerclear.shield.exceptions import ConfigError
 
-REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED"]
+REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
 
 def record_of(position, shielded=True, **arrays):
@@ -97,6 +97,14 @@ def test_reversals_are_per_boat_and_minute(crossing):
     sent[:, 0, 1] = [30, -30, 30, 30]
     counts = tally(record_of(crossing, sent=sent), 0)
     assert counts["reversals_per_boat_minute"] == pytest.approx(2 / (2 * 4 * 0.1 / 60))
+
+
+def test_deadlocks_are_those_of_the_own_team(crossing):
+    record = record_of(np.repeat(crossing[:1], 102, axis=0))
+    record["wanted"][..., 0], record["speed_mps"][:] = 1.0, 0.1
+    assert tally(record, 0)["deadlocks"] == tally(record, 1)["deadlocks"] == 1
+    record["speed_mps"][50, 0] = 1.0
+    assert (tally(record, 0)["deadlocks"], tally(record, 1)["deadlocks"]) == (0, 1)
 
 
 def test_reasons_are_counted_for_covered_boats_only(crossing):

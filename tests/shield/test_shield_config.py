@@ -25,7 +25,13 @@ NOT_ZERO = [
     "hunt_s",
 ]
 MAY_BE_NONE = ["horizon_s", "hunt_s", "edge_m"]
-MAY_BE_INFINITE = ["response_per_s", "table_response_per_s", "fixed_response_per_s", "max_track_age_s"]
+MAY_BE_INFINITE = [
+    "response_per_s",
+    "table_response_per_s",
+    "fixed_response_per_s",
+    "give_way_after_s",
+    "max_track_age_s",
+]
 
 
 @pytest.mark.parametrize("name", NUMBERS)

@@ -10,7 +10,7 @@ from steerclear.experiments.encounters.measure import chunks, measure_chunk, wor
 from steerclear.experiments.encounters.scene_file import read_scene, write_scene
 from steerclear.experiments.encounters.start import start_certificate_m
 from steerclear.experiments.encounters.summary import summarise, upper_bound
-from steerclear.experiments.encounters.tally import deadlocks, tally
+from steerclear.experiments.encounters.tally import tally
 from steerclear.experiments.encounters.verdicts import SIDES, VERDICT_COLUMNS, judge_game, judge_worst
 from steerclear.experiments.reversals import count_reversals
 from steerclear.shield.exceptions import ConfigError
@@ -54,18 +54,6 @@ def test_changes_are_counted_and_averaged_over_changed_steps():
     assert counted["changed_share"][0] == pytest.approx(0.5)
     assert counted["heading_change_deg"][0] == pytest.approx(2.5)
     assert counted["speed_change_mps"][0] == pytest.approx(0.25)
-
-
-@pytest.mark.parametrize(
-    ("steps", "speed", "wish", "expected"),
-    [(101, 0.1, 1.0, 1), (100, 0.1, 1.0, 0), (101, 0.3, 1.0, 0), (101, 0.1, 0.0, 0)],
-)
-def test_a_deadlock_is_two_mates_that_want_to_move_and_do_not_for_ten_seconds(steps, speed, wish, expected):
-    state, wanted = np.zeros((steps + 1, 1, 3, L.N_STATE)), np.zeros((steps, 1, 3, 2))
-    state[:, :, :2, L.SPEED], state[:, :, 2, L.SPEED], wanted[..., 0] = speed, 0.0, wish
-    out = np.zeros(1)
-    deadlocks(state, wanted, np.array([0, 0, 1]), 100, out)
-    assert out[0] == expected
 
 
 def test_the_worst_variant_of_each_encounter_counts():

@@ -1,0 +1,134 @@
+"""Right of way among team-mates: of two that keep each other from turning, one turns away and one stands on.
+
+Two boats on all but the same course, each wanting to go where the other is, keep each other from turning for as long as
+both press: every decision is safe, and neither ever gets anywhere. Symmetry is broken as the rules of the road do, by
+what each can see of the other: who is behind, or has the other on its starboard side, gives way and turns away; the
+other stands on, holding its course. The shield checks these commands as any others.
+
+That robots behind barriers block each other, and that consistent sides resolve it: Wang, Ames, Egerstedt, "Safety
+barrier certificates for collisions-free multirobot systems", IEEE T-RO 33(3), 2017.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .jit import Array, BoolArray, lean_kernel
+from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan
+from .platforms import layout as L
+from .platforms.usv import wrap_degrees
+from .scene import Memory, Tuning, Work
+
+NEAR_M = 2.0
+"""Distance beyond what is to be kept within which a team-mate is alongside, m."""
+ALIKE_DEG = 45.0
+"""Courses that differ by no more are all but the same."""
+PRESSING_DEG = 15.0
+"""A smaller turn wanted is steady steering."""
+TURNED_DEG = 20.0
+"""A boat that has turned so far to the side it wants is not kept from turning."""
+AWAY_DEG = 120.0
+"""Turn commanded to the boat that gives way."""
+ABREAST_M = 1.0
+"""Who is behind by no more is abreast, m."""
+CLEAR_M = 3.0
+"""Distance beyond what is to be kept from which who gave way is clear of the other, m."""
+LONGEST_S = 20.0
+"""Longest time a boat gives way, s."""
+STILL_MPS = 0.2
+"""A boat that wants no more than this does not want to go anywhere."""
+PATIENCE = 3.0
+"""Times as long as others a boat that has the right of way presses before it gives way nevertheless."""
+
+
+@lean_kernel
+def _alongside(i: int, turn_deg: float, state: Array, ours: BoolArray, work: Work) -> int:
+    """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
+    found, least = -1, math.inf
+    east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
+    for j in range(ours.shape[0]):
+        if j == i or not ours[j] or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG:
+            continue
+        dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
+        gap, starboard = math.sqrt(dx * dx + dy * dy), dx * north - dy * east
+        if starboard * turn_deg > 0.0 and gap < work.radius[i, j] + NEAR_M and gap < least:
+            found, least = j, gap
+    return found
+
+
+@lean_kernel
+def _stands_on(i: int, j: int, state: Array) -> bool:
+    """Whether boat i is ahead of j, or abreast of it on its starboard side."""
+    east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
+    dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
+    ahead = dx * east + dy * north
+    if abs(ahead) > ABREAST_M:
+        return ahead < 0.0
+    return dx * north - dy * east < 0.0
+
+
+@lean_kernel
+def _who_blocks(
+    i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, memory: Memory, work: Work
+) -> int:
+    """Team-mate that still keeps boat i from turning as it wants; -1 for none."""
+    if not memory.kept[i] or memory.pressed_s[i] <= 0.0 or speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
+        return -1
+    turned_deg = wrap_degrees(state[i, L.HEADING] - memory.pressed_deg[i])
+    if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
+        return -1
+    return _alongside(i, turn_deg, state, ours, work)
+
+
+@lean_kernel
+def _goes_on(
+    i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, memory: Memory, work: Work
+) -> bool:
+    """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
+    j = memory.blocked_by[i]
+    if memory.gives_way[i] == 0.0 or j < 0 or not ours[j] or not memory.kept[i] or speed_mps <= STILL_MPS:
+        return False
+    gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+    return (
+        turn_deg * memory.gives_way[i] < 0.0 and gap < work.radius[i, j] + CLEAR_M and memory.pressed_s[i] < LONGEST_S
+    )
+
+
+@lean_kernel
+def apply_right_of_way(
+    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+) -> None:
+    """Replace the wanted command of boat i where it has been kept from turning for long enough."""
+    speed_mps, turn_deg = plan.commands[i, 0], wrap_degrees(plan.commands[i, 1])
+    if _goes_on(i, turn_deg, speed_mps, state, ours, memory, work):
+        memory.pressed_s[i] += tuning.dt_s
+    else:
+        memory.gives_way[i] = 0.0
+        j = _who_blocks(i, turn_deg, speed_mps, state, ours, memory, work)
+        memory.blocked_by[i] = j
+        if j < 0:
+            memory.pressed_s[i] = 0.0
+            return
+        stands_on = _stands_on(i, j, state)
+        if not (stands_on and memory.gives_way[j] != 0.0):
+            memory.pressed_s[i] += tuning.dt_s
+        if memory.pressed_s[i] < tuning.give_way_after_s:
+            return
+        if not stands_on or memory.pressed_s[i] >= PATIENCE * tuning.give_way_after_s:
+            memory.gives_way[i], memory.pressed_s[i] = -math.copysign(1.0, turn_deg), tuning.dt_s
+    plan.commands[i, 1] = AWAY_DEG * memory.gives_way[i]
+    plan.reason[i] = RIGHT_OF_WAY
+
+
+@lean_kernel
+def note_pressing(
+    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+) -> None:
+    """Note since when, and on what heading, boat i is kept from turning: since a team-mate had its command changed."""
+    if plan.reason[i] == RIGHT_OF_WAY:
+        work.bound[i] = memory.blocked_by[i]
+        return
+    j = work.bound[i]
+    if plan.reason[i] >= QP and plan.reason[i] <= BEST_EFFORT and j >= 0 and ours[j] and memory.pressed_s[i] == 0.0:
+        memory.pressed_s[i] = tuning.dt_s
+        memory.pressed_deg[i] = state[i, L.HEADING]

@@ -1,0 +1,130 @@
+"""Team-mates that keep each other from turning: one gives way, and both get where they want."""
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed, sail, sail_games
+from shield_scenes import fleet_of
+from steerclear.shield import Reason, Shield, ShieldConfig
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+
+ARRIVED_M = 4.0
+
+
+def to_the_other_side(platform, boats, radius_m, steps, **settings):
+    """Boats from rest on a circle, each wanting to go where the opposite one is; (games, boats) times of arrival, s."""
+    angle = 2.0 * np.pi * np.arange(boats) / boats + np.array([[0.0], [1.0]])
+    start = radius_m * np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    state = np.zeros((2, boats, L.N_STATE))
+    state[..., : L.Y + 1], state[..., L.HEADING], state[..., L.THRUST] = start, np.degrees(angle) - 180.0, np.nan
+    for game in state:
+        fill(game, packed([platform] * boats))
+    at_s, top = np.full((2, boats), np.inf), get_platform(platform).max_speed_mps
+
+    def wanted(step, now):
+        way = -start - now[..., : L.Y + 1]
+        near = np.hypot(way[..., 0], way[..., 1]) < ARRIVED_M
+        at_s[near & np.isinf(at_s)] = 0.1 * step
+        error = np.degrees(np.arctan2(way[..., 0], way[..., 1])) - now[..., L.HEADING]
+        return np.stack([np.full(error.shape, top), (error + 180.0) % 360.0 - 180.0], axis=-1)
+
+    run = sail_games(ShieldConfig(**settings), state, [platform] * boats, [0] * boats, wanted, steps)
+    return at_s, run
+
+
+def test_boats_that_cross_in_the_middle_all_arrive():
+    never, _ = to_the_other_side("surveyor", 3, 80.0, 1500, give_way_after_s=np.inf)
+    assert np.isinf(never).any(), "without anybody giving way two sail on side by side: or this test shows nothing"
+    at_s, run = to_the_other_side("surveyor", 3, 80.0, 1200)
+    assert at_s.max() < 115.0
+    assert run.closest(np.ones(3, bool)).min() >= 2.5
+    assert (run.reason == Reason.RIGHT_OF_WAY).any()
+
+
+def abreast(platform="heron", starboard_m=2.7, ahead_m=0.0):
+    """Two boats of ours heading north, the second to starboard of the first and so much ahead."""
+    top = get_platform(platform).max_speed_mps
+    return fleet_of([(0.0, 0.0, 0.0, top), (starboard_m, ahead_m, 0.0, top)], [0, 0], platform)
+
+
+def press_together(fleet, steps, turns=(90.0, -90.0), **settings):
+    top = get_platform(fleet.platforms[0]).max_speed_mps
+    shield = Shield(ShieldConfig(**settings))
+
+    def wanted(step, state):
+        error = np.array(turns) - state[:, L.HEADING]
+        return np.stack([np.full(2, top), (error + 180.0) % 360.0 - 180.0], axis=-1)
+
+    return sail(shield, fleet, wanted, steps)
+
+
+def roles(run):
+    """(T, n) whether each boat gives way, and whether it stands on."""
+    ruled = run.reason == Reason.RIGHT_OF_WAY
+    return ruled & (run.sent[..., 1] != 0.0), ruled & (run.sent[..., 1] == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("starboard_m", "ahead_m", "who"),
+    [(2.7, 0.0, 0), (-2.7, 0.0, 1), (2.7, -1.6, 1), (-2.7, -1.6, 1), (-2.7, 1.6, 0)],
+)
+def test_who_is_behind_or_has_the_other_to_starboard_gives_way(starboard_m, ahead_m, who):
+    sides = (90.0, -90.0) if starboard_m > 0 else (-90.0, 90.0)
+    run = press_together(abreast("heron", starboard_m, ahead_m), 120, sides)
+    gives_way, _ = roles(run)
+    first = np.flatnonzero(gives_way.any(axis=1))[0]
+    assert 25 <= first <= 60
+    assert gives_way[first].tolist() == [who == 0, who == 1]
+    assert np.sign(run.sent[first, who, 1]) == -np.sign(sides[who]), "away from the other"
+    assert run.closest(np.ones(2, bool)) >= 2.5
+    way_m = run.position[-1, :, 0] - run.position[0, :, 0]
+    assert (way_m * np.sign(sides) > 2.5).all(), "both get to where they want"
+
+
+def test_one_beside_a_boat_that_just_goes_straight_on_passes_it():
+    run = press_together(abreast(ahead_m=-1.6), 200, (90.0, 0.0))
+    gives_way, stands_on = roles(run)
+    assert gives_way[:, 0].any()
+    assert run.position[-1, 0, 0] > run.position[-1, 1, 0] + 2.5
+    assert not (gives_way | stands_on)[:, 1].any()
+
+
+def test_the_decision_names_the_other():
+    fleet, shield, found = abreast(), Shield(), []
+
+    def wanted(step, state):
+        return np.stack([np.full(2, 2.0), np.array([90.0, -90.0]) - state[:, L.HEADING]], axis=-1)
+
+    decide = shield.decide
+
+    def listen(*args):
+        found.append(decide(*args))
+        return found[-1]
+
+    shield.decide = listen
+    sail(shield, fleet, wanted, 60)
+    said = [decision for decisions in found for decision in decisions if decision.reason is Reason.RIGHT_OF_WAY]
+    assert said
+    assert all({decision.boat, *decision.binding} == {*fleet.names} for decision in said)
+    assert all(decision.intervened and decision.certificate_m >= 0.0 for decision in said)
+
+
+def test_it_can_be_switched_off():
+    run = press_together(abreast(), 200, give_way_after_s=np.inf)
+    assert not (run.reason == Reason.RIGHT_OF_WAY).any()
+
+
+def test_a_formation_that_turns_together_is_left_alone():
+    """The outer boat wants to turn towards the inner one for ever, and does: nobody keeps it from turning."""
+    fleet = abreast(starboard_m=4.2)
+    run = sail(Shield(), fleet, lambda step, state: np.tile([2.0, 20.0], (2, 1)), 300)
+    assert not (run.reason == Reason.RIGHT_OF_WAY).any()
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_boats_that_cannot_talk_agree_on_who_gives_way(coordination):
+    gives_way, stands_on = roles(press_together(abreast(), 120, coordination=coordination))
+    assert gives_way[:, 0].any()
+    assert not gives_way[:, 1].any()
+    assert not stands_on[:, 0].any()
+    assert stands_on[:, 1].any() == (coordination == "per_boat"), "told of the other's turn, nothing is in its way"
