@@ -131,8 +131,8 @@ class BatchedShield:
             ours: (B, n) boats to decide for.
 
         Returns:
-            (B, n, 2) commands; rows of boats not decided for, and safe ones, bit for bit as wanted. The array is
-            reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why.
+            (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
+            array is reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why.
 
         Raises:
             FleetError: an array has the wrong shape or a state is not finite.

@@ -116,7 +116,7 @@ class ShieldConfig:
 
 _TEXTS = {"certificate", "coordination", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
-_POSITIVE = _RATES | {"separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
+_POSITIVE = _RATES | {"give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 1.0),

@@ -14,8 +14,8 @@ from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, only_fixed,
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
-from .linearised import check, pick_movers
-from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, Plan
+from .linearised import check, list_movers
+from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, RIGHT_OF_WAY, Plan, unchanged
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn, full_turn
 from .scene import Boats, Fixed, Memory, Tuning, Work
@@ -25,12 +25,6 @@ CLEARLY = 1e-2
 
 WORSE_BY_FIXED = 1e-6
 """The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
-
-
-@lean_kernel
-def unchanged(i: int, plan: Plan) -> bool:
-    """Whether boat i's command is the wanted one, bit for bit."""
-    return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
 
 
 @lean_kernel
@@ -57,7 +51,7 @@ def mark_relaxed(count: int, state: Array, boats: Boats, fixed: Fixed, work: Wor
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
         i = plan.movers[m]
-        if plan.reason[i] == PASSED or not unchanged(i, plan):
+        if plan.reason[i] == PASSED or plan.reason[i] == RIGHT_OF_WAY or not unchanged(i, plan):
             plan.reason[i] = QP_RELAXED
         plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
 
@@ -81,6 +75,16 @@ def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan
     side, togo = work.plan[i, 0], work.plan[i, 1]
     plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
     plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
+
+
+@lean_kernel
+def _join(ours: BoolArray, work: Work, plan: Plan) -> int:
+    """Make movers of the boats that passed and whose escapes come too near to those of movers; the movers there are."""
+    for i in range(ours.shape[0]):
+        j = work.bound[i]
+        if ours[i] and work.merit[i] < 0.0 and j >= 0 and ours[j]:
+            plan.moving[i] = plan.moving[j] = plan.moving[i] or plan.moving[j]
+    return list_movers(plan)
 
 
 @lean_kernel
@@ -142,7 +146,7 @@ def ladder(
     good = False
     for _ in range(ours.shape[0]):
         good = _assign_escapes(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        movers = count if good or worst_merit(ours, work) >= 0.0 else pick_movers(ours, work, plan)
+        movers = count if good else _join(ours, work, plan)
         if movers == count:
             break
         count = movers

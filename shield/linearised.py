@@ -34,8 +34,14 @@ def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
             j = work.bound[i]
             if j >= 0 and ours[j]:
                 plan.moving[j] = True
+    return list_movers(plan)
+
+
+@lean_kernel
+def list_movers(plan: Plan) -> int:
+    """List the boats marked as movers, and number them; returns how many they are."""
     count = 0
-    for i in range(n):
+    for i in range(plan.moving.shape[0]):
         plan.place[i] = -1
         if plan.moving[i]:
             plan.movers[count], plan.place[i] = i, count

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray, IntArray, lean_kernel
 
 PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY = range(8)
 
@@ -66,3 +66,9 @@ def new_plan(boats: int, rows: int) -> Plan:
         slack_m=np.zeros(boats),
         reason=np.zeros(boats, np.int64),
     )
+
+
+@lean_kernel
+def unchanged(i: int, plan: Plan) -> bool:
+    """Whether boat i's command is the wanted one, bit for bit."""
+    return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]

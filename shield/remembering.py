@@ -11,6 +11,21 @@ from .jit import Array, BoolArray, IntArray
 from .platforms import Platform
 from .scene import Boats, Memory, Tuning
 
+_OWN = (
+    "kept",
+    "side",
+    "target_deg",
+    "speed_mps",
+    "margin_m",
+    "fixed_m",
+    "escaping",
+    "pressed_s",
+    "pressed_deg",
+    "free_s",
+    "gives_way",
+)
+"""What is remembered of a boat alone."""
+
 
 class Known(NamedTuple):
     """Who the boats of the last decision were; two fleets that agree in this share their memory."""
@@ -53,19 +68,11 @@ def carry_over(old: Memory, new: Memory, stayed: Stayed, met: BoolArray) -> None
     it is asked for no more than a margin of 0, and its escape is kept.
     """
     now, then = stayed
-    for name in (
-        "kept",
-        "side",
-        "target_deg",
-        "speed_mps",
-        "margin_m",
-        "fixed_m",
-        "escaping",
-        "pressed_s",
-        "pressed_deg",
-        "gives_way",
-    ):
+    for name in _OWN:
         getattr(new, name)[now] = getattr(old, name)[then]
+    place = np.full(len(old.blocked_by) + 1, -1)  # the last for nobody
+    place[then] = now
+    new.blocked_by[now] = place[old.blocked_by[then]]
     new.margin_m[met] = np.minimum(new.margin_m[met], 0.0)
     new.threat_m[np.ix_(now, now)] = old.threat_m[np.ix_(then, then)]
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from .jit import Array, BoolArray, lean_kernel
-from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan
+from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan, unchanged
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .scene import Memory, Tuning, Work
@@ -27,6 +27,8 @@ PRESSING_DEG = 15.0
 """A smaller turn wanted is steady steering."""
 TURNED_DEG = 20.0
 """A boat that has turned so far to the side it wants is not kept from turning."""
+FREE_S = 1.0
+"""A boat whose wanted command has passed for longer is not kept from turning, s."""
 AWAY_DEG = 120.0
 """Turn commanded to the boat that gives way."""
 ABREAST_M = 1.0
@@ -42,9 +44,11 @@ PATIENCE = 3.0
 
 
 @lean_kernel
-def _alongside(i: int, turn_deg: float, state: Array, ours: BoolArray, work: Work) -> int:
+def _alongside(i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, work: Work) -> int:
     """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
     found, least = -1, math.inf
+    if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
+        return found
     east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
     for j in range(ours.shape[0]):
         if j == i or not ours[j] or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG:
@@ -58,8 +62,12 @@ def _alongside(i: int, turn_deg: float, state: Array, ours: BoolArray, work: Wor
 
 @lean_kernel
 def _stands_on(i: int, j: int, state: Array) -> bool:
-    """Whether boat i is ahead of j, or abreast of it on its starboard side."""
-    east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
+    """Whether boat i is ahead of j, or abreast to starboard of it, by their mean course: j says the opposite."""
+    own, other = math.radians(state[i, L.HEADING]), math.radians(state[j, L.HEADING])
+    east, north = math.sin(own) + math.sin(other), math.cos(own) + math.cos(other)
+    length = math.sqrt(east * east + north * north)
+    if length > 0.0:
+        east, north = east / length, north / length
     dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
     ahead = dx * east + dy * north
     if abs(ahead) > ABREAST_M:
@@ -72,12 +80,12 @@ def _who_blocks(
     i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, memory: Memory, work: Work
 ) -> int:
     """Team-mate that still keeps boat i from turning as it wants; -1 for none."""
-    if not memory.kept[i] or memory.pressed_s[i] <= 0.0 or speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
+    if not memory.kept[i] or memory.pressed_s[i] <= 0.0 or memory.free_s[i] > FREE_S:
         return -1
     turned_deg = wrap_degrees(state[i, L.HEADING] - memory.pressed_deg[i])
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
-    return _alongside(i, turn_deg, state, ours, work)
+    return _alongside(i, turn_deg, speed_mps, state, ours, work)
 
 
 @lean_kernel
@@ -86,12 +94,30 @@ def _goes_on(
 ) -> bool:
     """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
     j = memory.blocked_by[i]
-    if memory.gives_way[i] == 0.0 or j < 0 or not ours[j] or not memory.kept[i] or speed_mps <= STILL_MPS:
+    if j < 0 or not ours[j] or not memory.kept[i] or speed_mps <= STILL_MPS or memory.pressed_s[i] >= LONGEST_S:
         return False
     gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
-    return (
-        turn_deg * memory.gives_way[i] < 0.0 and gap < work.radius[i, j] + CLEAR_M and memory.pressed_s[i] < LONGEST_S
-    )
+    return turn_deg * memory.gives_way[i] < 0.0 and gap < work.radius[i, j] + CLEAR_M
+
+
+@lean_kernel
+def _press(
+    i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work
+) -> None:
+    """Go on counting how long boat i has been kept from turning, and decide whether it gives way."""
+    j = _who_blocks(i, turn_deg, speed_mps, state, ours, memory, work)
+    if j < 0:
+        memory.pressed_s[i] = 0.0
+    elif j != memory.blocked_by[i]:
+        memory.pressed_s[i] = tuning.dt_s
+    memory.blocked_by[i] = j
+    if j < 0:
+        return
+    if memory.gives_way[j] != 0.0 and memory.blocked_by[j] == i:
+        return
+    memory.pressed_s[i] += tuning.dt_s
+    if memory.pressed_s[i] >= tuning.give_way_after_s * (PATIENCE if _stands_on(i, j, state) else 1.0):
+        memory.gives_way[i], memory.pressed_s[i] = -math.copysign(1.0, turn_deg), tuning.dt_s
 
 
 @lean_kernel
@@ -100,22 +126,14 @@ def apply_right_of_way(
 ) -> None:
     """Replace the wanted command of boat i where it has been kept from turning for long enough."""
     speed_mps, turn_deg = plan.commands[i, 0], wrap_degrees(plan.commands[i, 1])
-    if _goes_on(i, turn_deg, speed_mps, state, ours, memory, work):
+    if memory.gives_way[i] != 0.0 and not _goes_on(i, turn_deg, speed_mps, state, ours, memory, work):
+        memory.gives_way[i], memory.pressed_s[i] = 0.0, 0.0
+    if memory.gives_way[i] != 0.0:
         memory.pressed_s[i] += tuning.dt_s
     else:
-        memory.gives_way[i] = 0.0
-        j = _who_blocks(i, turn_deg, speed_mps, state, ours, memory, work)
-        memory.blocked_by[i] = j
-        if j < 0:
-            memory.pressed_s[i] = 0.0
+        _press(i, turn_deg, speed_mps, state, ours, tuning, memory, work)
+        if memory.gives_way[i] == 0.0 and memory.pressed_s[i] < tuning.give_way_after_s:
             return
-        stands_on = _stands_on(i, j, state)
-        if not (stands_on and memory.gives_way[j] != 0.0):
-            memory.pressed_s[i] += tuning.dt_s
-        if memory.pressed_s[i] < tuning.give_way_after_s:
-            return
-        if not stands_on or memory.pressed_s[i] >= PATIENCE * tuning.give_way_after_s:
-            memory.gives_way[i], memory.pressed_s[i] = -math.copysign(1.0, turn_deg), tuning.dt_s
     plan.commands[i, 1] = AWAY_DEG * memory.gives_way[i]
     plan.reason[i] = RIGHT_OF_WAY
 
@@ -124,11 +142,17 @@ def apply_right_of_way(
 def note_pressing(
     i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
 ) -> None:
-    """Note since when, and on what heading, boat i is kept from turning: since a team-mate had its command changed."""
+    """Note since when, on what heading, boat i is kept from turning: its turn towards a team-mate was changed."""
     if plan.reason[i] == RIGHT_OF_WAY:
-        work.bound[i] = memory.blocked_by[i]
+        work.bound[i], memory.free_s[i] = memory.blocked_by[i], 0.0
         return
+    memory.free_s[i] += tuning.dt_s
     j = work.bound[i]
-    if plan.reason[i] >= QP and plan.reason[i] <= BEST_EFFORT and j >= 0 and ours[j] and memory.pressed_s[i] == 0.0:
+    if plan.reason[i] < QP or plan.reason[i] > BEST_EFFORT or j < 0 or not ours[j] or unchanged(i, plan):
+        return
+    if _alongside(i, wrap_degrees(plan.kept_commands[i, 1]), plan.kept_commands[i, 0], state, ours, work) < 0:
+        return
+    memory.free_s[i] = 0.0
+    if memory.pressed_s[i] == 0.0:
         memory.pressed_s[i] = tuning.dt_s
         memory.pressed_deg[i] = state[i, L.HEADING]

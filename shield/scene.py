@@ -137,6 +137,7 @@ class Memory(NamedTuple):
         pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
             given way to it, see `right_of_way`.
         pressed_deg: heading it had when that began.
+        free_s: time since it was last kept from it, s.
         blocked_by: that team-mate, -1 for none.
         gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
     """
@@ -151,6 +152,7 @@ class Memory(NamedTuple):
     escaping: BoolArray
     pressed_s: Array
     pressed_deg: Array
+    free_s: Array
     blocked_by: IntArray
     gives_way: Array
 
@@ -253,6 +255,7 @@ def new_memory(*shape: int) -> Memory:
         escaping=np.zeros(shape, np.bool_),
         pressed_s=np.zeros(shape),
         pressed_deg=np.zeros(shape),
+        free_s=np.zeros(shape),
         blocked_by=np.full(shape, -1, np.int64),
         gives_way=np.zeros(shape),
     )
@@ -272,6 +275,7 @@ def memory_of(memory: Memory, game: int) -> Memory:
         memory.escaping[game],
         memory.pressed_s[game],
         memory.pressed_deg[game],
+        memory.free_s[game],
         memory.blocked_by[game],
         memory.gives_way[game],
     )

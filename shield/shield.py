@@ -46,8 +46,9 @@ class _Seat:
 class Shield:
     """Filters commanded heading and speed so that boats keep their distance.
 
-    Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it, and otherwise
-    the least change that keeps one,
+    Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it (and no two
+    team-mates have kept each other from turning for seconds, see `right_of_way`), and otherwise the least change that
+    keeps one,
 
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 

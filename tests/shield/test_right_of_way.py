@@ -1,10 +1,12 @@
 """Team-mates that keep each other from turning: one gives way, and both get where they want."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from shield_loops import fill, packed, sail, sail_games
+from shield_loops import fill, packed, sail, sail_games, step_all
 from shield_scenes import fleet_of
-from steerclear.shield import Reason, Shield, ShieldConfig
+from steerclear.shield import Commands, Reason, Shield, ShieldConfig
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
@@ -112,6 +114,60 @@ def test_the_decision_names_the_other():
 def test_it_can_be_switched_off():
     run = press_together(abreast(), 200, give_way_after_s=np.inf)
     assert not (run.reason == Reason.RIGHT_OF_WAY).any()
+
+
+@pytest.mark.parametrize("thrust", [20.0, 100.0])
+def test_a_boat_that_turns_slowly_but_turns_is_left_alone(thrust):
+    """Its turn was changed once, by a team-mate that then made room: from then on what it wants passes."""
+    fleet = abreast("surveyor", starboard_m=4.3)
+    state = fleet.state.copy()
+    state[:, L.THRUST], state[:, L.SPEED] = thrust, 3.0
+    fleet = replace(fleet, state=state)
+
+    def wanted(step, now):
+        error = np.array([60.0, 60.0 if step > 5 else -60.0]) - now[:, L.HEADING]
+        return np.stack([np.full(2, 3.0), error], axis=-1)
+
+    run = sail(Shield(), fleet, wanted, 150)
+    changed = (run.reason >= Reason.QP) & (run.reason <= Reason.BEST_EFFORT)
+    after = np.flatnonzero(changed[:, 0])[-1] if changed[:, 0].any() else 0
+    assert not (run.reason == Reason.RIGHT_OF_WAY)[after + 10 :].any()
+
+
+def test_boats_that_come_and_go_far_away_change_nothing_about_who_gives_way():
+    near = abreast()
+    far = fleet_of([(0, 0, 0, 2), (2.7, 0, 0, 2), (400, 400, 0, 2)], [0, 0, 1], names=[*near.names, "far"])
+    runs = []
+    for others in (False, True):
+        shield, state, reasons = Shield(), near.state.copy(), []
+        fill(state, packed(near.platforms))
+        for step in range(120):
+            turns = np.array([90.0, -90.0]) - state[:, L.HEADING]
+            commands = np.stack([np.full(2, 2.0), (turns + 180.0) % 360.0 - 180.0], axis=-1)
+            fleet = replace(near, state=state.copy())
+            if others and step % 2:
+                fleet = replace(far, state=np.concatenate([state, far.state[2:]]))
+                commands = np.concatenate([commands, [[2.0, 0.0]]])
+            decisions = shield.decide(fleet, Commands.relative_deg(commands))
+            step_all(packed(near.platforms), state[None], decisions.sent.values[None, :2], 0.1)
+            reasons.append(decisions.reason[:2].copy())
+        runs.append((np.array(reasons), state))
+    assert (runs[0][0] == Reason.RIGHT_OF_WAY).any()
+    np.testing.assert_array_equal(runs[0][0], runs[1][0])
+    np.testing.assert_array_equal(runs[0][1], runs[1][1])
+
+
+def test_three_abreast_that_press_inwards_all_get_where_they_want():
+    top = get_platform("heron").max_speed_mps
+    fleet = fleet_of([(0, 0, 0, top), (2.8, 0, 0, top), (5.6, 0, 0, top)], [0, 0, 0], "heron")
+
+    def wanted(step, state):
+        error = np.array([90.0, 0.0, -90.0]) - state[:, L.HEADING]
+        return np.stack([np.full(3, top), (error + 180.0) % 360.0 - 180.0], axis=-1)
+
+    run = sail(Shield(), fleet, wanted, 300)
+    assert run.closest(np.ones(3, bool)) >= 2.5
+    assert run.position[-1, 0, 0] > run.position[-1, 2, 0] + 10.0
 
 
 def test_a_formation_that_turns_together_is_left_alone():
