@@ -20,6 +20,7 @@ NOT_ZERO = [
     "response_per_s",
     "table_response_per_s",
     "fixed_response_per_s",
+    "give_way_after_s",
     "speed_weight",
     "horizon_s",
     "hunt_s",
