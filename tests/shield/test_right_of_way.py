@@ -151,10 +151,10 @@ def test_it_can_be_switched_off():
     assert not (run.reason == Reason.RIGHT_OF_WAY).any()
 
 
-@pytest.mark.parametrize("thrust", [20.0, 100.0])
-def test_a_boat_that_turns_slowly_but_turns_is_left_alone(thrust):
+@pytest.mark.parametrize(("thrust", "starboard_m"), [(20.0, 3.6), (100.0, 4.3), (100.0, 3.0)])
+def test_a_boat_that_turns_slowly_but_turns_is_left_alone(thrust, starboard_m):
     """Its turn was changed once, by a team-mate that then made room: from then on what it wants passes."""
-    fleet = abreast("surveyor", starboard_m=4.3)
+    fleet = abreast("surveyor", starboard_m=starboard_m)
     state = fleet.state.copy()
     state[:, L.THRUST], state[:, L.SPEED] = thrust, 3.0
     fleet = replace(fleet, state=state)
@@ -165,8 +165,8 @@ def test_a_boat_that_turns_slowly_but_turns_is_left_alone(thrust):
 
     run = sail(Shield(), fleet, wanted, 150)
     changed = (run.reason >= Reason.QP) & (run.reason <= Reason.BEST_EFFORT)
-    after = np.flatnonzero(changed[:, 0])[-1] if changed[:, 0].any() else 0
-    assert not (run.reason == Reason.RIGHT_OF_WAY)[after + 10 :].any()
+    assert changed[:, 0].any(), "or nothing began that could have gone on"
+    assert not (run.reason == Reason.RIGHT_OF_WAY).any()
 
 
 def test_boats_that_come_and_go_far_away_change_nothing_about_who_gives_way():
