@@ -8,6 +8,7 @@ import numpy as np
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms.layout import N_STATE
+from steerclear.shield.shared import share
 
 from .config import GameConfig
 from .field import FieldGeometry
@@ -84,31 +85,33 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
     """Pack a config and its field for compiled code."""
     platforms = [get_platform(name) for name in config.platforms]
     reward = config.reward
-    return Rules(
-        n_boats=config.n_boats,
-        team_size=config.team_size,
-        dt_s=config.dt_s,
-        max_time_s=config.max_time_s,
-        max_score=config.max_score,
-        agent_radius=np.array(config.agent_radius_m, dtype=np.float64),
-        catch_radius=config.catch_radius_m,
-        flag_keepout=config.flag_keepout_m,
-        cooldown=config.tagging_cooldown_s,
-        oob_speed_frac=config.oob_speed_frac,
-        tag_on_oob=config.tag_on_oob,
-        tag_on_collision=config.tag_on_collision,
-        capture_at_base=config.capture_at == "own_base",
-        size=field.size,
-        flag_home=field.flag_home,
-        scrimmage=field.scrimmage,
-        sight_lines=np.stack([pack_lines(np.concatenate([walls, [field.scrimmage]])) for walls in field.walls]),
-        side_sign=field.side_sign,
-        slots=boat_slots(config),
-        team=np.repeat(np.array([0, 1], dtype=np.int64), config.team_size),
-        params=np.stack([platform.pack() for platform in platforms]),
-        max_speed=np.array([platform.max_speed_mps for platform in platforms]),
-        obstacles=pack_obstacles(config.obstacles),
-        reward=np.array([reward.capture, reward.grab, reward.tag, -reward.oob, -reward.collision]),
+    return share(
+        Rules(
+            n_boats=config.n_boats,
+            team_size=config.team_size,
+            dt_s=config.dt_s,
+            max_time_s=config.max_time_s,
+            max_score=config.max_score,
+            agent_radius=np.array(config.agent_radius_m, dtype=np.float64),
+            catch_radius=config.catch_radius_m,
+            flag_keepout=config.flag_keepout_m,
+            cooldown=config.tagging_cooldown_s,
+            oob_speed_frac=config.oob_speed_frac,
+            tag_on_oob=config.tag_on_oob,
+            tag_on_collision=config.tag_on_collision,
+            capture_at_base=config.capture_at == "own_base",
+            size=field.size,
+            flag_home=field.flag_home,
+            scrimmage=field.scrimmage,
+            sight_lines=np.stack([pack_lines(np.concatenate([walls, [field.scrimmage]])) for walls in field.walls]),
+            side_sign=field.side_sign,
+            slots=boat_slots(config),
+            team=np.repeat(np.array([0, 1], dtype=np.int64), config.team_size),
+            params=np.stack([platform.pack() for platform in platforms]),
+            max_speed=np.array([platform.max_speed_mps for platform in platforms]),
+            obstacles=pack_obstacles(config.obstacles),
+            reward=np.array([reward.capture, reward.grab, reward.tag, -reward.oob, -reward.collision]),
+        )
     )
 
 
@@ -125,28 +128,30 @@ def make_games(config: GameConfig, n_games: int) -> Games:
     def reals(*shape: int) -> Array:
         return np.zeros((n_games, *shape))
 
-    return Games(
-        state=reals(n, N_STATE),
-        previous_position=reals(n, 2),
-        error_is_float32=booleans(n),
-        is_tagged=booleans(n),
-        has_flag=booleans(n),
-        oob=booleans(n),
-        on_side=booleans(n),
-        driven=booleans(n),
-        tagging_cooldown_s=reals(n),
-        made_tag=counts(n),
-        collisions=counts(n),
-        touching=booleans(n, n),
-        new_collisions=counts(n),
-        flag_position=reals(2, 2),
-        flag_taken=booleans(2),
-        captures=counts(2),
-        grabs=counts(2),
-        tags=counts(2),
-        events=counts(2, 4),
-        time_s=np.zeros(n_games),
-        terminated=np.zeros(n_games, dtype=np.bool_),
-        truncated=np.zeros(n_games, dtype=np.bool_),
-        rng=np.zeros(n_games, dtype=np.uint64),
+    return share(
+        Games(
+            state=reals(n, N_STATE),
+            previous_position=reals(n, 2),
+            error_is_float32=booleans(n),
+            is_tagged=booleans(n),
+            has_flag=booleans(n),
+            oob=booleans(n),
+            on_side=booleans(n),
+            driven=booleans(n),
+            tagging_cooldown_s=reals(n),
+            made_tag=counts(n),
+            collisions=counts(n),
+            touching=booleans(n, n),
+            new_collisions=counts(n),
+            flag_position=reals(2, 2),
+            flag_taken=booleans(2),
+            captures=counts(2),
+            grabs=counts(2),
+            tags=counts(2),
+            events=counts(2, 4),
+            time_s=np.zeros(n_games),
+            terminated=np.zeros(n_games, dtype=np.bool_),
+            truncated=np.zeros(n_games, dtype=np.bool_),
+            rng=np.zeros(n_games, dtype=np.uint64),
+        )
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.shared import share
 
 from .advance import CHUNK, advance_games, first_unusable, follow_games
 from .arrays import make_games, make_rules
@@ -194,7 +195,7 @@ class BatchedMctf:
         given = self._checked_sight(seen)
         if not 0.0 <= dt_s < np.inf:
             raise GameError(f"dt_s is {dt_s}; give a finite time >= 0, in s")
-        follow_games(self.rules._replace(dt_s=float(dt_s)), self.games, given)
+        follow_games(share(self.rules._replace(dt_s=float(dt_s))), self.games, given)
 
     def restore(self, view: GameView, game: int = 0) -> None:
         """Make a game stand as a view of it, or of another of the same size, says: the inverse of `view`.

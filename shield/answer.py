@@ -8,10 +8,29 @@ from .certificates.manoeuvre import told_margin
 from .certificates.rating import FIXED_THING
 from .commands import Commands
 from .fleet import Fleet
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray, IntArray, lean_kernel
 from .plan import HELD, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L
 from .scene import Work
+
+
+@lean_kernel
+def read_margins(state: Array, work: Work, reason: IntArray, told_m: Array) -> None:
+    """Write the margin each boat is told, m; infinite for those not decided for."""
+    for i in range(state.shape[0]):
+        told_m[i] = np.inf if reason[i] == NOT_COVERED else told_margin(i, state, work)
+
+
+@lean_kernel
+def mark_changed(commands: Array, asked: Array, reason: IntArray, changed: BoolArray) -> bool:
+    """Mark the boats whose command is not the one asked for, bit for bit; returns whether there are any."""
+    some = False
+    for i in range(asked.shape[0]):
+        changed[i] = False
+        if reason[i] != NOT_COVERED and reason[i] != PASSED:
+            changed[i] = commands[i, 0] != asked[i, 0] or commands[i, 1] != asked[i, 1]
+            some = some or changed[i]
+    return some
 
 
 class Answer:
@@ -22,9 +41,8 @@ class Answer:
         self.commands = plan.commands.copy()
         self.reason = plan.reason.copy()
         self.slack = plan.slack_m.copy()
-        self.margin = np.where(self.reason == NOT_COVERED, np.inf, work.clear[:n, 0])
-        for i in np.flatnonzero(work.breach.any(axis=1) & (self.reason != NOT_COVERED)):
-            self.margin[i] = told_margin(int(i), state, work)
+        self.margin = np.empty(n)
+        read_margins(state, work, self.reason, self.margin)
         self.bound = work.bound[:n].copy()
 
     @classmethod
@@ -46,9 +64,8 @@ def to_send(
     fleet: Fleet, wanted: Commands, asked: Array, turned: Array, answer: Answer
 ) -> tuple[Commands, BoolArray, IntArray]:
     """Commands to send, which of them are changed, and what binds each boat."""
-    changed = (answer.reason != NOT_COVERED) & (answer.reason != PASSED)
-    changed &= (answer.commands != asked).any(axis=1)
-    if not changed.any():
+    changed: BoolArray = np.empty(len(asked), np.bool_)
+    if not mark_changed(answer.commands, asked, answer.reason, changed):
         return wanted, changed, answer.bound
     sent = wanted.replaced(changed, less_turn(answer.commands, -turned), fleet.state[:, L.HEADING])
     alone = changed & (answer.bound < 0) & (answer.reason != HELD)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .jit import Array, BoolArray
+from .jit import Array, BoolArray, kernel
 from .plan import LARGEST_COMMAND
 from .platforms import layout as L
 from .platforms.step import step_boat
@@ -42,10 +42,14 @@ _MEMORY = (
 """Which sum of differences judges what: a column that says whether it is told, and those that go with it."""
 
 
+@kernel
 def all_told(state: Array) -> bool:
     """Whether no memory of any boat is unknown: the quick answer, which simulators' states give at every step."""
-    told: float = state[:, L.THRUST : L.HEADING_ERROR + 1].sum()
-    return not math.isnan(told)
+    for i in range(state.shape[0]):
+        for column in range(L.THRUST, L.HEADING_ERROR + 1):
+            if math.isnan(state[i, column]):
+                return False
+    return True
 
 
 def unknown_memory(state: Array) -> BoolArray:

@@ -11,13 +11,14 @@ from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .fleet import LARGEST, LARGEST_SPEED_MPS
-from .flow import decide_compiled
+from .flow import Scene, decide_compiled
 from .jit import Array, BoolArray, IntArray, kernel
-from .plan import Plan, new_plan
+from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
-from .scene import Boats, Fixed, Memory, Tuning, Work, memory_of, new_memory, new_work, path_samples
+from .scene import Memory, new_memory, new_work, path_samples, put_memory, take_memory
 from .setup import boats_of, plans_of, tuning_of
+from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
 
@@ -27,13 +28,8 @@ def decide_games(
     state: Array,
     wanted: Array,
     ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
+    scene: Scene,
     memory: Memory,
-    work: Work,
-    plan: Plan,
     error_m: Array,
     late_m: float,
     pending: Array,
@@ -41,8 +37,12 @@ def decide_games(
     reason: IntArray,
     clearance_m: Array,
 ) -> None:
-    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis."""
+    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
+
+    ``scene`` serves one game after another, each with its own part of ``memory``.
+    """
     n = state.shape[1]
+    boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
         ahead[:] = state[b]
@@ -53,8 +53,9 @@ def decide_games(
             margin_m[i] = error_m[i] if ours[b, i] else error_m[i] + late_m
             if ahead[i, L.HEADING] != state[b, i, L.HEADING]:
                 asked[i, 1] += state[b, i, L.HEADING] - ahead[i, L.HEADING]
-        own = memory_of(memory, b)
-        decide_compiled(ahead, asked, margin_m, ours[b], boats, fixed, plans, tuning, own, work, plan)
+        take_memory(memory, b, scene.memory)
+        decide_compiled(scene, ahead, asked, margin_m, ours[b])
+        put_memory(scene.memory, b, memory)
         for i in range(n):
             sent[b, i] = wanted[b, i]
             if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
@@ -101,12 +102,19 @@ class BatchedShield:
             raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
         self.config, self.flag_of = config, flag_of
         n = len(platforms)
-        self._boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
-        self._fixed = surroundings.pack(config)
-        self._plans, self._tuning = plans_of(config), tuning_of(config)
+        boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
         self._memory = new_memory(games, n)
-        self._work = new_work(n, path_samples(self._boats))
-        self._plan = new_plan(n, n * ((WAYS + 1) * n + 6) + 2)
+        self._scene = share(
+            Scene(
+                boats=boats,
+                fixed=surroundings.pack(config),
+                plans=plans_of(config),
+                tuning=tuning_of(config),
+                memory=new_memory(n),
+                work=new_work(n, path_samples(boats)),
+                plan=new_plan(n, n * ((WAYS + 1) * n + 6) + 2),
+            )
+        )
         self._margin = np.full(n, config.position_error_m)
         self._late_m = config.track_error_mps * config.delay_s
         self._pending = np.full((games, steps_of_delay(config), n, 2), np.nan)
@@ -152,13 +160,8 @@ class BatchedShield:
             state,
             wanted,
             ours,
-            self._boats,
-            self._fixed,
-            self._plans,
-            self._tuning,
+            self._scene,
             self._memory,
-            self._work,
-            self._plan,
             self._margin,
             self._late_m,
             self._pending,

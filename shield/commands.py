@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .exceptions import FleetError
-from .jit import Array
+from .jit import Array, BoolArray
 
 LARGEST_HEADING_RAD = 1e6
 """Absolute headings beyond this are no directions, rad: turns so many that the angle left in the number is lost."""
@@ -70,7 +70,7 @@ class Commands:
             heading = float(heading_rad) + math.radians(heading)
         return speed, heading % (2.0 * math.pi) if math.isfinite(heading) else heading
 
-    def replaced(self, changed: Array, relative: Array, heading_deg: Array) -> Commands:
+    def replaced(self, changed: BoolArray, relative: Array, heading_deg: Array) -> Commands:
         """These commands with the rows of ``changed`` taken from ``relative`` (speed m/s, relative deg)."""
         values = self.values.copy()
         rows = relative[changed]

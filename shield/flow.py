@@ -7,6 +7,7 @@ chains the same stages with the compiled projection for thousands of games. Noth
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +29,23 @@ ROUNDS = 2
 PASSES, TO_SOLVE, TO_ESCAPE = range(3)
 """What is left to do once the wanted commands are screened: nothing, the program, or the ladder at once."""
 
+NO_ANSWER, UNSAFE, SAFE = range(3)
+"""What an answer of the program comes to: none that can be sent, one that fails the exact check, one that passes."""
+
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
+
+
+class Scene(NamedTuple):
+    """All that one decider works with, as one `shared` tuple of such tuples."""
+
+    boats: Boats
+    fixed: Fixed
+    plans: Array
+    tuning: Tuning
+    memory: Memory
+    work: Work
+    plan: Plan
 
 
 @lean_kernel
@@ -63,76 +79,57 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
 
 
 @lean_kernel
-def finish(
-    safe: bool,
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> None:
+def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) -> None:
     """Name the reasons of a checked answer, or go down the ladder without one; then remember the escapes."""
+    boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
     if safe:
         mark_answer(count, QP, plan)
     else:
         count = pick_movers(ours, work, plan)
-        ladder(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        ladder(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
     commit(state, ours, boats, tuning, memory, work, plan)
 
 
 @lean_kernel
-def begin(
-    state: Array,
-    wanted: Array,
-    margin_m: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> int:
+def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> int:
     """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_ESCAPE`."""
-    if screen(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan):
-        finish(True, 0, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+    boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
+    if screen(state, wanted, margin_m, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan):
+        finish(scene, True, 0, state, ours)
         return PASSES
     return TO_ESCAPE if lost(ours, memory, work) else TO_SOLVE
 
 
 @lean_kernel
-def decide_compiled(
-    state: Array,
-    wanted: Array,
-    margin_m: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> None:
+def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
+    """Rows about the candidate commands: how many boats take part, and how many rows, -1 when there are too many."""
+    count = pick_movers(ours, scene.work, scene.plan)
+    return count, build(count, state, ours, scene.boats, scene.fixed, scene.tuning, scene.work, scene.plan)
+
+
+@lean_kernel
+def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) -> int:
+    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`."""
+    boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
+    if not take_answer(z, count, state, boats, tuning, plan):
+        return NO_ANSWER
+    if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
+        return SAFE
+    return UNSAFE
+
+
+@lean_kernel
+def decide_compiled(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> None:
     """The whole decision for one game; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
-    todo = begin(state, wanted, margin_m, ours, boats, fixed, plans, tuning, memory, work, plan)
+    todo = begin(scene, state, wanted, margin_m, ours)
     if todo == PASSES:
         return
-    safe, count = False, 0
+    found, count = UNSAFE, 0
     for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-        count = pick_movers(ours, work, plan)
-        rows = build(count, state, ours, boats, fixed, tuning, work, plan)
-        if rows < 0 or not solve_compiled(count, rows, plan):
+        count, rows = linearise(scene, state, ours)
+        if rows < 0 or not solve_compiled(count, rows, scene.plan):
             break
-        if not take_answer(plan.z, count, state, boats, tuning, plan):
+        found = accept(scene, scene.plan.z, count, state, ours)
+        if found != UNSAFE:
             break
-        safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        if safe:
-            break
-    finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+    finish(scene, found == SAFE, count, state, ours)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import Array, BoolArray, IntArray, lean_kernel
+from .shared import share
 
 PASSED, QP, QP_RELAXED, ESCAPE, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY = range(8)
 
@@ -44,27 +45,29 @@ class Plan(NamedTuple):
 
 def new_plan(boats: int, rows: int) -> Plan:
     """Program arrays for a scene of that many boats and rows."""
-    return Plan(
-        commands=np.zeros((boats, 2)),
-        kept_commands=np.zeros((boats, 2)),
-        wanted_turn=np.zeros(boats),
-        held=np.zeros((boats, 3)),
-        answer=np.zeros((boats, 2)),
-        answer_held=np.zeros((boats, 3)),
-        eased=np.zeros((boats, 3)),
-        movers=np.zeros(boats, np.int64),
-        place=np.full(boats, -1, np.int64),
-        moving=np.zeros(boats, np.bool_),
-        gain=np.zeros((boats, 3)),
-        z_now=np.zeros(3 * boats + 1),
-        z0=np.zeros(3 * boats + 1),
-        z=np.zeros(3 * boats + 1),
-        C=np.zeros((rows, 3 * boats + 1)),
-        d=np.zeros(rows),
-        kind=np.zeros(rows, np.int64),
-        label=np.zeros((rows, 2), np.int64),
-        slack_m=np.zeros(boats),
-        reason=np.zeros(boats, np.int64),
+    return share(
+        Plan(
+            commands=np.zeros((boats, 2)),
+            kept_commands=np.zeros((boats, 2)),
+            wanted_turn=np.zeros(boats),
+            held=np.zeros((boats, 3)),
+            answer=np.zeros((boats, 2)),
+            answer_held=np.zeros((boats, 3)),
+            eased=np.zeros((boats, 3)),
+            movers=np.zeros(boats, np.int64),
+            place=np.full(boats, -1, np.int64),
+            moving=np.zeros(boats, np.bool_),
+            gain=np.zeros((boats, 3)),
+            z_now=np.zeros(3 * boats + 1),
+            z0=np.zeros(3 * boats + 1),
+            z=np.zeros(3 * boats + 1),
+            C=np.zeros((rows, 3 * boats + 1)),
+            d=np.zeros(rows),
+            kind=np.zeros(rows, np.int64),
+            label=np.zeros((rows, 2), np.int64),
+            slack_m=np.zeros(boats),
+            reason=np.zeros(boats, np.int64),
+        )
     )
 
 

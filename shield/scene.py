@@ -13,6 +13,7 @@ import numpy as np
 from .certificates.clearance import N_CLEARANCE
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import layout as L
+from .shared import share
 from .tables.lookup import Tables
 
 
@@ -244,81 +245,101 @@ def path_samples(boats: Boats) -> int:
 
 def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
-    return Memory(
-        kept=np.zeros(shape, np.bool_),
-        side=np.ones(shape),
-        target_deg=np.zeros(shape),
-        speed_mps=np.zeros(shape),
-        margin_m=np.zeros(shape),
-        threat_m=np.zeros((*shape, shape[-1])),
-        fixed_m=np.zeros(shape),
-        escaping=np.zeros(shape, np.bool_),
-        pressed_s=np.zeros(shape),
-        pressed_deg=np.zeros(shape),
-        free_s=np.zeros(shape),
-        blocked_by=np.full(shape, -1, np.int64),
-        gives_way=np.zeros(shape),
+    return share(
+        Memory(
+            kept=np.zeros(shape, np.bool_),
+            side=np.ones(shape),
+            target_deg=np.zeros(shape),
+            speed_mps=np.zeros(shape),
+            margin_m=np.zeros(shape),
+            threat_m=np.zeros((*shape, shape[-1])),
+            fixed_m=np.zeros(shape),
+            escaping=np.zeros(shape, np.bool_),
+            pressed_s=np.zeros(shape),
+            pressed_deg=np.zeros(shape),
+            free_s=np.zeros(shape),
+            blocked_by=np.full(shape, -1, np.int64),
+            gives_way=np.zeros(shape),
+        )
     )
 
 
 @kernel
-def memory_of(memory: Memory, game: int) -> Memory:
-    """Memory of one of many games, not copied."""
-    return Memory(
-        memory.kept[game],
-        memory.side[game],
-        memory.target_deg[game],
-        memory.speed_mps[game],
-        memory.margin_m[game],
-        memory.threat_m[game],
-        memory.fixed_m[game],
-        memory.escaping[game],
-        memory.pressed_s[game],
-        memory.pressed_deg[game],
-        memory.free_s[game],
-        memory.blocked_by[game],
-        memory.gives_way[game],
-    )
+def take_memory(games: Memory, game: int, own: Memory) -> None:
+    """Copy the memory of one of many games."""
+    own.kept[:] = games.kept[game]
+    own.side[:] = games.side[game]
+    own.target_deg[:] = games.target_deg[game]
+    own.speed_mps[:] = games.speed_mps[game]
+    own.margin_m[:] = games.margin_m[game]
+    own.threat_m[:] = games.threat_m[game]
+    own.fixed_m[:] = games.fixed_m[game]
+    own.escaping[:] = games.escaping[game]
+    own.pressed_s[:] = games.pressed_s[game]
+    own.pressed_deg[:] = games.pressed_deg[game]
+    own.free_s[:] = games.free_s[game]
+    own.blocked_by[:] = games.blocked_by[game]
+    own.gives_way[:] = games.gives_way[game]
+
+
+@kernel
+def put_memory(own: Memory, game: int, games: Memory) -> None:
+    """Copy the memory of one game back to its place among many."""
+    games.kept[game] = own.kept
+    games.side[game] = own.side
+    games.target_deg[game] = own.target_deg
+    games.speed_mps[game] = own.speed_mps
+    games.margin_m[game] = own.margin_m
+    games.threat_m[game] = own.threat_m
+    games.fixed_m[game] = own.fixed_m
+    games.escaping[game] = own.escaping
+    games.pressed_s[game] = own.pressed_s
+    games.pressed_deg[game] = own.pressed_deg
+    games.free_s[game] = own.free_s
+    games.blocked_by[game] = own.blocked_by
+    games.gives_way[game] = own.gives_way
 
 
 def new_work(boats: int, samples: int) -> Work:
     """Scratch arrays for a scene of that many boats and path samples."""
-    return Work(
-        next_state=np.zeros((boats, L.N_STATE)),
-        row=np.zeros(L.N_STATE),
-        plan=np.zeros((boats + 1, 3)),
-        path=np.zeros((boats + 1, samples + 1, 2)),
-        clear=np.zeros((boats + 1, N_CLEARANCE)),
-        fixed=np.zeros((boats + 1, N_CLEARANCE)),
-        out=np.zeros(N_CLEARANCE),
-        spare=np.zeros(N_CLEARANCE),
-        spare2=np.zeros(N_CLEARANCE),
-        merit=np.zeros(boats),
-        threat_m=np.zeros(boats + 1),
-        threats_m=np.zeros((boats + 1, boats)),
-        fails=np.zeros(boats + 1, np.bool_),
-        target=np.zeros(boats),
-        threat_target_m=np.zeros((boats, boats)),
-        fixed_target_m=np.zeros(boats),
-        bound=np.full(boats + 1, -1, np.int64),
-        near=np.zeros((boats, boats), np.bool_),
-        hunted=np.zeros(boats, np.bool_),
-        reach_samples=np.zeros(boats, np.int64),
-        breach=np.zeros((boats, boats), np.bool_),
-        radius=np.zeros((boats, boats)),
-        course=np.zeros((boats, 4)),
-        ways=np.zeros((boats, 3, 5)),
-        place=np.zeros((boats + 1, 5)),
-        sealed=np.zeros(boats + 1, np.bool_),
-        beset=np.zeros(boats, np.bool_),
-        ready=np.full((boats + 1, 4), -1.0),
-        decided=np.full(boats + 1, np.inf),
-        hunter=np.zeros(5),
-        later=np.zeros((boats + 1, 5)),
-        ways_later=np.zeros((boats, 3, 5)),
-        nobody=np.zeros(boats, np.bool_),
-        searched=np.full(boats, -1, np.int64),
-        first_hunter=np.zeros(boats, np.int64),
-        first_refuser=np.zeros(boats, np.int64),
-        first_manner=np.zeros((boats, boats), np.int64),
+    return share(
+        Work(
+            next_state=np.zeros((boats, L.N_STATE)),
+            row=np.zeros(L.N_STATE),
+            plan=np.zeros((boats + 1, 3)),
+            path=np.zeros((boats + 1, samples + 1, 2)),
+            clear=np.zeros((boats + 1, N_CLEARANCE)),
+            fixed=np.zeros((boats + 1, N_CLEARANCE)),
+            out=np.zeros(N_CLEARANCE),
+            spare=np.zeros(N_CLEARANCE),
+            spare2=np.zeros(N_CLEARANCE),
+            merit=np.zeros(boats),
+            threat_m=np.zeros(boats + 1),
+            threats_m=np.zeros((boats + 1, boats)),
+            fails=np.zeros(boats + 1, np.bool_),
+            target=np.zeros(boats),
+            threat_target_m=np.zeros((boats, boats)),
+            fixed_target_m=np.zeros(boats),
+            bound=np.full(boats + 1, -1, np.int64),
+            near=np.zeros((boats, boats), np.bool_),
+            hunted=np.zeros(boats, np.bool_),
+            reach_samples=np.zeros(boats, np.int64),
+            breach=np.zeros((boats, boats), np.bool_),
+            radius=np.zeros((boats, boats)),
+            course=np.zeros((boats, 4)),
+            ways=np.zeros((boats, 3, 5)),
+            place=np.zeros((boats + 1, 5)),
+            sealed=np.zeros(boats + 1, np.bool_),
+            beset=np.zeros(boats, np.bool_),
+            ready=np.full((boats + 1, 4), -1.0),
+            decided=np.full(boats + 1, np.inf),
+            hunter=np.zeros(5),
+            later=np.zeros((boats + 1, 5)),
+            ways_later=np.zeros((boats, 3, 5)),
+            nobody=np.zeros(boats, np.bool_),
+            searched=np.full(boats, -1, np.int64),
+            first_hunter=np.zeros(boats, np.int64),
+            first_refuser=np.zeros(boats, np.int64),
+            first_manner=np.zeros((boats, boats), np.int64),
+        )
     )

@@ -18,6 +18,7 @@ from .platforms import Platform, get_platform
 from .platforms import layout as L
 from .platforms.limits import ENOUGH_THRUST, FULL_THRUST, Limits, limits_of
 from .scene import Boats, Tuning
+from .shared import share
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
 from .tables.lookup import Tables, no_tables
@@ -41,16 +42,18 @@ STATIC_REACTION_S = 0.5
 
 def tuning_of(config: ShieldConfig) -> Tuning:
     """Scalar settings for compiled code."""
-    return Tuning(
-        dt_s=config.dt_s,
-        radius_m=config.separation_m + config.buffer_m,
-        buffer_m=config.buffer_m,
-        tail_s=config.tail_s,
-        hysteresis_m=config.hysteresis_m,
-        margin_cap_m=config.margin_cap_m,
-        speed_weight=config.speed_weight,
-        fixed_decay=_decay(config.fixed_response_per_s, config),
-        give_way_after_s=config.give_way_after_s,
+    return share(
+        Tuning(
+            dt_s=config.dt_s,
+            radius_m=config.separation_m + config.buffer_m,
+            buffer_m=config.buffer_m,
+            tail_s=config.tail_s,
+            hysteresis_m=config.hysteresis_m,
+            margin_cap_m=config.margin_cap_m,
+            speed_weight=config.speed_weight,
+            fixed_decay=_decay(config.fixed_response_per_s, config),
+            give_way_after_s=config.give_way_after_s,
+        )
     )
 
 
@@ -69,33 +72,37 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    share = config.opponent_share if certificate.hunters else 0.0
+    granted = config.opponent_share if certificate.hunters else 0.0
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
-    looked = _tables_of(config, kinds, team) if share == 1.0 else _no_tables(len(kinds))
+    looked = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
     with_table = np.asarray((looked.table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
-    return Boats(
-        params=params,
-        team=np.array(team, dtype=np.int64),
-        fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
-        granted_turn_dps=np.array([share * limit.turn_rate_dps for limit in limits]),
-        granted_acc_mps2=np.array([limit.acceleration_mps2 if share > 0.0 else 0.0 for limit in limits]),
-        granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
-        granted_loss=np.array([share * _lasting_loss(limit) for limit in limits]),
-        ready_thrust=_ready_thrust(params, limits, with_table),
-        stride=stride,
-        sample_s=stride * config.dt_s,
-        plans=np.where(with_table, len(certificate.plans), certificate.nimble),
-        decay=np.where(with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)),
-        cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
-        tables=looked.tables,
-        table=looked.table,
-        table_margin_m=config.table_margin_m,
-        look=np.where(with_table, looked.steps, 0),
-        joint_look=max(1, looked.steps, round(JOINT_LOOK_S / config.dt_s)),
-        feared=np.asarray((looked.table >= 0).any(axis=0)),
-        **_horizons(config, kinds, limits, stride * config.dt_s, share > 0.0),
+    return share(
+        Boats(
+            params=params,
+            team=np.array(team, dtype=np.int64),
+            fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
+            granted_turn_dps=np.array([granted * limit.turn_rate_dps for limit in limits]),
+            granted_acc_mps2=np.array([limit.acceleration_mps2 if granted > 0.0 else 0.0 for limit in limits]),
+            granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
+            granted_loss=np.array([granted * _lasting_loss(limit) for limit in limits]),
+            ready_thrust=_ready_thrust(params, limits, with_table),
+            stride=stride,
+            sample_s=stride * config.dt_s,
+            plans=np.where(with_table, len(certificate.plans), certificate.nimble),
+            decay=np.where(
+                with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
+            ),
+            cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
+            tables=looked.tables,
+            table=looked.table,
+            table_margin_m=config.table_margin_m,
+            look=np.where(with_table, looked.steps, 0),
+            joint_look=max(1, looked.steps, round(JOINT_LOOK_S / config.dt_s)),
+            feared=np.asarray((looked.table >= 0).any(axis=0)),
+            **_horizons(config, kinds, limits, stride * config.dt_s, granted > 0.0),
+        )
     )
 
 

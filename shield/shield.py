@@ -17,15 +17,16 @@ from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
-from .flow import PASSES, ROUNDS, TO_SOLVE, begin, finish
+from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, Scene, accept, begin, finish, linearise
 from .jit import Array, BoolArray
-from .linearised import add_slack, build, check, pick_movers, take_answer
+from .linearised import add_slack
 from .plan import Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
-from .scene import Boats, Fixed, Memory, Work, new_memory, new_work, path_samples
+from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work, path_samples
 from .setup import boats_of, plans_of, tuning_of
+from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
@@ -36,11 +37,18 @@ MOST_ROWS = 3000
 
 @dataclass
 class _Seat:
-    """Working memory of one decider: the team, or one boat of it."""
+    """Working memory of one decider: the team, or one boat of it; and the scene it was last used in."""
 
     memory: Memory
     work: Work
     plan: Plan
+    scene: Scene | None = None
+
+    def scene_of(self, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning) -> Scene:
+        """The scene with these boats and fixed things."""
+        if self.scene is None or self.scene.boats is not boats or self.scene.fixed is not fixed:
+            self.scene = share(Scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan))
+        return self.scene
 
 
 class Shield:
@@ -81,6 +89,7 @@ class Shield:
         self._tuning = tuning_of(self.config)
         self._plans = plans_of(self.config)
         self._packed: dict[Surroundings, Fixed] = {}
+        self._last_around: tuple[Surroundings | None, Any] = None, None
         self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._kept_from: Fixed | None = None
         self._seats: list[_Seat] = []
@@ -246,32 +255,33 @@ class Shield:
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if not isinstance(surroundings, Surroundings):
             raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
+        if surroundings is self._last_around[0]:
+            return self._last_around[1]
         if surroundings not in self._packed:
             if len(self._packed) > 64:
                 self._packed.clear()
             self._packed[surroundings] = surroundings.pack(self.config)
+        self._last_around = surroundings, self._packed[surroundings]
         return self._packed[surroundings]
 
     def _run(
         self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, fixed: Fixed
     ) -> None:
         """The stages of `flow` with the QP backend in between."""
-        tuning, plans = self._tuning, self._plans
-        memory, work, plan = seat.memory, seat.work, seat.plan
-        todo = begin(state, wanted, margin, ours, boats, fixed, plans, tuning, memory, work, plan)
+        scene = seat.scene_of(boats, fixed, self._plans, self._tuning)
+        todo = begin(scene, state, wanted, margin, ours)
         if todo == PASSES:
             return
-        safe, count = False, 0
+        found, count = UNSAFE, 0
         for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-            count = pick_movers(ours, work, plan)
-            rows = build(count, state, ours, boats, fixed, tuning, work, plan)
-            z = self._solve(count, rows, plan) if rows >= 0 else None
-            if z is None or not take_answer(z, count, state, boats, tuning, plan):
+            count, rows = linearise(scene, state, ours)
+            z = self._solve(count, rows, seat.plan) if rows >= 0 else None
+            if z is None:
                 break
-            safe = check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-            if safe:
+            found = accept(scene, z, count, state, ours)
+            if found != UNSAFE:
                 break
-        finish(safe, count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        finish(scene, found == SAFE, count, state, ours)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
         """Answer of the program, relaxed with slack when it has none."""

@@ -17,6 +17,7 @@ from .config import ShieldConfig
 from .exceptions import ConfigError
 from .jit import Array
 from .scene import Fixed
+from .shared import share
 
 Point = tuple[float, float]
 
@@ -71,14 +72,16 @@ class Surroundings:
         circles = [(x, y, r + config.hull_m + off_m) for x, y, r in self.circles]
         circles += [(x, y, r + off_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
-        return Fixed(
-            field=self._edge(config),
-            keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
-            circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
-            segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
-            segment_m=config.hull_m + off_m,
-            side_m=off_m,
-            current_mps=float(config.current_mps),
+        return share(
+            Fixed(
+                field=self._edge(config),
+                keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
+                circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
+                segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
+                segment_m=config.hull_m + off_m,
+                side_m=off_m,
+                current_mps=float(config.current_mps),
+            )
         )
 
     def _edge(self, config: ShieldConfig) -> Array:

@@ -84,10 +84,13 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
         pending[last, i, 1] = state[i, L.HEADING] + commands[i, 1]
 
 
-def turn_round(state: Array, astern: BoolArray) -> None:
-    """Make boats that go astern go ahead the same way, in place: others' courses are followed ahead."""
-    state[astern, L.HEADING] = state[astern, L.HEADING] % 360.0 - 180.0
-    state[astern, L.SPEED] *= -1.0
+@kernel
+def turn_round(state: Array, controlled: BoolArray) -> None:
+    """Make boats not ours that go astern go ahead the same way, in place: others' courses are followed ahead."""
+    for i in range(state.shape[0]):
+        if not controlled[i] and state[i, L.SPEED] < 0.0:
+            state[i, L.HEADING] = state[i, L.HEADING] % 360.0 - 180.0
+            state[i, L.SPEED] = -state[i, L.SPEED]
 
 
 def whole_steps(time_s: float, dt_s: float) -> int:
@@ -119,7 +122,7 @@ def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -
         FleetError: a track is older than ``max_track_age_s``.
     """
     state = fleet.state.copy()
-    turn_round(state, ~fleet.controlled & (state[:, L.SPEED] < 0.0))
+    turn_round(state, fleet.controlled)
     fill_memory(state, params)
     n = len(state)
     margin = np.full(n, config.position_error_m)

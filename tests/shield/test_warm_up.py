@@ -22,14 +22,14 @@ def head_on(platform="heron", speed_mps=2.0):
 
 def test_what_is_run_needs_every_stage(monkeypatch):
     seen = []
-    for name in ("begin", "build", "solve", "take_answer", "check", "finish"):
+    for name in ("begin", "linearise", "solve", "accept", "finish"):
         stage = getattr(shield, name)
         monkeypatch.setattr(
             shield, name, lambda *values, name=name, stage=stage: (seen.append(name), stage(*values))[1]
         )
     fleet, wanted, around = warming.tight_spot()
     decisions = Shield().decide(fleet, wanted, around)
-    assert set(seen) == {"begin", "build", "solve", "take_answer", "check", "finish"}
+    assert set(seen) == {"begin", "linearise", "solve", "accept", "finish"}
     assert {Reason(reason) for reason in decisions.reason} & {Reason.ESCAPE, Reason.BEST_EFFORT, Reason.QP_RELAXED}
 
 

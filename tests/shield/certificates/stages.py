@@ -10,6 +10,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.program import Program, solve
 from steerclear.shield.scene import new_memory, new_work, path_samples
 from steerclear.shield.setup import boats_of, plans_of, tuning_of
+from steerclear.shield.shared import share
 
 
 class Stages(NamedTuple):
@@ -24,6 +25,11 @@ class Stages(NamedTuple):
     memory: object
     work: object
     plan: object
+
+    @property
+    def scene(self):
+        """What the stages take."""
+        return share(flow.Scene(*self[2:]))
 
 
 def stages_of(config, state, platforms, team, surroundings=None):
@@ -101,22 +107,21 @@ def checked(at, count):
 
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
-    count = linearised.pick_movers(at.ours, at.work, at.plan)
-    return count, linearised.build(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work, at.plan)
+    return flow.linearise(at.scene, at.state, at.ours)
 
 
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
-    count = 0
+    count, found = 0, flow.SAFE if safe else flow.UNSAFE
     for _ in range(0 if screening.lost(at.ours, at.memory, at.work) else flow.ROUNDS):
-        if safe:
+        if found != flow.UNSAFE:
             break
         count, rows = built(at)
         z = _answer(at, count, rows, solver)
-        if z is None or not linearised.take_answer(z, count, at.state, at.boats, at.tuning, at.plan):
+        if z is None:
             break
-        safe = checked(at, count)
-    flow.finish(safe, count, at.state, at.ours, at.boats, at.fixed, at.plans, at.tuning, at.memory, at.work, at.plan)
+        found = flow.accept(at.scene, z, count, at.state, at.ours)
+    flow.finish(at.scene, found == flow.SAFE, count, at.state, at.ours)
     return at.plan.commands.copy(), at.plan.reason.copy()
 
 
