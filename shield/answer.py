@@ -11,7 +11,7 @@ from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray, lean_kernel
 from .plan import HELD, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L
-from .scene import Work
+from .work import Work
 
 
 @lean_kernel

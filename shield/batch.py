@@ -11,16 +11,18 @@ from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .fleet import LARGEST, LARGEST_SPEED_MPS
-from .flow import Scene, decide_compiled
+from .flow import decide_compiled
 from .jit import Array, BoolArray, IntArray, kernel
+from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
-from .scene import Memory, new_memory, new_work, path_samples, put_memory, take_memory
+from .scene import Scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
+from .work import new_work
 
 
 @kernel

@@ -57,6 +57,8 @@ class Decision:
         slack_m: margin given up, m.
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.
+        no_table: names of the opponents that a value table should answer for and none does: they are run through as
+            hunters instead, which for slow boats is the poorer word. The log says why, once.
     """
 
     boat: str
@@ -71,6 +73,7 @@ class Decision:
     slack_m: float
     fallback: str | None
     solve_time_s: float
+    no_table: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,7 @@ class Decisions(Sequence[Decision]):
         slack_m: (n,) m.
         bound: (n,) index of the binding neighbour, -1 none, -2 fixed things.
         solve_time_s: time of the whole decision, s.
+        no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
     """
 
     fleet: Fleet
@@ -97,6 +101,7 @@ class Decisions(Sequence[Decision]):
     slack_m: Array
     bound: IntArray
     solve_time_s: float
+    no_table: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -134,12 +139,18 @@ class Decisions(Sequence[Decision]):
             slack_m=float(self.slack_m[i]),
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,
+            no_table=self._no_table(i),
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:
         if bound == FIXED_THING:
             return ("field",)
         return (self.fleet.names[bound],) if bound >= 0 else ()
+
+    def _no_table(self, i: int) -> tuple[str, ...]:
+        if self.no_table is None or self.reason[i] == Reason.NOT_COVERED:
+            return ()
+        return tuple(self.fleet.names[j] for j in np.flatnonzero(self.no_table[i]))
 
     @property
     def count_intervened(self) -> int:

@@ -9,12 +9,14 @@ from __future__ import annotations
 from .certificates.rating import PAIR_SAFE, worst_merit
 from .jit import Array, BoolArray, lean_kernel
 from .linearised import check
+from .memory import Memory
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
 from .platforms.usv import wrap_degrees
-from .scene import Boats, Fixed, Memory, Tuning, Work
+from .scene import Boats, Fixed, Tuning
 from .screening import set_targets
+from .work import Work
 
 LOOKS = 6
 """Looks for the least share of an escape, the first at none of it: to a 32nd of the way."""

@@ -7,7 +7,6 @@ chains the same stages with the compiled projection for thousands of games. Noth
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,12 +15,14 @@ from .certificates.rating import FIXED_LOST
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
+from .memory import Memory
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .right_of_way import note_pressing
-from .scene import Boats, Fixed, Memory, Tuning, Work
+from .scene import Boats, Scene, Tuning
 from .screening import lost, screen
+from .work import Work
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the ladder takes over."""
@@ -34,18 +35,6 @@ NO_ANSWER, UNSAFE, SAFE = range(3)
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
-
-
-class Scene(NamedTuple):
-    """All that one decider works with, as one `shared` tuple of such tuples."""
-
-    boats: Boats
-    fixed: Fixed
-    plans: Array
-    tuning: Tuning
-    memory: Memory
-    work: Work
-    plan: Plan
 
 
 @lean_kernel

@@ -15,10 +15,12 @@ from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import check, list_movers
+from .memory import Memory
 from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, RIGHT_OF_WAY, Plan, unchanged
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn, full_turn
-from .scene import Boats, Fixed, Memory, Tuning, Work
+from .scene import Boats, Fixed, Tuning
+from .work import Work
 
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""

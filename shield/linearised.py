@@ -10,12 +10,14 @@ from .active_set import OPTIMAL, project
 from .certificates.assign import hold, recheck
 from .certificates.rating import PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
+from .memory import Memory
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
 from .rows import FIXED_ROW, PAIR_ROW, build_rows, inputs_of
-from .scene import Boats, Fixed, Memory, Tuning, Work
+from .scene import Boats, Fixed, Tuning
 from .screening import predict
+from .work import Work
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""

@@ -8,8 +8,9 @@ import numpy as np
 
 from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray
+from .memory import Memory
 from .platforms import Platform
-from .scene import Boats, Memory, Tuning
+from .scene import Boats, Tuning
 
 _OWN = (
     "kept",

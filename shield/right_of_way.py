@@ -14,10 +14,12 @@ from __future__ import annotations
 import math
 
 from .jit import Array, BoolArray, lean_kernel
+from .memory import Memory
 from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan, unchanged
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
-from .scene import Memory, Tuning, Work
+from .scene import Tuning
+from .work import Work
 
 NEAR_M = 2.0
 """Distance beyond what is to be kept within which a team-mate is alongside, m."""

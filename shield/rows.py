@@ -27,7 +27,8 @@ from .jit import Array, BoolArray, IntArray, copy_row, lean_kernel
 from .platforms import layout as L
 from .platforms.actuator import full_turn
 from .platforms.step import step_boat
-from .scene import Boats, Fixed, Tuning, Work
+from .scene import Boats, Fixed, Tuning
+from .work import Work
 
 AIM_M = 0.02
 """Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""

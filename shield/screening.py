@@ -7,13 +7,15 @@ from .certificates.clearance import FAR
 from .certificates.manoeuvre import look_around
 from .certificates.rating import STRAIGHT_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
+from .memory import Memory
 from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
 from .platforms import layout as L
 from .platforms.step import step_boat
 from .platforms.usv import wrap_degrees
 from .right_of_way import apply_right_of_way
-from .scene import Boats, Fixed, Memory, Tuning, Work
+from .scene import Boats, Fixed, Tuning
 from .tables.grid import CAP
+from .work import Work
 
 
 @lean_kernel

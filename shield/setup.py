@@ -106,6 +106,16 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     )
 
 
+@lru_cache(maxsize=256)
+def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
+    """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
+    certificate, sides = CERTIFICATES[config.certificate], np.array(team)
+    limits = [limits_of(get_platform(name), config.dt_s) for name in platforms]
+    looks = np.array([config.opponent_share == 1.0 and certificate.looks_up(limit) for limit in limits])
+    found: BoolArray = boats_of(config, platforms, team).table >= 0
+    return looks[:, None] & (sides[:, None] != sides[None]) & ~found
+
+
 def _horizons(
     config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], sample_s: float, hunters: bool
 ) -> dict[str, Any]:

@@ -17,19 +17,21 @@ from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
-from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, Scene, accept, begin, finish, linearise
+from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
 from .linearised import add_slack
+from .memory import Memory, new_memory
 from .plan import Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
-from .scene import Boats, Fixed, Memory, Tuning, Work, new_memory, new_work, path_samples
-from .setup import boats_of, plans_of, tuning_of
+from .scene import Boats, Fixed, Scene, Tuning, path_samples
+from .setup import boats_of, missing_tables, plans_of, tuning_of
 from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
+from .work import Work, new_work
 
 MOST_ROWS = 3000
 """Programs with more rows than this go to the ladder instead."""
@@ -94,6 +96,7 @@ class Shield:
         self._kept_from: Fixed | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
+        self._missing: BoolArray | None = None
         self._known: Known | None = None
         self._pending = np.zeros((0, 0, 2))
         self._autopilots: Autopilots | None = None
@@ -169,6 +172,7 @@ class Shield:
             slack_m=answer.slack,
             bound=bound,
             solve_time_s=time.perf_counter() - started,
+            no_table=self._missing,
         )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
@@ -189,7 +193,8 @@ class Shield:
     def _scene(self, fleet: Fleet) -> Boats:
         """Boat constants; new working memory when the fleet is not the one of the last call."""
         if self._boats is None or self._known is None or self._known != Known.of(fleet):
-            boats = boats_of(self.config, fleet.platforms, tuple(int(t) for t in fleet.team))
+            kinds = self.config, fleet.platforms, tuple(int(t) for t in fleet.team)
+            boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
             self._seat(fleet, boats)
             self._boats, self._known = boats, Known.of(fleet)
         return self._boats

@@ -24,7 +24,7 @@ def bench_tables(content: Mapping[str, Any]) -> list[BenchTable]:
         _decide(content, "decide", "3 boats and 3 opponents"),
         _decide(content, "decide_by_table", "with value tables (surveyors)"),
     ]
-    return [*decisions, _solvers(content), _batch(content), _memory(content), _scaling(content)]
+    return [*decisions, _lookups(content), _solvers(content), _batch(content), _memory(content), _scaling(content)]
 
 
 def _decide(content: Mapping[str, Any], key: str, about: str) -> BenchTable:
@@ -35,6 +35,12 @@ def _decide(content: Mapping[str, Any], key: str, about: str) -> BenchTable:
     times = f"each timed {content['settings']['repeats']} times"
     title = f"One decision, {about}, us ({decide['decisions']:,} of real games, {times})"
     return BenchTable(title, ("", "p50", "p99", "p99.9"), rows)
+
+
+def _lookups(content: Mapping[str, Any]) -> BenchTable:
+    rows = [[row["what"], number_text(row["us"])] for row in content["lookups"]]
+    title = f"One look-up in a value table, us (mean of {content['lookups'][0]['lookups']:,}, anywhere in the table)"
+    return BenchTable(title, ("", "us"), rows)
 
 
 def _solvers(content: Mapping[str, Any]) -> BenchTable:

@@ -13,6 +13,7 @@ from ..provenance import machine, versions
 from ..spec import check_seed
 from .batch import BatchSize, batch_memory, steps_per_s
 from .decide import COUNTS, decide_times, scaling
+from .lookups import lookup_times
 from .sampling import programs_of, questions_of_games
 from .solvers import solver_times
 
@@ -27,6 +28,7 @@ class BenchSettings:
         seed: of everything drawn.
         repeats: times each decision and program is timed; its median counts.
         game_s: length of the games that states are taken from, s.
+        lookups: look-ups in a value table.
         programs: programs for the solvers, at most.
         batch: size of the batched runs.
         memory_games: games whose memory is measured.
@@ -39,6 +41,7 @@ class BenchSettings:
     seed: int = 0
     repeats: int = 5
     game_s: float = 300.0
+    lookups: int = 200_000
     programs: int = 400
     batch: BatchSize = field(default_factory=BatchSize)
     memory_games: int = 4096
@@ -51,7 +54,9 @@ class BenchSettings:
     def small(self) -> BenchSettings:
         """Return a version of seconds instead of minutes; its figures are rough."""
         batch = BatchSize(games=64, steps=20, repeats=2)
-        return replace(self, repeats=1, game_s=20.0, programs=30, batch=batch, scenes=10, counts=self.counts[:2])
+        return replace(
+            self, repeats=1, game_s=20.0, lookups=20_000, programs=30, batch=batch, scenes=10, counts=self.counts[:2]
+        )
 
 
 def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
@@ -98,6 +103,11 @@ def _parts(settings: BenchSettings, shield: ShieldConfig) -> Iterator[tuple[str,
 
     yield "decide", "one decision, 3 boats and 3 opponents", decide
     yield "decide_by_table", "one decision with value tables", decide_by_table
+    yield (
+        "lookups",
+        "look-ups in a value table",
+        lambda: lookup_times(settings.lookups, settings.repeats, settings.seed),
+    )
     yield "solvers", "the same programs through every solver", solvers
     yield "batch", "games at once, one core", batch
     yield "memory", "memory", lambda: batch_memory(settings.preset, settings.memory_games, shield)

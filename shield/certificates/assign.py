@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..memory import Memory
 from ..platforms import layout as L
-from ..scene import Boats, Fixed, Memory, Tuning, Work
+from ..scene import Boats, Fixed, Tuning
+from ..work import Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
 from .laying import lay_path, refused_by_tables, run_out, set_out
 from .paths import READY_SAMPLE, TURNING_SAMPLE, angle_to_go

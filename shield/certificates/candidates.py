@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from ..jit import Array, lean_kernel
+from ..memory import Memory
 from ..platforms import layout as L
-from ..scene import Boats, Memory, Tuning
+from ..scene import Boats, Tuning
 from .paths import angle_to_go
 from .rating import FIXED_LOST
 

@@ -11,7 +11,8 @@ import math
 
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Fixed, Work
+from ..scene import Boats, Fixed
+from ..work import Work
 from .clearance import MARGIN
 from .surroundings import clear_of_obstacles, clear_of_rules, first_touch
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Tuning, Work
+from ..scene import Boats, Tuning
+from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .paths import READY_SAMPLE
 from .pursuer import clear_of_pursuer

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
-from ..scene import Boats, Tuning, Work
+from ..scene import Boats, Tuning
+from ..work import Work
 from .clearance import FAR
 from .hunters import first_then_rest
 from .paths import trace_path

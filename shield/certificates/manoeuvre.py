@@ -17,7 +17,8 @@ import math
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import next_thrust
-from ..scene import Boats, Tuning, Work
+from ..scene import Boats, Tuning
+from ..work import Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .hunters import closing
 from .values import find_beset, run_opponents

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..jit import Array, BoolArray, lean_kernel
-from ..scene import Boats, Fixed, Tuning, Work
+from ..scene import Boats, Fixed, Tuning
+from ..work import Work
 from .clearance import FAR, MARGIN, SAMPLE
 from .fixed_things import clear_of_fixed, clear_of_near_obstacles, share_before_touch
 from .hunters import worst_hunter

@@ -16,9 +16,10 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
-from ..scene import Boats, Tuning, Work
+from ..scene import Boats, Tuning
 from ..tables.grid import CAP
 from ..tables.lookup import Gradient, table_gradient, table_value
+from ..work import Work
 from .clearance import FAR
 from .paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
 

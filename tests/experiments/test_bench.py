@@ -21,6 +21,7 @@ TINY = replace(
     BenchSettings(),
     repeats=1,
     game_s=4.0,
+    lookups=1000,
     programs=5,
     batch=BatchSize(games=4, steps=3, repeats=2),
     memory_games=16,
@@ -43,12 +44,14 @@ def test_everything_is_measured_and_documented(content):
     assert all(row["low"] <= row["median"] <= row["high"] for row in content["batch"])
     assert [(row["boats"], row["ours"]) for row in content["scaling"]] == [(4, 2), (8, 4)]
     assert content["memory"]["games_mib"] > 0.0
+    assert [row["what"] for row in content["lookups"]] == ["value", "value and gradient"]
+    assert all(row["us"] > 0.0 and row["lookups"] == 1000 for row in content["lookups"])
     assert {"daqp", "osqp", "compiled projection"} <= {row["solver"] for row in content["solvers"]}
 
 
 def test_figures_become_tables_and_a_page(content, tmp_path):
     titles = [table.title for table in bench_tables(content)]
-    assert len(set(titles)) == len(titles) == 6
+    assert len(set(titles)) == len(titles) == 7
     for table in bench_tables(content):
         assert all(len(row) == len(table.heads) for row in table.rows)
     write_json(tmp_path / "bench.json", content)

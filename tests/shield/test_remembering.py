@@ -7,9 +7,9 @@ import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import bits, fleet_of, relative
 from steerclear.shield import Fleet, Shield
+from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.remembering import Known, Stayed, carry_over, meets_new
-from steerclear.shield.scene import new_memory
 
 FAR_AWAY = (1300.0, 0.0, 0.0, 0.0)
 STEPS = 120

@@ -6,11 +6,13 @@ import numpy as np
 from steerclear.shield import Surroundings, flow, linearised, plan, screening
 from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
+from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.program import Program, solve
-from steerclear.shield.scene import new_memory, new_work, path_samples
+from steerclear.shield.scene import Scene, path_samples
 from steerclear.shield.setup import boats_of, plans_of, tuning_of
 from steerclear.shield.shared import share
+from steerclear.shield.work import new_work
 
 
 class Stages(NamedTuple):
@@ -29,7 +31,7 @@ class Stages(NamedTuple):
     @property
     def scene(self):
         """What the stages take."""
-        return share(flow.Scene(*self[2:]))
+        return share(Scene(*self[2:]))
 
 
 def stages_of(config, state, platforms, team, surroundings=None):

@@ -123,6 +123,21 @@ def test_a_boat_without_a_table_is_run_through_and_the_log_says_so(caplog):
     assert "steerclear reach solve --own surveyor_lighter" in caplog.text
 
 
+def test_decisions_name_the_opponents_without_a_table():
+    stranger = replace(SURVEYOR, name="surveyor_slower", max_acc=0.15)
+    rows = [(0.0, 0.0, 0.0, 3.0), (60.0, 0.0, 0.0, 3.0), (0.0, 90.0, 180.0, 3.0), (60.0, 90.0, 180.0, 3.0)]
+    fleet = fleet_of(rows, [0, 0, 1, 1])
+    fleet = replace(fleet, platforms=("surveyor", "heron", "surveyor", stranger))
+    wanted = relative(*[(2.0, 0.0)] * 4)
+    told = {
+        certificate: Shield(certificate=certificate).decide(fleet, wanted) for certificate in ("auto", "value_table")
+    }
+    assert [d.no_table for d in told["auto"]] == [("boat_3",), (), (), ()]  # herons are not looked up, opponents never
+    assert [d.no_table for d in told["value_table"]] == [("boat_3",), ("boat_3",), (), ()]
+    tame = Shield(opponent_share=0.9).decide(fleet, wanted)  # no table is wanted
+    assert [d.no_table for d in tame] == [()] * 4
+
+
 def chased(count, seed):
     """Closest distances of surveyors at full speed, each with a rammer that steers where they will be."""
     rng, params = np.random.default_rng(seed), SURVEYOR.pack()

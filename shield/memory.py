@@ -1,0 +1,102 @@
+"""What a decider remembers of its boats from one decision to the next."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import Array, BoolArray, IntArray, kernel
+from .shared import share
+
+
+class Memory(NamedTuple):
+    """Escape manoeuvre each boat holds between decisions (n boats).
+
+    Attributes:
+        kept: whether the boat has one.
+        side: 1 clockwise, -1 the other way.
+        target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
+        speed_mps: speed it commands.
+        margin_m: margin verified at the last decision.
+        threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
+        fixed_m: the same from fixed things, 0 where it was not looked at.
+        escaping: whether the boat was carrying it out at the last decision.
+        pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
+            given way to it, see `right_of_way`.
+        pressed_deg: heading it had when that began.
+        free_s: time since it was last kept from it, s.
+        blocked_by: that team-mate, -1 for none.
+        gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
+    """
+
+    kept: BoolArray
+    side: Array
+    target_deg: Array
+    speed_mps: Array
+    margin_m: Array
+    threat_m: Array
+    fixed_m: Array
+    escaping: BoolArray
+    pressed_s: Array
+    pressed_deg: Array
+    free_s: Array
+    blocked_by: IntArray
+    gives_way: Array
+
+
+def new_memory(*shape: int) -> Memory:
+    """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
+    return share(
+        Memory(
+            kept=np.zeros(shape, np.bool_),
+            side=np.ones(shape),
+            target_deg=np.zeros(shape),
+            speed_mps=np.zeros(shape),
+            margin_m=np.zeros(shape),
+            threat_m=np.zeros((*shape, shape[-1])),
+            fixed_m=np.zeros(shape),
+            escaping=np.zeros(shape, np.bool_),
+            pressed_s=np.zeros(shape),
+            pressed_deg=np.zeros(shape),
+            free_s=np.zeros(shape),
+            blocked_by=np.full(shape, -1, np.int64),
+            gives_way=np.zeros(shape),
+        )
+    )
+
+
+@kernel
+def take_memory(games: Memory, game: int, own: Memory) -> None:
+    """Copy the memory of one of many games."""
+    own.kept[:] = games.kept[game]
+    own.side[:] = games.side[game]
+    own.target_deg[:] = games.target_deg[game]
+    own.speed_mps[:] = games.speed_mps[game]
+    own.margin_m[:] = games.margin_m[game]
+    own.threat_m[:] = games.threat_m[game]
+    own.fixed_m[:] = games.fixed_m[game]
+    own.escaping[:] = games.escaping[game]
+    own.pressed_s[:] = games.pressed_s[game]
+    own.pressed_deg[:] = games.pressed_deg[game]
+    own.free_s[:] = games.free_s[game]
+    own.blocked_by[:] = games.blocked_by[game]
+    own.gives_way[:] = games.gives_way[game]
+
+
+@kernel
+def put_memory(own: Memory, game: int, games: Memory) -> None:
+    """Copy the memory of one game back to its place among many."""
+    games.kept[game] = own.kept
+    games.side[game] = own.side
+    games.target_deg[game] = own.target_deg
+    games.speed_mps[game] = own.speed_mps
+    games.margin_m[game] = own.margin_m
+    games.threat_m[game] = own.threat_m
+    games.fixed_m[game] = own.fixed_m
+    games.escaping[game] = own.escaping
+    games.pressed_s[game] = own.pressed_s
+    games.pressed_deg[game] = own.pressed_deg
+    games.free_s[game] = own.free_s
+    games.blocked_by[game] = own.blocked_by
+    games.gives_way[game] = own.gives_way
