@@ -20,9 +20,7 @@ from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
-
-from .jit import kernel
+from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
 
 Row = TypeVar("Row")
 
@@ -38,9 +36,8 @@ class Shared:
     def __init__(self, row: Any) -> None:
         self._tuple = row
         self._type = SharedType(typeof(row))
-        self._copy = np.zeros(_bytes_of(self._type.row), np.uint8)
+        self._copy = np.frombuffer(_tuple_bytes(self._type.row, row), np.uint8).copy()
         self._address = int(self._copy.ctypes.data)
-        _write(row, self._address)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._tuple, name)
@@ -102,40 +99,37 @@ def _read_field(context: Any, builder: Any, of: SharedType, pointer: Any, name: 
     return impl_ret_borrowed(context, builder, of.row.types[place], value)
 
 
-def _bytes_of(row: Any) -> int:
-    """Size of the copy of a tuple of that type."""
-    context = cpu_target.target_context
-    return int(context.get_abi_sizeof(context.get_value_type(row)))
+def _bytes_of(of: Any, value: Any) -> bytes:
+    """A value as compiled code keeps it in memory; its arrays name no owner, so that nobody counts references to them.
 
+    Written here and not by compiled code, whose disk cache would hold every tuple ever shared.
 
-def _uncounted(context: Any, builder: Any, of: Any, value: Any) -> Any:
-    """A value whose arrays name no owner: nobody counts references to them."""
+    Raises:
+        TypeError: it is none of an array, a float, an int, a bool, or a tuple of such.
+    """
     if isinstance(of, types.Array):
-        array = cgutils.create_struct_proxy(of)(context, builder, value=value)
-        array.meminfo = ir.Constant(array.meminfo.type, None)
-        array.parent = ir.Constant(array.parent.type, None)
-        return array._getvalue()
+        nobody = (0, 0)
+        words = (*nobody, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+        return np.array(words, np.int64).tobytes()
     if isinstance(of, types.BaseTuple):
-        items: Any = of
-        for k, item in enumerate(items.types):
-            bare = _uncounted(context, builder, item, builder.extract_value(value, k))
-            value = builder.insert_value(value, bare, k)
-    return value
+        return _tuple_bytes(of, value)
+    if isinstance(of, SharedType):
+        return np.int64(value._address).tobytes()
+    if of in (types.float64, types.int64, types.boolean):
+        return np.asarray(value, str(of).replace("boolean", "bool")).tobytes()
+    raise TypeError(f"{of} cannot be shared; give arrays, floats, ints, bools, and tuples of them")
 
 
-@intrinsic
-def _store(typing: Any, row: Any, address: Any) -> Any:
-    """Write a tuple's fields to an address."""
-
-    def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        of = signature.args[0]
-        pointer = builder.inttoptr(values[1], context.get_value_type(of).as_pointer())
-        builder.store(_uncounted(context, builder, of, values[0]), pointer)
-        return context.get_dummy_value()
-
-    return types.none(row, types.uintp), lower
-
-
-@kernel
-def _write(row: Any, address: int) -> None:
-    _store(row, address)  # type: ignore[call-arg]
+def _tuple_bytes(of: Any, value: Any) -> bytes:
+    """The fields one after another, each at the place the compiler gives it."""
+    context = cpu_target.target_context
+    form, data = context.get_value_type(of), context.target_data
+    whole = bytearray(form.get_abi_size(data))
+    for k, (kind, item) in enumerate(zip(of.types, value, strict=True)):
+        content = _bytes_of(kind, item)
+        if isinstance(form, ir.ArrayType):  # a tuple of one kind
+            start = k * form.element.get_abi_size(data)
+        else:
+            start = form.get_element_offset(data, k)
+        whole[start : start + len(content)] = content
+    return bytes(whole)

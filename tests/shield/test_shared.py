@@ -145,6 +145,12 @@ def test_types_tell_tuples_apart():
     assert len(types) == 3
 
 
+@pytest.mark.parametrize("value", ["text", 1j, None, [1.0], np.float32(1.0)])
+def test_what_has_no_place_in_memory_is_refused(value):
+    with pytest.raises(TypeError, match="cannot be shared"):
+        share(Inner(True, 1, value))
+
+
 def test_a_field_that_is_not_there_is_an_error():
     shared = share(outer())
     with pytest.raises(TypingError, match="nothing"):
