@@ -58,7 +58,8 @@ class Decision:
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.
         no_table: names of the opponents that a value table should answer for and none does: they are run through as
-            hunters instead, which for slow boats is the poorer word. The log says why, once.
+            hunters instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
+            decisions read from a black box.
     """
 
     boat: str
@@ -73,7 +74,7 @@ class Decision:
     slack_m: float
     fallback: str | None
     solve_time_s: float
-    no_table: tuple[str, ...] = ()
+    no_table: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -147,8 +148,10 @@ class Decisions(Sequence[Decision]):
             return ("field",)
         return (self.fleet.names[bound],) if bound >= 0 else ()
 
-    def _no_table(self, i: int) -> tuple[str, ...]:
-        if self.no_table is None or self.reason[i] == Reason.NOT_COVERED:
+    def _no_table(self, i: int) -> tuple[str, ...] | None:
+        if self.no_table is None:
+            return None
+        if self.reason[i] == Reason.NOT_COVERED:
             return ()
         return tuple(self.fleet.names[j] for j in np.flatnonzero(self.no_table[i]))
 

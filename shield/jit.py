@@ -41,8 +41,9 @@ def kernel(function: F) -> F:
 def lean_kernel(function: F) -> F:
     """The same for a function that makes no array: those it is handed stay its caller's, and are not counted.
 
-    numba otherwise counts references at every call, to each array of each tuple: for the tuples of a decision that
-    costs more than most functions do. Assigning a slice counts as making an array, see `copy_row`; compiling says so.
+    numba otherwise counts references at every call, to each array of each plain tuple (not of a `shared` one), which
+    may cost more than the function does. Assigning a slice counts as making an array, see `copy_row`; compiling says
+    so.
     """
     return _compiled(function, counted=False)
 

@@ -110,10 +110,13 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     certificate, sides = CERTIFICATES[config.certificate], np.array(team)
+    wanted = certificate.hunters and config.opponent_share == 1.0
     limits = [limits_of(get_platform(name), config.dt_s) for name in platforms]
-    looks = np.array([config.opponent_share == 1.0 and certificate.looks_up(limit) for limit in limits])
+    looks = np.array([wanted and certificate.looks_up(limit) for limit in limits], dtype=np.bool_)
     found: BoolArray = boats_of(config, platforms, team).table >= 0
-    return looks[:, None] & (sides[:, None] != sides[None]) & ~found
+    missing: BoolArray = looks[:, None] & (sides[:, None] != sides[None]) & ~found
+    missing.setflags(write=False)  # all shields of such a fleet tell the same one
+    return missing
 
 
 def _horizons(

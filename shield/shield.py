@@ -47,7 +47,7 @@ class _Seat:
     scene: Scene | None = None
 
     def scene_of(self, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning) -> Scene:
-        """The scene with these boats and fixed things."""
+        """The scene with these boats and fixed things; manoeuvres and settings are always the shield's."""
         if self.scene is None or self.scene.boats is not boats or self.scene.fixed is not fixed:
             self.scene = share(Scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan))
         return self.scene
@@ -91,7 +91,7 @@ class Shield:
         self._tuning = tuning_of(self.config)
         self._plans = plans_of(self.config)
         self._packed: dict[Surroundings, Fixed] = {}
-        self._last_around: tuple[Surroundings | None, Any] = None, None
+        self._last_around: tuple[Surroundings, Fixed] | None = None
         self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._kept_from: Fixed | None = None
         self._seats: list[_Seat] = []
@@ -260,7 +260,7 @@ class Shield:
     def _fixed(self, surroundings: Surroundings) -> Fixed:
         if not isinstance(surroundings, Surroundings):
             raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
-        if surroundings is self._last_around[0]:
+        if self._last_around is not None and surroundings is self._last_around[0]:
             return self._last_around[1]
         if surroundings not in self._packed:
             if len(self._packed) > 64:

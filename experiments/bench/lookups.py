@@ -31,7 +31,8 @@ def _gradients(tables: Tables, places: Array, out: Array) -> None:
     for k in range(places.shape[0]):
         x, y, own, other, own_mps, other_mps = places[k]
         slope = table_gradient(tables, 0, x, y, own, other, own_mps, other_mps)
-        out[k] = slope.value_m + slope.own_x + slope.own_y + slope.own_heading + slope.own_speed
+        own_part = slope.own_x + slope.own_y + slope.own_heading + slope.own_speed
+        out[k] = slope.value_m + own_part + slope.other_heading + slope.other_speed  # all of it is computed
 
 
 def lookup_times(lookups: int, repeats: int, seed: int) -> list[dict[str, Any]]:

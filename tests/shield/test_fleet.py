@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shield_scenes import fleet_of, head_on, relative
-from steerclear.shield import Fleet, Reason, Shield
+from steerclear.shield import Commands, Fleet, Reason, Shield
 from steerclear.shield.exceptions import FleetError, PlatformError, SteerclearError
 from steerclear.shield.platforms import layout as L
 
@@ -151,3 +151,11 @@ def test_deciding_does_not_write_to_the_fleet():
 def test_fleet_errors_are_of_the_one_tree():
     assert issubclass(FleetError, SteerclearError)
     assert issubclass(FleetError, ValueError)
+
+
+def test_a_fleet_without_boats_has_no_decisions():
+    nobody = Fleet.of(position_m=np.zeros((0, 2)), heading_rad=[], speed_mps=[], team=[], platforms="heron")
+    for coordination in ("team", "per_boat"):
+        decisions = Shield(coordination=coordination).decide(nobody, Commands.relative_deg(np.zeros((0, 2))))
+        assert len(decisions) == 0
+        assert decisions.sent.values.shape == (0, 2)

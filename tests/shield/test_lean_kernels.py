@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 import steerclear.shield
 from numba.core.dispatcher import Dispatcher
+from steerclear.env.arrays import Games, Rules
+from steerclear.shield.memory import Memory
+from steerclear.shield.plan import Plan
+from steerclear.shield.scene import Boats, Fixed, Scene, Tuning
+from steerclear.shield.work import Work
 
 ROOT = Path(steerclear.shield.__file__).parent.parent
 FOLDERS = ("shield", "env", "policies")
@@ -45,6 +50,16 @@ def test_there_are_both_kinds():
     assert len(LEAN) > 100
     assert len(KERNELS) > len(LEAN)
     assert any(map(gives_array, KERNELS.values())), "some counted ones return arrays: the test can tell"
+
+
+SHARED = (Boats, Fixed, Tuning, Memory, Work, Plan, Scene, Rules, Games)
+TAKE_SHARED = [name for name, function in KERNELS.items() if {*get_type_hints(function.py_func).values()} & {*SHARED}]
+
+
+def test_no_array_of_a_shared_tuple_is_returned():
+    """It would not keep alive what it is a part of, in counting kernels neither."""
+    assert len(TAKE_SHARED) > 100
+    assert [name for name in TAKE_SHARED if gives_array(KERNELS[name])] == []
 
 
 @pytest.mark.parametrize("name", sorted(LEAN))

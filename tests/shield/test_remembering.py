@@ -1,13 +1,14 @@
 """Boats that come into view or go do not make a shield forget the others."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from shield_loops import fill, packed, step_all
-from shield_scenes import bits, fleet_of, relative
+from shield_scenes import bits, fleet_of, head_on, relative
 from steerclear.shield import Fleet, Shield
-from steerclear.shield.memory import new_memory
+from steerclear.shield.memory import Memory, new_memory, put_memory, take_memory
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.remembering import Known, Stayed, carry_over, meets_new
 
@@ -106,3 +107,40 @@ def test_only_new_boats_that_can_come_near_count(gap_m, met):
     shield.decide(fleet, relative((0.0, 0.0), (0.0, 0.0)))
     stayed = Stayed.between(Known.of(part(fleet, (0,))), fleet)
     assert meets_new(fleet, stayed, shield._boats, shield._tuning).tolist() == [met, False]
+
+
+def numbered(memory, first):
+    """Fill every field of a memory with numbers of its own: the flags with every other one."""
+    assert memory._asdict().keys() == set(Memory._fields)
+    for k, array in enumerate(memory):
+        numbers = first + 100 * k + np.arange(array.size).reshape(array.shape)
+        array[...] = numbers % 2 if array.dtype == np.bool_ else numbers
+
+
+def test_games_of_a_batch_keep_their_memory_apart():
+    """All of it is taken and put back: a field left out would pass from one game to the next."""
+    games, own = new_memory(3, 4), new_memory(4)
+    numbered(games, 1)
+    numbered(own, 7)
+    before = {name: array.copy() for name, array in games._asdict().items()}
+    take_memory(games, 1, own)
+    for name, array in own._asdict().items():
+        np.testing.assert_array_equal(array, before[name][1], err_msg=name)
+    numbered(own, 50_000)  # flags the other way round, too
+    put_memory(own, 2, games)
+    for name, array in games._asdict().items():
+        np.testing.assert_array_equal(array[:2], before[name][:2], err_msg=name)
+        np.testing.assert_array_equal(array[2], getattr(own, name), err_msg=name)
+        assert (array[2] != before[name][2]).any(), name
+
+
+def test_a_copy_decides_on_its_own():
+    """A shield copied with all it works with goes on as the first would have, and neither is changed by the other."""
+    first = Shield(delay_s=0.2)
+    fleet, wanted = head_on(9.0), relative((2.0, 0.0), (2.0, 0.0))
+    first.decide(fleet, wanted)
+    second = copy.deepcopy(first)
+    told = [[shield.decide(fleet, wanted).sent.values for _ in range(3)] for shield in (first, second)]
+    np.testing.assert_array_equal(*told)
+    alone = Shield(delay_s=0.2)
+    np.testing.assert_array_equal([alone.decide(fleet, wanted).sent.values for _ in range(4)][1:], told[0])

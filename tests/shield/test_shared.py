@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import typeof
+from numba import njit, typeof, types
 from numba.core.errors import TypingError
+from numba.core.registry import cpu_target
+from steerclear.shield import shared
 from steerclear.shield.jit import kernel, lean_kernel
-from steerclear.shield.shared import share
+from steerclear.shield.shared import Shared, share
 
 
 class Inner(NamedTuple):
@@ -71,6 +73,12 @@ def fill(of, value):
     of.table[1, 1] = value
 
 
+@njit
+def get_x(of):
+    """One field."""
+    return of.x
+
+
 @kernel
 def read_nothing(of):
     """Ask for a field that is not there."""
@@ -92,8 +100,8 @@ def outer(seed=0, rows=3, columns=4, of=Outer):
 @given(st.integers(0, 2**32 - 1), st.integers(0, 5), st.integers(0, 5))
 def test_compiled_code_reads_what_python_reads(seed, rows, columns):
     plain = outer(seed, rows, columns)
-    shared = share(plain)
-    assert read_lean(shared) == read_counted(shared) == read(shared) == read(plain)
+    same = share(plain)
+    assert read_lean(same) == read_counted(same) == read(same) == read(plain)
 
 
 def test_what_compiled_code_writes_is_seen():
@@ -149,6 +157,86 @@ def test_types_tell_tuples_apart():
 def test_what_has_no_place_in_memory_is_refused(value):
     with pytest.raises(TypeError, match="cannot be shared"):
         share(Inner(True, 1, value))
+
+
+class Array(NamedTuple):
+    """One array."""
+
+    a: np.ndarray
+
+
+@kernel
+def described(of):
+    """All that compiled code knows of an array."""
+    a = of.a
+    return a.size, a.itemsize, a.nbytes, a.ndim, a.shape, a.strides, a.ctypes.data
+
+
+DRAWN = np.arange(60.0).reshape(3, 4, 5)
+FROZEN = np.arange(6.0)
+FROZEN.setflags(write=False)
+
+
+@pytest.mark.parametrize(
+    "a",
+    [
+        DRAWN,
+        np.asfortranarray(DRAWN),
+        DRAWN[:, ::2, 1:],
+        DRAWN[::-1],
+        FROZEN,
+        np.zeros((0, 3)),
+        np.array(2.5),
+        np.array([True, False]),
+        np.arange(5, dtype=np.uint8),
+        np.arange(5, dtype=np.int64)[::2],
+    ],
+    ids=["C", "Fortran", "strided", "reversed", "read-only", "empty", "no dimension", "bool", "bytes", "every other"],
+)
+def test_arrays_lie_where_they_lie(a):
+    assert described(share(Array(a))) == (a.size, a.itemsize, a.nbytes, a.ndim, a.shape, a.strides, a.ctypes.data)
+
+
+def test_arrays_name_no_owner():
+    """An owner would be counted by code that counts, and freed by one count too few."""
+    a = np.arange(4.0)
+    words = np.frombuffer(share(Array(a))._copy, np.int64)
+    fields = cpu_target.target_context.data_model_manager[typeof(a)]._fields
+    assert words[fields.index("meminfo")] == words[fields.index("parent")] == 0
+    assert words[fields.index("data")] == a.ctypes.data
+
+
+def test_tuples_of_one_name_are_told_apart():
+    """Compiled code would read one's fields in the order of the other's."""
+
+    def pair(first, second):
+        return NamedTuple("Pair", [(first, float), (second, int)])
+
+    of = [pair("x", "y")(1.0, 2), pair("y", "x")(1.0, 2)]
+    assert [get_x(share(one)) for one in of] == [get_x(one) for one in of] == [1.0, 2.0]
+    names = {typeof(share(one)).name for one in of}  # symbols are named by it
+    assert len(names) == 2
+
+
+def test_what_is_asked_before_it_is_made_is_an_error():
+    blank = Shared.__new__(Shared)
+    with pytest.raises(AttributeError, match="_tuple"):
+        _ = blank.anything
+    assert repr(share(Array(FROZEN))).startswith("shared Array(a=array(")
+
+
+def test_an_unknown_layout_is_refused(monkeypatch):
+    """Of a numba that keeps arrays or tuples another way nothing is guessed."""
+    shared._places.cache_clear()
+    known = shared._NUMBERS
+    monkeypatch.setitem(known, types.int64, "i")
+    with pytest.raises(TypeError, match="not known"):
+        share(Inner(True, 1, FROZEN))
+    monkeypatch.undo()
+    model = cpu_target.target_context.data_model_manager[typeof(FROZEN)]
+    monkeypatch.setattr(model, "_fields", (*model._fields, "more"))
+    with pytest.raises(TypeError, match="not known"):
+        share(Array(FROZEN))
 
 
 def test_a_field_that_is_not_there_is_an_error():

@@ -45,6 +45,8 @@ def test_arrays_stay_their_callers():
     assert [shield.decide(fleet, wanted)[0].reason.name for fleet in fleets] == ["PASSED", "ESCAPE"]
     seat = shield._seats[0]
     arrays = [array for part in (seat.memory, seat.work, seat.plan, shield._boats) for array in part]
+    arrays += [array for fleet in fleets for array in (fleet.state, fleet.team, fleet.controlled)]
+    arrays += [wanted.values, shield._pending, shield._plans]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
     before = [sys.getrefcount(array) for array in arrays]
     for k in range(100):

@@ -138,6 +138,13 @@ def test_decisions_name_the_opponents_without_a_table():
     assert [d.no_table for d in tame] == [()] * 4
 
 
+def test_what_is_told_of_tables_cannot_be_changed():
+    decisions = Shield().decide(apart(1.0, 24.0, 180.0), relative((3.0, 0.0), (3.0, 0.0)))
+    with pytest.raises(ValueError, match="read-only"):
+        decisions.no_table[0, 1] = True
+    assert replace(decisions, no_table=None)[0].no_table is None  # not known is not none
+
+
 def chased(count, seed):
     """Closest distances of surveyors at full speed, each with a rammer that steers where they will be."""
     rng, params = np.random.default_rng(seed), SURVEYOR.pack()
