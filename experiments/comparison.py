@@ -15,6 +15,8 @@ from .encounters.summary import upper_bound
 CONDITIONS = ("radius_m", "delay_s", "noise_m", "current_mps")
 COUNTS = ("encounters", "breached", "avoidable", "unavoidable", "not_judged", "deadlocked")
 MEANS = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
+LATER_MEANS = ("never_arrived_percent",)
+"""Means that results of earlier versions lack: theirs stay unknown."""
 NAMED = ("family", "guard", "own", "other")
 NEEDED = (*NAMED, *COUNTS, *MEANS)
 NO_GUARD = "none"
@@ -104,15 +106,22 @@ def _contest(
 
 
 def _pool(cells: Sequence[Cell]) -> dict[str, Any]:
-    """Counts added up, means weighted with encounters (None without any); what nobody judged may be avoidable."""
+    """Counts added up, means weighted with encounters (None without any); what nobody judged may be avoidable.
+
+    A mean of `LATER_MEANS` is None where a cell lacks it: of the other families alone it would be no total.
+    """
     pooled: dict[str, Any] = {key: sum(cell[key] for cell in cells) for key in COUNTS}
-    for key in MEANS:
-        parts = [(cell[key], cell["encounters"]) for cell in cells if cell[key] is not None]
-        weight = sum(count for _, count in parts)
-        pooled[key] = sum(value * count for value, count in parts) / weight if weight else None
+    pooled |= {key: _mean(cells, key) for key in MEANS}
+    pooled |= {key: _mean(cells, key) if all(key in cell for cell in cells) else None for key in LATER_MEANS}
     pooled["breached_upper"] = upper_bound(pooled["breached"], pooled["encounters"])
     pooled["avoidable_upper"] = upper_bound(pooled["avoidable"] + pooled["not_judged"], pooled["encounters"])
     return pooled
+
+
+def _mean(cells: Sequence[Cell], key: str) -> float | None:
+    parts = [(cell[key], cell["encounters"]) for cell in cells if cell[key] is not None]
+    weight = sum(count for _, count in parts)
+    return sum(value * count for value, count in parts) / weight if weight else None
 
 
 def _rank(figures: Mapping[str, Any]) -> tuple[int, int, float]:

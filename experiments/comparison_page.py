@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from .comparison import NO_GUARD, Contest, cells_of, contests_of
 from .markdown import MADE, table
+from .tables import number_text
 
 STEM = "comparison"
 COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
@@ -56,9 +57,11 @@ def _intro(versions: Sequence[str]) -> str:
         f"Results of `steerclear encounters`, steerclear {', '.join(versions)}. All guards of a section met the same "
         "encounters. *Breached* counts encounters in which an own boat came within the radius of another boat, "
         "*avoidable* those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % "
-        "upper limit of the probability. *Time to goal* is that without a guard times the number. The filters of the "
-        "literature are those of `steerclear.experiments.textbook`, with gains chosen by their own sweep on these "
-        "platforms; `reach` is `steerclear.experiments.reach_guard`, the value tables alone."
+        "upper limit of the probability. *Time to goal* is that without a guard times the number; own boats that "
+        "*never arrived* had not reached their goal by the end of an encounter, though without a guard they do (empty: "
+        "results of an earlier version). The filters of the literature are those of `steerclear.experiments.textbook`, "
+        "with gains chosen by their own sweep on these platforms; `reach` is `steerclear.experiments.reach_guard`, the "
+        "value tables alone."
     )
 
 
@@ -74,14 +77,15 @@ def _winner_line(contest: Contest) -> str:
 
 def _totals_table(contest: Contest) -> list[str]:
     heads = ["guard", "encounters", "avoidable", "unavoidable", "not judged", "breached", "commands changed",
-             "time to goal", "deadlocked", "reversals / min", "µs per decision"]  # fmt: skip
+             "time to goal", "never arrived", "deadlocked", "reversals / min", "µs per decision"]  # fmt: skip
     rows = []
     for guard, one in contest.totals.items():
         name = f"**{guard}**" if guard == contest.winner else guard
         rows.append([
             name, f"{one['encounters']:,}", _bounded(one, "avoidable"), one["unavoidable"], one["not_judged"],
             _bounded(one, "breached"), f"{one['changed_percent']:.1f} %", _number(one["goal_time_ratio"], 2),
-            one["deadlocked"], _number(one["reversals_per_min"], 1), _number(one["decision_us"], 1),
+            _percent(one["never_arrived_percent"]), one["deadlocked"], _number(one["reversals_per_min"], 1),
+            _number(one["decision_us"], 1),
         ])  # fmt: skip
     return table(heads, rows)
 
@@ -105,6 +109,10 @@ def _bounded(figures: Mapping[str, Any], key: str) -> str:
     if key == "avoidable" and figures["not_judged"]:
         count += f" to {figures[key] + figures['not_judged']}"
     return f"{count} [{100.0 * figures[f'{key}_upper']:.2g} %]"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{number_text(value)} %"
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -21,7 +21,7 @@ from .summary import summarise
 from .tally import Columns
 
 Pair = tuple[str, str]
-COLUMNS_VERSION = 2
+COLUMNS_VERSION = 3
 """Goes up when columns change, so that results kept by an earlier version are played anew."""
 
 

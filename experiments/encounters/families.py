@@ -22,14 +22,16 @@ class Family:
     Attributes:
         name: of the family.
         build: puts the boats of one encounter into a cast.
-        field_for: number of boats that its field is made for; 0 is open water.
         others: how many boats the own team does not command.
+        field_for: number of boats that its field is made for; 0 is open water.
+        lasts: how many times as long as others it lasts.
     """
 
     name: str
     build: Callable[[Cast], None]
     others: int
     field_for: int = 0
+    lasts: float = 1.0
 
     @property
     def words(self) -> str:
@@ -46,6 +48,8 @@ FAMILIES: dict[str, Family] = {
         Family("overtaking", duels.overtaking, 1),
         Family("converging_2", groups.converging_2, 0),
         Family("converging_3", groups.converging_3, 0),
+        Family("circle_3", groups.circle_3, 0, lasts=2.0),
+        Family("circle_6", groups.circle_6, 0, lasts=2.0),
         Family("doorway", groups.doorway, 2, field_for=4),
         Family("cluster", groups.cluster, groups.CLUSTER),
         Family("corner", duels.corner, 1, field_for=2),
@@ -108,7 +112,7 @@ def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, f
         noise_seed=np.array([cast.noise_seed for cast in casts for _ in _variants(cast)], dtype=np.uint64),
         number=np.array([first + k for k, cast in enumerate(casts) for _ in _variants(cast)], dtype=np.int64),
         field=_field(kind, casts[0]),
-        length_s=30.0 + 15.0 * min(scale, 4.0),
+        length_s=kind.lasts * (30.0 + 15.0 * min(scale, 4.0)),
     )
 
 

@@ -10,6 +10,8 @@ from .duels import bearing, onwards
 from .field import field_of, within
 
 CLUSTER = 5
+CIRCLE_OFF_DEG = 10.0
+"""How far boats round a circle are off even angles at most, deg."""
 
 
 def converging(cast: Cast, boats: int) -> None:
@@ -34,6 +36,30 @@ def converging_2(cast: Cast) -> None:
 def converging_3(cast: Cast) -> None:
     """Three team-mates."""
     converging(cast, 3)
+
+
+def circle(cast: Cast, boats: int) -> None:
+    """Team-mates all round a circle, each with its goal at the opposite point: they all come to the middle at once.
+
+    Two that turned away there may end up side by side, each wanting to turn to where the other is. In mixed fleets
+    platforms alternate, and each starts as far out as its speed calls for.
+    """
+    crossing_s, names = cast.uniform(15.0, 25.0), (cast.own, cast.other)
+    for k in range(boats):
+        heading, name = k * 360.0 / boats + cast.uniform(-CIRCLE_OFF_DEG, CIRCLE_OFF_DEG), names[k % 2]
+        across_m = cast.top(name) * crossing_s
+        x, y = ahead(0.0, 0.0, heading + 180.0, 0.5 * across_m)
+        cast.add_own(x, y, heading, 1.0, ahead(x, y, heading, across_m), ahead(x, y, heading, FAR_M), name=name)
+
+
+def circle_3(cast: Cast) -> None:
+    """Three team-mates all round a circle, each on its way to the opposite point."""
+    circle(cast, 3)
+
+
+def circle_6(cast: Cast) -> None:
+    """Six team-mates all round a circle, each on its way to the opposite point."""
+    circle(cast, 6)
 
 
 def doorway(cast: Cast) -> None:

@@ -30,6 +30,7 @@ CELL_KEYS = {
     "speed_change_mps": "mean change of the commanded speed over changed steps, m/s",
     "goal_time_ratio": "time to the first goal over that without a guard; never there counts as the whole length",
     "reached_percent": "own boats that reached their first goal, %",
+    "never_arrived_percent": "own boats that had not reached their first goal by the end but do without a guard, %",
     "deadlocked": "encounters in which two team-mates that want to move stood still for over 10 s",
     "reversals_per_min": "flips of the commanded side per own boat and minute",
     "unshielded_reversals_per_min": "the same without a guard",

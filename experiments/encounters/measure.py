@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
+from .arrival import never_arrived
 from .families import draw
 from .guards import NONE, GuardMaker
 from .play import Film, play
@@ -100,13 +101,15 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
 
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
-        ``start_certificate_m`` (see `start`), those of `tally.tally`, ``unshielded_*`` of `BARE_SAME` and
-        `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per game and step), and the verdicts.
+        ``start_certificate_m`` (see `start`), those of `tally.tally`, ``never_arrived`` (see `arrival`),
+        ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
+        game and step), and the verdicts.
     """
     play(replace(scenes.take([0]), length_s=DT_S), guard, conditions)  # compiles, so that what is timed is deciding
     film = play(scenes, guard, conditions)
-    counted = tally(film)
-    bare = counted if guard == NONE else tally(play(scenes, NONE, conditions))
+    bare_film = film if guard == NONE else play(scenes, NONE, conditions)
+    counted = tally(film) | {"never_arrived": never_arrived(film, bare_film)}
+    bare = tally(bare_film)
     worst, verdicts = _verdicts(film, counted, judge)
     columns = {"number": scenes.number[worst].astype(np.float64), "game": worst.astype(np.float64)}
     columns["variant"] = np.array([game - np.argmax(scenes.number == scenes.number[game]) for game in worst], float)

@@ -29,6 +29,7 @@ COLUMNS = (
     ("speed_change_mps", "changed by, m/s"),
     ("goal_time_ratio", "time to goal, ×"),
     ("reached_percent", "goal reached, %"),
+    ("never_arrived_percent", "never arrived, %"),
     ("deadlocked", "deadlocked"),
     ("reversals_per_min", "reversals/min"),
     ("decision_us", "decision, µs"),

@@ -88,6 +88,7 @@ def _course_figures(columns: Columns) -> dict[str, Any]:
     return {
         "goal_time_ratio": float(goal / bare) if bare > 0 else None,
         "reached_percent": 100.0 * float(columns["reached"].mean()),
+        "never_arrived_percent": 100.0 * float(columns["never_arrived"].mean()),
         "deadlocked": int((columns["deadlocks"] > 0).sum()),
         "reversals_per_min": float(columns["reversals_per_min"].mean()),
         "unshielded_reversals_per_min": float(columns["unshielded_reversals_per_min"].mean()),

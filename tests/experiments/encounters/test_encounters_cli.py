@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from steerclear.env.record import read_meta, validate
 from steerclear.experiments import cli, keys
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, campaign, draw, play
 from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
 from steerclear.experiments.encounters.replays import record_of, records_of
-from steerclear.experiments.encounters.results import bars_of
+from steerclear.experiments.encounters.results import bars_of, cells_table
 from steerclear.experiments.encounters.scene_file import write_scene
 from steerclear.experiments.encounters.worst import worst_encounters
 from typer.testing import CliRunner
@@ -178,6 +179,21 @@ def test_one_rammer_must_not_breach_what_started_outside(hits, met):
     cell = asdict(campaign.Cell("shield", "heron", "heron", "rammer_1")) | counts
     assert bars_of([cell])[1]["met"] is met
     assert len(bars_of([cell | {"other": "surveyor"}])) == 1
+
+
+def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
+    counts = {"unshielded_breached": 1000, "started_outside": 1000, "never_arrived_percent": 41.7, "decision_us": 28.3}
+    names = ("breached", "avoidable", "not_judged", "unavoidable", "started_inside", "breaches_outside", "deadlocked")
+    means = dict.fromkeys(("closest_m", "goal_time_ratio"), 2.6) | {"avoidable_upper": 0.003}
+    means |= dict.fromkeys(("changed_percent", "reversals_per_min"), 10.6)
+    cell = asdict(campaign.Cell("shield", "heron", "heron", "crossing_right")) | dict.fromkeys(names, 0)
+    console = Console(width=80)
+    with console.capture() as shown:
+        console.print(*cells_table({"cells": [cell | counts | means | {"encounters": 1000}]}))
+    text = shown.get()
+    assert "…" not in text
+    heads, row = (text.splitlines()[k].split() for k in (1, 3))
+    assert (row[0], row[heads.index("out") + 1], row[heads.index("lost") + 1]) == ("crossing_right", "0/1000", "41.7")
 
 
 def test_a_distribution_ends_at_the_edge_and_never_falls():

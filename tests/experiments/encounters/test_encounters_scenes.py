@@ -28,7 +28,8 @@ def test_every_family_starts_apart_and_fits(family, own, other):
     assert scenes.own.any()
     assert np.isfinite(scenes.state).all()
     assert (np.unique(scenes.number) == [0, 1, 2]).all()
-    assert scenes.length_s == (45.0 if (own, other) == ("heron", "heron") else 60.0)
+    usual_s = 45.0 if (own, other) == ("heron", "heron") else 60.0
+    assert scenes.length_s == usual_s * FAMILIES[family].lasts
     assert FAMILIES[family].words.endswith(".")
     np.testing.assert_allclose(np.hypot(*scenes.current.T), 1.0)
     if scenes.field is not None:
@@ -79,6 +80,29 @@ def test_crossings_come_from_the_side_they_are_named_after():
         apart = state[:, 1, :2] - state[:, 0, :2]
         right = apart[:, 0] * np.cos(course) - apart[:, 1] * np.sin(course)
         assert (np.sign(right) == sign).all()
+
+
+@pytest.mark.parametrize("family", ["circle_3", "circle_6"])
+@pytest.mark.parametrize(("own", "other"), [("heron", "heron"), ("heron", "surveyor")])
+def test_boats_round_a_circle_want_to_its_opposite_point_and_would_be_in_the_middle_at_once(family, own, other):
+    scenes = draw(family, own, other, USUAL, 0, 0, 30)
+    boats = len(scenes.platforms)
+    assert scenes.own.all()
+    assert scenes.platforms == ((own, other) * boats)[:boats]
+    start = scenes.state[:, :, :2]
+    np.testing.assert_allclose(scenes.goals[:, :, 0], -start, atol=1e-9)
+    bearings = np.radians(scenes.state[:, :, L.HEADING])
+    far = np.linalg.norm(start, axis=-1)
+    np.testing.assert_allclose(start, -far[..., None] * np.stack([np.sin(bearings), np.cos(bearings)], -1), atol=1e-9)
+    across_s = 2.0 * far / scenes.state[:, :, L.SPEED]
+    np.testing.assert_allclose(across_s, across_s[:, :1] * np.ones(boats))
+    assert across_s.min() > 15.0
+    assert across_s.max() < 25.0
+    assert np.ptp(across_s[:, 0]) > 5.0
+    angles = np.sort(np.arctan2(start[..., 0], start[..., 1]), axis=1)
+    apart_deg = np.degrees(np.diff(angles, axis=1, append=angles[:, :1] + 2.0 * np.pi))
+    off_deg = np.abs(apart_deg - 360.0 / boats)
+    assert 5.0 < off_deg.max() <= 20.0
 
 
 @pytest.mark.parametrize(
