@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -39,8 +38,8 @@ class Shared:
 
     def __init__(self, row: Any) -> None:
         self._tuple = row
-        self._type = SharedType(typeof(row))
-        self._copy = np.frombuffer(_bytes_of(self._type.row, row), np.uint8).copy()
+        self._type, write = _of_kind(row)
+        self._copy = np.frombuffer(write(row), np.uint8).copy()
         self._address = int(self._copy.ctypes.data)
 
     def __getattr__(self, name: str) -> Any:
@@ -96,6 +95,31 @@ def _full_name(of: Any) -> str:
     return f"{of_class.__module__}.{of_class.__qualname__}({fields})"
 
 
+_KINDS: dict[Any, tuple[SharedType, Writer]] = {}
+
+
+def _of_kind(row: Any) -> tuple[SharedType, Writer]:
+    """Type of a shared tuple of these fields, and its writer.
+
+    numba, which takes a millisecond for fifty fields, is asked once for each kind of them.
+    """
+    kind = _kind(row)
+    if kind not in _KINDS:
+        of = typeof(row)
+        _KINDS[kind] = SharedType(of), _writer(of)[0]
+    return _KINDS[kind]
+
+
+def _kind(value: Any) -> Any:
+    """All that numba's type of a value hangs on."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags
+        return value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
+    if isinstance(value, Shared):
+        return value._type
+    return (type(value), *map(_kind, value)) if isinstance(value, tuple) else type(value)
+
+
 @typeof_impl.register(Shared)
 def _typeof_shared(value: Shared, context: Any) -> SharedType:
     return value._type
@@ -132,62 +156,65 @@ def _read_field(context: Any, builder: Any, of: SharedType, pointer: Any, name: 
     return impl_ret_borrowed(context, builder, of.row.types[place], value)
 
 
-def _bytes_of(of: Any, value: Any) -> bytes:
-    """A value as compiled code keeps it in memory.
+Writer = Callable[[Any], bytes]
+"""Turns a value into bytes as compiled code keeps it in memory; made once for a type, and quick.
 
-    Written here and not by compiled code, whose disk cache would hold every tuple ever shared.
+Not compiled itself: the compiler's disk cache would hold every tuple ever shared.
+"""
+
+_NUMBERS = {types.float64: "d", types.int64: "q", types.boolean: "?"}
+_ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
+_WORD = 8
+
+
+def _writer(of: Any) -> tuple[Writer, int]:
+    """Writer of values of a type, and how many bytes it writes.
 
     Raises:
         TypeError: it is none of an array, a float64, an int64, a bool, or a tuple or shared tuple of such.
     """
     if isinstance(of, types.Array):
-        return _array_bytes(of, value)
+        return _array_writer(of)
     if isinstance(of, SharedType):
-        return struct.pack("q", value._address)
+        return (lambda value: struct.pack("q", value._address)), _WORD
     if isinstance(of, types.BaseTuple):
-        tuple_type: Any = of
-        size, places = _places(of)
-        whole = bytearray(size)
-        for (start, length), kind, item in zip(places, tuple_type.types, value, strict=True):
-            content = _bytes_of(kind, item)
-            if len(content) != length:
-                raise TypeError(f"numba gives {length} bytes to {kind}, not {len(content)}: its memory is not known")
-            whole[start : start + length] = content
-        return bytes(whole)
-    if of not in _NUMBERS:
-        raise TypeError(f"{of} cannot be shared; give arrays, float64, int64, bool, and tuples of them")
-    return struct.pack(_NUMBERS[of], value)
+        return _tuple_writer(of)
+    if of in _NUMBERS:
+        form = struct.Struct(_NUMBERS[of])
+        return form.pack, form.size
+    raise TypeError(f"{of} cannot be shared; give arrays, float64, int64, bool, and tuples of them")
 
 
-_NUMBERS = {types.float64: "d", types.int64: "q", types.boolean: "?"}
-
-
-def _array_bytes(of: Any, array: Any) -> bytes:
+def _array_writer(of: Any) -> tuple[Writer, int]:
     """An array's place, shape and strides. It names no owner, so that nobody counts references to it."""
-    known = {
-        "meminfo": (0,),
-        "parent": (0,),
-        "nitems": (array.size,),
-        "itemsize": (array.itemsize,),
-        "data": (array.ctypes.data,),
-        "shape": array.shape,
-        "strides": array.strides,
-    }
     fields = cpu_target.target_context.data_model_manager[of]._fields
-    if set(fields) != set(known):
+    if fields != _ARRAY:
         raise TypeError(f"numba lays arrays out as {', '.join(fields)}: this version of it is not known")
-    words = [word for name in fields for word in known[name]]
-    return struct.pack(f"{len(words)}q", *words)
+    form, nobody = struct.Struct(f"{5 + 2 * of.ndim}q"), (0, 0)
+
+    def write(array: Any) -> bytes:
+        return form.pack(*nobody, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides)
+
+    return write, form.size
 
 
-@cache
-def _places(of: Any) -> tuple[int, tuple[tuple[int, int], ...]]:
-    """Bytes of a tuple in memory, and where each of its fields begins and how many it has."""
+def _tuple_writer(of: Any) -> tuple[Writer, int]:
+    """The fields one after another, each where the compiler has it."""
     context = cpu_target.target_context
     form, data = context.get_value_type(of), context.target_data
-    lengths = [context.get_value_type(kind).get_abi_size(data) for kind in of.types]
-    if isinstance(form, ir.ArrayType):  # a tuple of one kind
-        starts = [k * length for k, length in enumerate(lengths)]
-    else:
-        starts = [form.get_element_offset(data, k) for k in range(len(lengths))]
-    return form.get_abi_size(data), tuple(zip(starts, lengths, strict=True))
+    size, parts = form.get_abi_size(data), []
+    for k, kind in enumerate(of.types):
+        write, length = _writer(kind)
+        has = context.get_value_type(kind).get_abi_size(data)
+        if has != length:
+            raise TypeError(f"numba gives {has} bytes to {kind}, not {length}: its memory is not known")
+        start = k * length if isinstance(form, ir.ArrayType) else form.get_element_offset(data, k)
+        parts.append((start, start + length, write))
+
+    def write_all(value: Any) -> bytes:
+        whole = bytearray(size)
+        for (start, end, write), item in zip(parts, value, strict=True):
+            whole[start:end] = write(item)
+        return bytes(whole)
+
+    return write_all, size

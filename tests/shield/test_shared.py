@@ -227,16 +227,25 @@ def test_what_is_asked_before_it_is_made_is_an_error():
 
 def test_an_unknown_layout_is_refused(monkeypatch):
     """Of a numba that keeps arrays or tuples another way nothing is guessed."""
-    shared._places.cache_clear()
-    known = shared._NUMBERS
-    monkeypatch.setitem(known, types.int64, "i")
+    monkeypatch.setattr(shared, "_KINDS", {})
+    monkeypatch.setitem(shared._NUMBERS, types.int64, "i")
     with pytest.raises(TypeError, match="not known"):
         share(Inner(True, 1, FROZEN))
     monkeypatch.undo()
+    monkeypatch.setattr(shared, "_KINDS", {})
     model = cpu_target.target_context.data_model_manager[typeof(FROZEN)]
     monkeypatch.setattr(model, "_fields", (*model._fields, "more"))
     with pytest.raises(TypeError, match="not known"):
         share(Array(FROZEN))
+
+
+def test_numba_is_asked_once_for_tuples_of_a_kind(monkeypatch):
+    first = share(outer())
+    monkeypatch.setattr(shared, "typeof", None)
+    assert typeof(share(outer(3, 7, 2))) is typeof(first)
+    for other in (outer()._replace(row=FROZEN), outer()._replace(speed=2), outer()._replace(table=DRAWN)):
+        with pytest.raises(TypeError, match="not callable"):
+            share(other)
 
 
 def test_a_field_that_is_not_there_is_an_error():
