@@ -10,7 +10,7 @@ from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
 from .certificates.fixed_things import clear_of_near_obstacles
 from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, only_fixed, worst_merit
+from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, STRAIGHT_SAFE, only_fixed, worst_merit
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
@@ -24,6 +24,13 @@ from .work import Work
 
 CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
+
+CLEARLY_BY_TABLES = 0.1
+"""The same where a boat that looks opponents up is short of its margin from them.
+
+A hard turn of one step costs such a boat the speed of three steps, of which a table tells hardly more than it errs by.
+A wanted turn sent whenever it looks a little better keeps a hunted boat from ever gaining speed.
+"""
 
 WORSE_BY_FIXED = 1e-6
 """The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
@@ -117,6 +124,16 @@ def _assign_escapes(
 
 
 @lean_kernel
+def _clearly(count: int, before: float, after: float, boats: Boats, plan: Plan) -> float:
+    """Merit by which the program's answer (before) must exceed the escapes' (after) to be kept."""
+    if after >= STRAIGHT_SAFE and before < FIXED_LOST:
+        for m in range(count):
+            if boats.look[plan.movers[m]] > 0:
+                return CLEARLY_BY_TABLES
+    return CLEARLY
+
+
+@lean_kernel
 def ladder(
     count: int,
     state: Array,
@@ -156,7 +173,8 @@ def ladder(
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     after = worst_merit(ours, work)
-    if not good and (before > after + CLEARLY or (before >= FIXED_LOST and before >= after - WORSE_BY_FIXED)):
+    clearly = _clearly(count, before, after, boats, plan)
+    if not good and (before > after + clearly or (before >= FIXED_LOST and before >= after - WORSE_BY_FIXED)):
         for m in range(count):
             i = plan.movers[m]
             copy_row(plan.commands[i], plan.answer[i])

@@ -43,7 +43,8 @@ class Boats(NamedTuple):
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
         table_margin_m: added to the radius where a table is looked into, m.
         look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
-        joint_look: the same for boats that several opponents come near to.
+        joint_samples: path samples over which opponents of a boat that several come near to are run through before they
+            are looked up.
         feared: whether some boat's table is about this boat, (n,).
     """
 
@@ -69,7 +70,7 @@ class Boats(NamedTuple):
     table: IntArray
     table_margin_m: float
     look: IntArray
-    joint_look: int
+    joint_samples: int
     feared: BoolArray
 
 

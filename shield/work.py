@@ -44,8 +44,6 @@ class Work(NamedTuple):
         ready: (n + 1, 4) what is noted of a plan's path, see `certificates.paths`.
         decided: (n + 1,) sample at which the merit of a plan that fails was decided; infinite where it hangs on more.
         hunter: (5,) where a hunter is at the end of its run: x, y, m, heading as a unit vector, speed m/s.
-        later: (n + 1, 5) place at which such a boat is looked up.
-        ways_later: (n, 3, 5) places opponents may be at by then.
         nobody: (n,) False.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
         first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
@@ -83,8 +81,6 @@ class Work(NamedTuple):
     ready: Array
     decided: Array
     hunter: Array
-    later: Array
-    ways_later: Array
     nobody: BoolArray
     searched: IntArray
     first_hunter: IntArray
@@ -126,8 +122,6 @@ def new_work(boats: int, samples: int) -> Work:
             ready=np.full((boats + 1, 4), -1.0),
             decided=np.full(boats + 1, np.inf),
             hunter=np.zeros(5),
-            later=np.zeros((boats + 1, 5)),
-            ways_later=np.zeros((boats, 3, 5)),
             nobody=np.zeros(boats, np.bool_),
             searched=np.full(boats, -1, np.int64),
             first_hunter=np.zeros(boats, np.int64),

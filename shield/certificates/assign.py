@@ -26,7 +26,6 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
         copy_row(work.path[i, k], work.path[slot, k])
     copy_row(work.plan[i], work.plan[slot])
     copy_row(work.place[i], work.place[slot])
-    copy_row(work.later[i], work.later[slot])
     copy_row(work.ready[i], work.ready[slot])
     copy_row(work.clear[i], work.clear[slot])
     copy_row(work.fixed[i], work.fixed[slot])

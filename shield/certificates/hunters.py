@@ -13,7 +13,7 @@ from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .paths import READY_SAMPLE
 from .pursuer import clear_of_pursuer
-from .values import looked_up, margin_at_once, margin_later, margin_when_ready, tabled
+from .values import looked_up, margin_at_once, margin_when_ready, tabled
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
@@ -54,7 +54,8 @@ def clear_of_hunter(
 
     The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently. The one that
     came below its floor last is looked at first. They are followed until the boat's thrust is full and as long beyond
-    as such a boat needs to get away; where a table is for the pair it tells what they can do from there on.
+    as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust is full,
+    of a beset boat (see `values.find_beset`) not before ``boats.joint_samples``.
     """
     ready = int(work.ready[slot, READY_SAMPLE])
     till_ready = ready >= 0 and tabled(i, j, ours, boats, work)
@@ -186,17 +187,20 @@ def worst_hunter(
         j = first_then_rest(first, number)
         if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
             continue
+        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+        floor_m = min(work.threat_target_m[i, j], level_m)
         if looked_up(i, j, slot, ours, boats, work):
             at_once = margin_at_once(i, j, slot, -FAR, boats, work)
-            margin = min(at_once, margin_later(i, j, slot, -FAR, boats, work))
-            at = math.ceil(boats.joint_look / boats.stride)
+            margin, at = at_once, 0.0
+            if work.beset[i]:
+                clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+                if work.out[MARGIN] < margin:
+                    margin, at = work.out[MARGIN], work.out[SAMPLE]
             at_best = min(at_best, at_once)
             refused = refused or at_once < work.threat_target_m[i, j]
             if margin < work.clear[slot, MARGIN]:
                 work.clear[slot, MARGIN], work.bound[slot] = margin, j
         else:
-            # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-            floor_m = min(work.threat_target_m[i, j], level_m)
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
             margin, at = work.out[MARGIN], work.out[SAMPLE]
             if margin < work.clear[slot, MARGIN]:
@@ -207,7 +211,7 @@ def worst_hunter(
         work.threats_m[slot, j] = margin
         if margin < work.threat_target_m[i, j]:
             fails, failed_at = True, min(failed_at, at)
-        if margin < min(work.threat_target_m[i, j], level_m):
+        if margin < floor_m:
             work.first_hunter[i] = j
             break
     work.sealed[slot] = refused and threat >= at_best

@@ -9,7 +9,7 @@ from .clearance import FAR
 from .hunters import first_then_rest
 from .paths import trace_path
 from .rating import STRAIGHT_BASE, STRAIGHT_SAFE
-from .values import looked_up, margin_at_once, margin_later, set_place, tabled
+from .values import looked_up, margin_at_once, set_place, tabled
 
 NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
 """How far hunters are run through: not at all, until thrust is back and tables answer, or to the end of the hunt."""
@@ -68,16 +68,12 @@ def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Bo
         if j == i or not work.near[i, j] or not looked_up(i, j, slot, ours, boats, work):
             continue
         enough_m = min(work.threat_target_m[i, j], best - STRAIGHT_BASE) - CLEARLY_M
-        for look in range(2):
-            if look == 0:
-                margin = margin_at_once(i, j, slot, enough_m, boats, work)
-            else:
-                margin = margin_later(i, j, slot, enough_m, boats, work)
-            least = min(least, margin)
-            fails = fails or margin < work.threat_target_m[i, j]
-            if fails and STRAIGHT_BASE + least <= best:
-                work.first_refuser[i] = j
-                return True
+        margin = margin_at_once(i, j, slot, enough_m, boats, work)
+        least = min(least, margin)
+        fails = fails or margin < work.threat_target_m[i, j]
+        if fails and STRAIGHT_BASE + least <= best:
+            work.first_refuser[i] = j
+            return True
     return False
 
 
@@ -85,7 +81,12 @@ def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Bo
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     how = hunters_run(i, slot, boats, work)
-    samples = boats.samples[i] if how == NO_HUNTERS else boats.hunt_samples[i] + boats.thrust_samples[i]
+    samples = boats.samples[i]
+    if how != NO_HUNTERS or work.beset[i]:
+        samples = boats.hunt_samples[i] + boats.thrust_samples[i]
+    earliest = 0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride
+    if work.beset[i]:
+        earliest = max(earliest, boats.joint_samples)
     beyond = boats.hunt_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
@@ -101,7 +102,7 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         samples,
         boats.samples[i],
         beyond,
-        0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride,
+        earliest,
         boats.ready_thrust[i],
         work.path[slot],
         work.ready[slot],

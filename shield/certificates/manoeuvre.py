@@ -77,7 +77,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
                 work.breach[j, i] = now < least
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
-    find_beset(ours, state, boats, tuning, work)
+    find_beset(ours, state, boats, work)
 
 
 @lean_kernel

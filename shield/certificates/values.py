@@ -61,14 +61,13 @@ def run_opponents(
 
 
 @lean_kernel
-def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
     """Mark the boats of ours that more than one opponent can come near to, as far as the tables tell.
 
-    Each table knows of one opponent only: two may each leave a way out, and not the same. Such a boat is looked up
-    some time into its manoeuvre as well, against all of them at that place: then one manoeuvre has to do for all.
+    Each table knows of one opponent only: two may each leave a way out, and not the same. Opponents of such a boat
+    are run through for some time as well, before they are looked up: then one manoeuvre has to do for all.
     """
     n = state.shape[0]
-    some = False
     for i in range(n):
         work.beset[i] = False
         if not ours[i] or boats.look[i] == 0:
@@ -79,9 +78,6 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work
             if j != i and work.near[i, j] and looked_up(i, j, i, ours, boats, work):
                 count += 1 if table_margin(i, j, work.place[i], work.ways[j], -FAR, boats, work) < FAR else 0
         work.beset[i] = count > 1
-        some = some or count > 1
-    if some:
-        run_opponents(boats.joint_look + 1, ours, state, boats, tuning, work, work.ways_later)
 
 
 @lean_kernel
@@ -100,21 +96,14 @@ def set_place(
     """Write where boat i is looked up for the manoeuvre in ``slot``.
 
     That is its predicted state (done = 1), the same for every manoeuvre, or where it is ``boats.look`` steps into the
-    manoeuvre (done = 0): within one step manoeuvres hardly differ. Where it is ``boats.joint_look`` steps after that
-    of one step from now is written, too, when the boat is beset.
+    manoeuvre (done = 0): within one step manoeuvres hardly differ.
     """
     if boats.look[i] == 0:
         return
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
-    first = 0 if done == 1 else boats.look[i]
-    for _ in range(first):
+    for _ in range(0 if done == 1 else boats.look[i]):
         togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
     _note_place(work.row, boats.ready_thrust[i], work.place[slot])
-    if not work.beset[i]:
-        return
-    for _ in range(boats.joint_look + 1 - done - first):
-        togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
-    _note_place(work.row, boats.ready_thrust[i], work.later[slot])
 
 
 @lean_kernel
@@ -146,7 +135,7 @@ def margin_when_ready(
     boats: Boats,
     work: Work,
 ) -> float:
-    """Margin, m, of boat i where its thrust is full at last, opponent j being at (x, y) heading (ux, uy) then."""
+    """Margin, m, of boat i where a run of opponent j ends that is to be looked up: at (x, y), heading (ux, uy)."""
     table, k = boats.table[i, j], int(ready[READY_SAMPLE])
     value = table_value(
         boats.tables,
@@ -198,16 +187,6 @@ def margin_at_once(i: int, j: int, slot: int, enough_m: float, boats: Boats, wor
     For ``enough_m`` see `table_margin`.
     """
     return table_margin(i, j, work.place[slot], work.ways[j], enough_m, boats, work)
-
-
-@lean_kernel
-def margin_later(i: int, j: int, slot: int, enough_m: float, boats: Boats, work: Work) -> float:
-    """The same some time into the manoeuvre, of a boat that is beset; `FAR` for others."""
-    if not work.beset[i]:
-        return FAR
-    if work.later[slot, PLACE_USABLE] == 0.0:  # nothing is known of a boat that has let its thrust go by then
-        return -work.radius[i, j]
-    return table_margin(i, j, work.later[slot], work.ways_later[j], enough_m, boats, work)
 
 
 @lean_kernel

@@ -18,9 +18,12 @@ from .moves import moves_of, sub_steps
 
 FAR_M = 30.0
 """Tables that go farther than this get fewer ranges, the nearest of them closer together."""
-LONGEST_S = 30.0
-"""Longest play that is fitted: over longer ones a faster boat catches the most agile one from anywhere (the
+LONGEST_CHASE_S = 30.0
+"""Longest play that is fitted against a faster boat: over longer ones it catches the most agile one from anywhere (the
 homicidal chauffeur), and a table that says so is of no use."""
+LONGEST_S = 90.0
+"""Longest play that is fitted against others. Who has lost its speed is chased for as long as it takes to win it back,
+and a table that ends sooner promises what is lost just beyond its end."""
 SPEED_NODES = 5
 """Nodes along each axis of speed."""
 RUDDERS = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -129,7 +132,7 @@ def problem_of(
         other_top_mps=boats[1].max_speed_mps,
         rho_ratio=8.0 if far else 5.0,
     )
-    return Problem(*boats, mode, grid, dt_s, _fitted_horizon(half_turn_s) if horizon_s is None else horizon_s)
+    return Problem(*boats, mode, grid, dt_s, _fitted_horizon(boats) if horizon_s is None else horizon_s)
 
 
 def _fitted_step(boats: tuple[Platform, Platform]) -> float:
@@ -149,9 +152,14 @@ def _full_turn_deg(boat: Platform, dt_s: float) -> float:
     return math.degrees(abs(moves.turn_rad[0, 0]))
 
 
-def _fitted_horizon(half_turn_s: float) -> float:
-    """Several half turns and the return to top speed, at most `LONGEST_S`."""
-    return min(max(20.0, 7.0 * half_turn_s), LONGEST_S)
+def _fitted_horizon(boats: tuple[Platform, Platform]) -> float:
+    """Several half turns, and against a boat that is not faster the return to top speed as well, s."""
+    own, other = limits_of(boats[0]), limits_of(boats[1])
+    turns_s = 7.0 * max(own.half_turn_s, other.half_turn_s)
+    if boats[1].max_speed_mps > boats[0].max_speed_mps:
+        return min(max(20.0, turns_s), LONGEST_CHASE_S)
+    regain_s = own.top_speed_mps / max(own.acceleration_mps2, 1e-6)
+    return min(max(20.0, turns_s + regain_s), LONGEST_S)
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:

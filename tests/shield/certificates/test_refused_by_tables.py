@@ -7,7 +7,7 @@ from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.clearance import FAR
 from steerclear.shield.certificates.laying import refused_by_tables, set_out
 from steerclear.shield.certificates.rating import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
-from steerclear.shield.certificates.values import looked_up, margin_at_once, margin_later
+from steerclear.shield.certificates.values import looked_up, margin_at_once
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
 
@@ -36,9 +36,9 @@ def most_merit(at):
     margins, fails = [FAR], False
     for j in range(1, 4):
         if at.work.near[0, j] and looked_up(0, j, TRIAL, at.ours, at.boats, at.work):
-            found = [look(0, j, TRIAL, -FAR, at.boats, at.work) for look in (margin_at_once, margin_later)]
-            fails = fails or min(found) < at.work.threat_target_m[0, j]
-            margins += found
+            margin = margin_at_once(0, j, TRIAL, -FAR, at.boats, at.work)
+            fails = fails or margin < at.work.threat_target_m[0, j]
+            margins.append(margin)
     return max(STRAIGHT_SAFE, STRAIGHT_BASE + min(margins)) if fails else 2.0 * PAIR_SAFE
 
 

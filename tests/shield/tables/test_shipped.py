@@ -7,7 +7,8 @@ import pytest
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.areas import area_m2, reach_ahead_m, unsafe
 from steerclear.shield.tables.files import SHIPPED, check_parameters, read_table
-from steerclear.shield.tables.settings import OtherMay, table_name
+from steerclear.shield.tables.settings import OtherMay, problem_of, table_name
+from steerclear.shield.tables.solve import CONVERGED_M
 
 BOATS = ("heron", "surveyor")
 PLACES = list(itertools.product(BOATS, BOATS, OtherMay))
@@ -16,7 +17,7 @@ SHORT = {
     ("heron", "surveyor", "2.5"): 0.16,
     ("heron", "surveyor", "4"): 0.37,
     ("surveyor", "heron", "4"): 0.11,
-    ("surveyor", "surveyor", "4"): 0.16,
+    ("surveyor", "surveyor", "4"): 0.2,
 }
 """Worst-case tables that are known to fall short of it, and by how much (docs/tables.md)."""
 FILES = {path.name for path in SHIPPED.glob("*.npz")}
@@ -35,6 +36,13 @@ def test_every_pair_has_its_table(own, other, mode):
         assert card.margin[radius]["runs"] >= 1000
         known = SHORT.get((own, other, radius)) if mode is OtherMay.WORST_CASE else None
         assert card.convergence[radius]["mean"] <= (known or CONVERGED_SHARE)
+
+
+@pytest.mark.parametrize("other", BOATS)
+def test_who_is_no_slower_is_followed_until_nothing_changes(other):
+    card = shipped("surveyor", other, OtherMay.WORST_CASE).card
+    assert card.residual_m <= CONVERGED_M
+    assert card.horizon_s == problem_of("surveyor", other).horizon_s == 90.0
 
 
 def test_nothing_else_is_shipped_and_it_is_small():
