@@ -31,7 +31,8 @@ PASSES, TO_SOLVE, TO_ESCAPE = range(3)
 """What is left to do once the wanted commands are screened: nothing, the program, or the ladder at once."""
 
 NO_ANSWER, UNSAFE, SAFE = range(3)
-"""What an answer of the program comes to: none that can be sent, one that fails the exact check, one that passes."""
+"""What an answer of the program comes to: none that can be sent, or none but what failed already, one that fails the
+exact check, one that passes."""
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
@@ -59,6 +60,7 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
         memory.fixed_m[i] = work.fixed[i, MARGIN] if work.merit[i] >= FIXED_LOST else 0.0
+        memory.joint_m[i] = work.joint_m[i] if work.beset[i] else 0.0
         if boats.look[i] > 0:
             copy_row(memory.threat_m[i], work.threats_m[i])
         else:
@@ -97,10 +99,26 @@ def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
 
 
 @lean_kernel
+def _as_before(count: int, plan: Plan) -> bool:
+    """Whether the movers' commands are those in ``plan.answer``, bit for bit."""
+    for m in range(count):
+        i = plan.movers[m]
+        if plan.commands[i, 0] != plan.answer[i, 0] or plan.commands[i, 1] != plan.answer[i, 1]:
+            return False
+    return True
+
+
+@lean_kernel
 def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) -> int:
-    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`."""
+    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`.
+
+    The rows do not know everything that the check does (runs of several opponents): where the program leaves all as it
+    was there is nothing to check, and nothing to linearise anew.
+    """
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    if not take_answer(z, count, state, boats, tuning, plan):
+    for m in range(count):
+        copy_row(plan.answer[plan.movers[m]], plan.commands[plan.movers[m]])
+    if not take_answer(z, count, state, boats, tuning, plan) or _as_before(count, plan):
         return NO_ANSWER
     if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
         return SAFE

@@ -10,7 +10,7 @@ from .certificates.assign import assign_plans, hold
 from .certificates.clearance import MARGIN
 from .certificates.fixed_things import clear_of_near_obstacles
 from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, STRAIGHT_SAFE, only_fixed, worst_merit
+from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, STRAIGHT_SAFE, only_fixed, worst_merit, worst_off
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
@@ -26,7 +26,7 @@ CLEARLY = 1e-2
 """Difference of merit that counts when an answer of the program is weighed against an escape."""
 
 CLEARLY_BY_TABLES = 0.1
-"""The same where a boat that looks opponents up is short of its margin from them.
+"""The same where the boat that is worst off looks opponents up and is short of its margin from them.
 
 A hard turn of one step costs such a boat the speed of three steps, of which a table tells hardly more than it errs by.
 A wanted turn sent whenever it looks a little better keeps a hunted boat from ever gaining speed.
@@ -115,6 +115,7 @@ def _assign_escapes(
         i = plan.movers[m]
         work.target[i] = 0.0
         work.threat_target_m[i, :] = 0.0
+        work.joint_target_m[i] = 0.0
         work.fixed_target_m[i] = 0.0
         look = max(look, boats.look[i])
     run_opponents(look, ours, state, boats, tuning, work, work.ways)
@@ -124,12 +125,11 @@ def _assign_escapes(
 
 
 @lean_kernel
-def _clearly(count: int, before: float, after: float, boats: Boats, plan: Plan) -> float:
-    """Merit by which the program's answer (before) must exceed the escapes' (after) to be kept."""
-    if after >= STRAIGHT_SAFE and before < FIXED_LOST:
-        for m in range(count):
-            if boats.look[plan.movers[m]] > 0:
-                return CLEARLY_BY_TABLES
+def _clearly(before: float, ours: BoolArray, boats: Boats, work: Work) -> float:
+    """Merit by which the program's answer (before) must exceed the escapes', which are held now, to be kept."""
+    i = worst_off(ours, work)
+    if i >= 0 and boats.look[i] > 0 and work.merit[i] >= STRAIGHT_SAFE and before < FIXED_LOST:
+        return CLEARLY_BY_TABLES
     return CLEARLY
 
 
@@ -173,7 +173,7 @@ def ladder(
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     after = worst_merit(ours, work)
-    clearly = _clearly(count, before, after, boats, plan)
+    clearly = _clearly(before, ours, boats, work)
     if not good and (before > after + clearly or (before >= FIXED_LOST and before >= after - WORSE_BY_FIXED)):
         for m in range(count):
             i = plan.movers[m]

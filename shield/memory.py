@@ -20,7 +20,8 @@ class Memory(NamedTuple):
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
         threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
-        fixed_m: the same from fixed things, 0 where it was not looked at.
+        joint_m: of boats that look opponents up, the least on runs of several, 0 where there were none.
+        fixed_m: the margin from fixed things, 0 where it was not looked at.
         escaping: whether the boat was carrying it out at the last decision.
         pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
             given way to it, see `right_of_way`.
@@ -36,6 +37,7 @@ class Memory(NamedTuple):
     speed_mps: Array
     margin_m: Array
     threat_m: Array
+    joint_m: Array
     fixed_m: Array
     escaping: BoolArray
     pressed_s: Array
@@ -55,6 +57,7 @@ def new_memory(*shape: int) -> Memory:
             speed_mps=np.zeros(shape),
             margin_m=np.zeros(shape),
             threat_m=np.zeros((*shape, shape[-1])),
+            joint_m=np.zeros(shape),
             fixed_m=np.zeros(shape),
             escaping=np.zeros(shape, np.bool_),
             pressed_s=np.zeros(shape),
@@ -75,6 +78,7 @@ def take_memory(games: Memory, game: int, own: Memory) -> None:
     own.speed_mps[:] = games.speed_mps[game]
     own.margin_m[:] = games.margin_m[game]
     own.threat_m[:] = games.threat_m[game]
+    own.joint_m[:] = games.joint_m[game]
     own.fixed_m[:] = games.fixed_m[game]
     own.escaping[:] = games.escaping[game]
     own.pressed_s[:] = games.pressed_s[game]
@@ -93,6 +97,7 @@ def put_memory(own: Memory, game: int, games: Memory) -> None:
     games.speed_mps[game] = own.speed_mps
     games.margin_m[game] = own.margin_m
     games.threat_m[game] = own.threat_m
+    games.joint_m[game] = own.joint_m
     games.fixed_m[game] = own.fixed_m
     games.escaping[game] = own.escaping
     games.pressed_s[game] = own.pressed_s

@@ -18,6 +18,7 @@ _OWN = (
     "target_deg",
     "speed_mps",
     "margin_m",
+    "joint_m",
     "fixed_m",
     "escaping",
     "pressed_s",

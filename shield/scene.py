@@ -43,8 +43,12 @@ class Boats(NamedTuple):
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
         table_margin_m: added to the radius where a table is looked into, m.
         look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
+        joint_decay: factor by which the margin on such runs may shrink in one step.
         joint_samples: path samples over which opponents of a boat that several come near to are run through before they
             are looked up.
+        told_range_m: range, m, beyond which each table tells margins of their cap or more, for each of its cells of
+            own speed, (tables, cells); infinite where it does so nowhere.
+        told_radius_m: largest radius for which that holds, m.
         feared: whether some boat's table is about this boat, (n,).
     """
 
@@ -70,7 +74,10 @@ class Boats(NamedTuple):
     table: IntArray
     table_margin_m: float
     look: IntArray
+    joint_decay: float
     joint_samples: int
+    told_range_m: Array
+    told_radius_m: float
     feared: BoolArray
 
 

@@ -44,9 +44,11 @@ def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, w
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
         work.threat_target_m[i, :] = 0.0
+        work.joint_target_m[i] = 0.0
         work.fixed_target_m[i] = 0.0
         if ours[i] and memory.kept[i]:
             work.target[i] = boats.decay[i] * max(0.0, min(memory.margin_m[i], boats.cap_m[i]))
+            work.joint_target_m[i] = boats.joint_decay * max(0.0, min(memory.joint_m[i], boats.cap_m[i]))
             work.fixed_target_m[i] = tuning.fixed_decay * max(0.0, min(memory.fixed_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):
                 most = min(boats.cap_m[i], _most_told(i, j, boats, work))

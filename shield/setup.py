@@ -23,6 +23,7 @@ from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
 from .tables.lookup import Tables, no_tables
 from .tables.settings import OtherMay
+from .tables.told import ranges_told_m
 
 _LOG = logging.getLogger(__name__)
 
@@ -99,7 +100,10 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             table=looked.table,
             table_margin_m=config.table_margin_m,
             look=np.where(with_table, looked.steps, 0),
+            joint_decay=_decay(config.response_per_s, config),
             joint_samples=math.ceil(max(looked.steps, round(JOINT_LOOK_S / config.dt_s)) / stride),
+            told_range_m=looked.told_range_m,
+            told_radius_m=_widest_m(config),
             feared=np.asarray((looked.table >= 0).any(axis=0)),
             **_horizons(config, kinds, limits, stride * config.dt_s, granted > 0.0),
         )
@@ -153,15 +157,19 @@ def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:
 
 
 class _LookedUp(NamedTuple):
-    """Value tables of a fleet: all of them, which holds for each pair (-1: none), and the steps of one table step."""
+    """Value tables of a fleet.
+
+    All of them, which holds for each pair (-1: none), the steps of one table step, and see `ranges_told_m`.
+    """
 
     tables: Tables
     table: IntArray
     steps: int
+    told_range_m: Array
 
 
 def _no_tables(boats: int) -> _LookedUp:
-    return _LookedUp(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1)
+    return _LookedUp(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1, np.zeros((0, 1)))
 
 
 def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]) -> _LookedUp:
@@ -183,7 +191,8 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
                 tables.append(table)
             looked.table[i, j] = found[own, other]
     steps = max((round(table.card.dt_s / config.dt_s) for table in tables), default=1)
-    return _LookedUp(stack_tables(tables), looked.table, max(1, steps))
+    enough_m = _widest_m(config) + config.table_margin_m + config.margin_cap_m
+    return _LookedUp(stack_tables(tables), looked.table, max(1, steps), ranges_told_m(tables, enough_m))
 
 
 @lru_cache(maxsize=64)
@@ -201,9 +210,14 @@ def _decay(response_per_s: float, config: ShieldConfig) -> float:
     return 0.0 if math.isinf(response_per_s) else math.exp(-response_per_s * config.dt_s)
 
 
+def _widest_m(config: ShieldConfig) -> float:
+    """Distance kept between boats whose tracks are as good as the settings say, m."""
+    return config.separation_m + config.buffer_m + 2.0 * config.position_error_m
+
+
 def _table_cap(config: ShieldConfig, looked: _LookedUp) -> float:
     """Margins above this may shrink freely, m: no more than the tables can tell."""
-    kept_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m + config.table_margin_m
+    kept_m = _widest_m(config) + config.table_margin_m
     told_m = min((float(axes[CAP]) for axes in looked.tables.axes), default=math.inf)
     return max(0.0, min(config.margin_cap_m, told_m - kept_m))
 

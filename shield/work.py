@@ -25,10 +25,15 @@ class Work(NamedTuple):
         out, spare, spare2: (N_CLEARANCE,).
         merit: (n,) merit of the plan held.
         threat_m: (n + 1,) margin against hunting opponents alone, m.
-        threats_m: (n + 1, n) the same against each, m; as far as they were looked at.
+        threats_m: (n + 1, n) the same against each, m; as far as they were looked at. Of one that is looked up without
+            the run before.
+        threat_by: (n + 1,) the opponent the least margin is from, -1 for none.
+        hunters_known: (n + 1,) whether the margins against opponents are all those of the path that is there.
+        joint_m: (n + 1,) the least of these runs, m; `FAR` where none were made.
         fails: (n + 1,) whether one of these is below what must be kept.
         target: (n,) margin the boat must keep, m.
         threat_target_m: (n, n) margin it must keep against each hunting opponent, m.
+        joint_target_m: (n,) margin it must keep on runs of several opponents, m.
         fixed_target_m: (n,) margin it must keep from fixed things, m.
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
@@ -39,6 +44,7 @@ class Work(NamedTuple):
         course: (n, 4) position one step on at present velocity, m, and heading as a unit vector.
         ways: (n, 3, 5) places opponents may be at when tables are looked into, see `certificates.values`.
         place: (n + 1, 5) place at which the boat itself is looked up.
+        looked: (n, n, 5) the place of each boat at which each opponent was looked up last, and the margin there, m.
         sealed: (n + 1,) whether a table alone made the plan fail.
         beset: (n,) boats that several opponents can come near to, see `certificates.values`.
         ready: (n + 1, 4) what is noted of a plan's path, see `certificates.paths`.
@@ -63,9 +69,13 @@ class Work(NamedTuple):
     merit: Array
     threat_m: Array
     threats_m: Array
+    threat_by: IntArray
+    hunters_known: BoolArray
+    joint_m: Array
     fails: BoolArray
     target: Array
     threat_target_m: Array
+    joint_target_m: Array
     fixed_target_m: Array
     bound: IntArray
     near: BoolArray
@@ -76,6 +86,7 @@ class Work(NamedTuple):
     course: Array
     ways: Array
     place: Array
+    looked: Array
     sealed: BoolArray
     beset: BoolArray
     ready: Array
@@ -104,9 +115,13 @@ def new_work(boats: int, samples: int) -> Work:
             merit=np.zeros(boats),
             threat_m=np.zeros(boats + 1),
             threats_m=np.zeros((boats + 1, boats)),
+            threat_by=np.full(boats + 1, -1, np.int64),
+            hunters_known=np.zeros(boats + 1, np.bool_),
+            joint_m=np.zeros(boats + 1),
             fails=np.zeros(boats + 1, np.bool_),
             target=np.zeros(boats),
             threat_target_m=np.zeros((boats, boats)),
+            joint_target_m=np.zeros(boats),
             fixed_target_m=np.zeros(boats),
             bound=np.full(boats + 1, -1, np.int64),
             near=np.zeros((boats, boats), np.bool_),
@@ -117,6 +132,7 @@ def new_work(boats: int, samples: int) -> Work:
             course=np.zeros((boats, 4)),
             ways=np.zeros((boats, 3, 5)),
             place=np.zeros((boats + 1, 5)),
+            looked=np.full((boats, boats, 5), np.nan),
             sealed=np.zeros(boats + 1, np.bool_),
             beset=np.zeros(boats, np.bool_),
             ready=np.full((boats + 1, 4), -1.0),

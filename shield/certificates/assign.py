@@ -32,6 +32,9 @@ def _take(i: int, slot: int, merit: float, work: Work) -> None:
     work.threat_m[i] = work.threat_m[slot]
     work.fails[i] = work.fails[slot]
     copy_row(work.threats_m[i], work.threats_m[slot])
+    work.joint_m[i] = work.joint_m[slot]
+    work.threat_by[i] = work.threat_by[slot]
+    work.hunters_known[i] = work.hunters_known[slot]
     work.sealed[i] = work.sealed[slot]
     work.bound[i] = work.bound[slot]
     work.merit[i] = merit
@@ -76,7 +79,7 @@ def choose_plan(
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
     no_more_port, no_more_starboard = np.inf, np.inf
-    compared = boats.look[i] > 0 and (done == 0 or work.beset[i])  # else the tables say the same of all manoeuvres
+    compared = boats.look[i] > 0 and done == 0  # one step on the tables say the same of all manoeuvres
     for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue

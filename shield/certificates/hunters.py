@@ -13,7 +13,7 @@ from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .paths import READY_SAMPLE
 from .pursuer import clear_of_pursuer
-from .values import looked_up, margin_at_once, margin_when_ready, tabled
+from .values import looked_up, margin_when_ready, out_of_reach, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns hunters are followed with, shares of the granted one.
@@ -62,12 +62,15 @@ def clear_of_hunter(
     lasts = boats.hunt_samples[i] + boats.thrust_samples[i]
     if ready >= 0:
         lasts = min(lasts, ready + boats.hunt_samples[i])
+    fade = boats.fade[i]
+    if lasts != boats.hunt_samples[i]:
+        fade **= boats.hunt_samples[i] / lasts
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
         manner = first_then_rest(first, number)
-        weight = _run_hunter(i, j, slot, manner, lasts, till_ready, state, boats, tuning, work, floor_m, cap_m)
+        weight = _run_hunter(i, j, slot, manner, lasts, fade, till_ready, state, boats, tuning, work, floor_m, cap_m)
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -84,6 +87,7 @@ def _run_hunter(
     slot: int,
     manner: int,
     lasts: int,
+    fade: float,
     till_ready: bool,
     state: Array,
     boats: Boats,
@@ -94,11 +98,9 @@ def _run_hunter(
 ) -> float:
     """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by.
 
-    The hunt lasts so many samples; how far it leads the boat and how margins fade over it go by that.
+    The hunt lasts so many samples; how far it leads the boat goes by that. Negative margins fade by a factor a sample.
     """
-    sample_s, fade = boats.sample_s, boats.fade[i]
-    if lasts != boats.hunt_samples[i]:
-        fade **= boats.hunt_samples[i] / lasts
+    sample_s = boats.sample_s
     samples = min(lasts, int(work.ready[slot, READY_SAMPLE])) if till_ready else lasts
     course = work.course[j]
     turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
@@ -160,6 +162,43 @@ def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
 
 
 @lean_kernel
+def _note_margin(margin_m: float, out: Array) -> None:
+    """Write a margin that comes about at once, and whose direction nobody asks for."""
+    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = margin_m, 0.0, 1.0, 0.0
+
+
+@lean_kernel
+def _lower_clear_to_threat(slot: int, work: Work) -> None:
+    """Lower the margin of the path in ``slot`` to the least one from hunters where that is less."""
+    if work.threat_m[slot] < work.clear[slot, MARGIN]:
+        work.clear[slot, MARGIN], work.bound[slot] = work.threat_m[slot], work.threat_by[slot]
+
+
+@lean_kernel
+def _clear_of_one_of_several(
+    i: int,
+    j: int,
+    slot: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+    floor_m: float,
+) -> None:
+    """Clearance of a beset boat from opponent j, run through for a while and looked up from there, at most the cap.
+
+    On a manoeuvre on which thrust never is full the boat is lost.
+    """
+    if work.ready[slot, READY_SAMPLE] < 0.0:
+        _note_margin(-work.radius[i, j], work.out)
+    elif out_of_reach(i, j, slot, closing(i, j, state, boats, tuning), state, boats, tuning, work):
+        _note_margin(tuning.margin_cap_m, work.out)
+    else:
+        clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+
+
+@lean_kernel
 def worst_hunter(
     i: int,
     slot: int,
@@ -172,49 +211,58 @@ def worst_hunter(
 ) -> None:
     """Clearance from each hunting opponent, in ``work.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
+    What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre.
+
     Of one that is short of its target (``work.fails``) and below the level nothing more is to be known: the search
     stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
 
     ``work.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
     first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
-    first = work.first_hunter[i]
+    if work.hunters_known[slot]:
+        _lower_clear_to_threat(slot, work)
+        return
+    work.hunters_known[slot] = True
+    first, threat_by = work.first_hunter[i], -1
     refused, fails = False, False
     at_best, threat = FAR, FAR
     threat_at, failed_at = np.inf, np.inf
     work.threats_m[slot, :] = FAR
+    work.joint_m[slot] = FAR
     for number in range(state.shape[0]):
         j = first_then_rest(first, number)
         if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
             continue
         # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
         floor_m = min(work.threat_target_m[i, j], level_m)
-        if looked_up(i, j, slot, ours, boats, work):
-            at_once = margin_at_once(i, j, slot, -FAR, boats, work)
-            margin, at = at_once, 0.0
-            if work.beset[i]:
-                clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
-                if work.out[MARGIN] < margin:
-                    margin, at = work.out[MARGIN], work.out[SAMPLE]
-            at_best = min(at_best, at_once)
-            refused = refused or at_once < work.threat_target_m[i, j]
-            if margin < work.clear[slot, MARGIN]:
-                work.clear[slot, MARGIN], work.bound[slot] = margin, j
+        tells = looked_up(i, j, slot, ours, boats, work)
+        if tells:
+            _note_margin(worst_at_once(i, j, slot, boats, work), work.out)
+            at_best = min(at_best, work.out[MARGIN])
+            refused = refused or work.out[MARGIN] < work.threat_target_m[i, j]
         else:
             clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
-            margin, at = work.out[MARGIN], work.out[SAMPLE]
-            if margin < work.clear[slot, MARGIN]:
-                copy_row(work.clear[slot], work.out)
-                work.bound[slot] = j
-        if margin < threat:
-            threat, threat_at = margin, at
-        work.threats_m[slot, j] = margin
-        if margin < work.threat_target_m[i, j]:
-            fails, failed_at = True, min(failed_at, at)
-        if margin < floor_m:
+        work.threats_m[slot, j] = work.out[MARGIN]
+        enough = work.out[MARGIN] >= floor_m
+        if work.out[MARGIN] < work.threat_target_m[i, j]:
+            fails, failed_at = True, min(failed_at, work.out[SAMPLE])
+        if work.out[MARGIN] < threat:
+            threat, threat_at, threat_by = work.out[MARGIN], work.out[SAMPLE], j
+        if tells and enough and work.beset[i]:
+            floor_m = min(work.joint_target_m[i], level_m)
+            _clear_of_one_of_several(i, j, slot, state, ours, boats, tuning, work, floor_m)
+            work.joint_m[slot] = min(work.joint_m[slot], work.out[MARGIN])
+            enough = work.out[MARGIN] >= floor_m
+            if work.out[MARGIN] < work.joint_target_m[i]:
+                fails, failed_at = True, min(failed_at, work.out[SAMPLE])
+            if work.out[MARGIN] < threat:
+                threat, threat_at, threat_by = work.out[MARGIN], work.out[SAMPLE], j
+        if not enough:
             work.first_hunter[i] = j
+            work.hunters_known[slot] = False
             break
     work.sealed[slot] = refused and threat >= at_best
-    work.threat_m[slot] = threat
+    work.threat_m[slot], work.threat_by[slot] = threat, threat_by
     work.fails[slot] = fails
     work.decided[slot] = max(threat_at, failed_at)
+    _lower_clear_to_threat(slot, work)

@@ -12,7 +12,8 @@ from .rating import STRAIGHT_BASE, STRAIGHT_SAFE
 from .values import looked_up, margin_at_once, set_place, tabled
 
 NO_HUNTERS, HUNTERS_TILL_READY, HUNTERS = range(3)
-"""How far hunters are run through: not at all, until thrust is back and tables answer, or to the end of the hunt."""
+"""How far hunters are run through: not at all, until tables answer (thrust is back, and of several for a while), or to
+the end of the hunt."""
 
 CLEARLY_M = 1e-6
 """Margins this much below a bound are below it whatever the rounding, m: more than the room in which a table's value
@@ -24,7 +25,7 @@ def hunters_run(i: int, slot: int, boats: Boats, work: Work) -> int:
     """How far opponents near boat i are to be run through as hunters, which takes a longer path."""
     if not work.hunted[i] or boats.look[i] == 0:
         return HUNTERS if work.hunted[i] else NO_HUNTERS
-    how = NO_HUNTERS
+    how = HUNTERS_TILL_READY if work.beset[i] else NO_HUNTERS
     for j in range(work.near.shape[0]):
         if j == i or not work.near[i, j] or boats.team[i] == boats.team[j] or boats.granted_turn_dps[j] == 0.0:
             continue
@@ -50,6 +51,7 @@ def set_out(
 ) -> None:
     """Write a manoeuvre of boat i into ``slot`` and where its opponents are looked up for it."""
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
+    work.hunters_known[slot] = False
     set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
 
 
@@ -82,11 +84,12 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     how = hunters_run(i, slot, boats, work)
     samples = boats.samples[i]
-    if how != NO_HUNTERS or work.beset[i]:
+    if how != NO_HUNTERS:
         samples = boats.hunt_samples[i] + boats.thrust_samples[i]
     earliest = 0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride
     if work.beset[i]:
         earliest = max(earliest, boats.joint_samples)
+    earliest = min(earliest, samples)
     beyond = boats.hunt_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])

@@ -203,7 +203,7 @@ def _trace_usv(
             if ready[READY_SAMPLE] < 0.0:
                 _note_ready(k, earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)
             k += 1
-        if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and k > 0:
+        if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and 0 < k <= samples:
             _note_ready(max(k, earliest), earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)  # as now
             if ready[READY_SAMPLE] >= 0.0:
                 samples = min(samples, max(least, int(ready[READY_SAMPLE]) + beyond))

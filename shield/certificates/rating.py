@@ -51,6 +51,14 @@ def _level_to_beat(best: float) -> float:
 
 
 @lean_kernel
+def _ask_no_hunters(slot: int, work: Work) -> None:
+    """Margins against hunters of a path of which they do not matter: none is better than that from the others."""
+    margin = work.clear[slot, MARGIN]
+    work.threat_m[slot], work.threats_m[slot, :], work.joint_m[slot] = margin, margin, FAR
+    work.sealed[slot], work.hunters_known[slot] = False, False
+
+
+@lean_kernel
 def _rate_touching(
     i: int,
     slot: int,
@@ -104,23 +112,23 @@ def rate_path(
     boats, whatever the merit hangs on.
     """
     clear = work.clear[slot]
-    work.sealed[slot] = False
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
-    work.threat_m[slot] = clear[MARGIN]
-    work.threats_m[slot, :] = clear[MARGIN]
     work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
+        _ask_no_hunters(slot, work)
         if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
             work.decided[slot] = clear[SAMPLE]
         return clear[MARGIN]
     share = share_before_touch(i, slot, state, boats, fixed, work)
     if share < 1.0:
+        _ask_no_hunters(slot, work)
         return _rate_touching(i, slot, share, best, state, ours, boats, fixed, tuning, work)
     sure = clear[MARGIN]
     short = sure < work.target[i]
     if short and STRAIGHT_BASE + sure <= best:
+        _ask_no_hunters(slot, work)
         return STRAIGHT_BASE + sure
     worst_hunter(i, slot, state, ours, boats, tuning, work, _level_to_beat(best))
     if short or work.fails[slot]:
@@ -140,13 +148,20 @@ def rate_path(
 
 
 @lean_kernel
+def worst_off(ours: BoolArray, work: Work) -> int:
+    """The boat of ours whose merit is least, the first of several; -1 when none is ours."""
+    worst = -1
+    for i in range(ours.shape[0]):
+        if ours[i] and (worst < 0 or work.merit[i] < work.merit[worst]):
+            worst = i
+    return worst
+
+
+@lean_kernel
 def worst_merit(ours: BoolArray, work: Work) -> float:
     """Least merit of any boat of ours."""
-    worst = 2.0 * PAIR_SAFE
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            worst = min(worst, work.merit[i])
-    return worst
+    worst = worst_off(ours, work)
+    return work.merit[worst] if worst >= 0 else 2.0 * PAIR_SAFE
 
 
 @lean_kernel

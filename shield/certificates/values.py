@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
 from ..scene import Boats, Tuning
 from ..tables.grid import CAP
-from ..tables.lookup import Gradient, table_gradient, table_value
+from ..tables.lookup import Gradient, own_speed_cell, table_gradient, table_value
 from ..work import Work
 from .clearance import FAR
 from .paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
@@ -31,6 +33,9 @@ ROOM_M = 0.5
 
 PLACE_X, PLACE_Y, PLACE_HEADING, PLACE_SPEED, PLACE_USABLE = range(5)
 """Columns of a place: position m, heading rad, speed m/s, and whether the table holds for the boat there."""
+
+MARGIN_THERE = PLACE_USABLE
+"""Column of a place that was looked up: the margin there, m."""
 
 
 @lean_kernel
@@ -45,7 +50,12 @@ def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
 def run_opponents(
     steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work, ways: Array
 ) -> None:
-    """Write where the opponents that tables are looked up for may be after some steps: ``ways`` (n, WAYS, 5)."""
+    """Write where the opponents that tables are looked up for may be after some steps: ``ways`` (n, WAYS, 5).
+
+    What was known of margins against opponents holds no more.
+    """
+    work.hunters_known[:] = False
+    work.looked[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
         if ours[j] or not boats.feared[j]:
             continue
@@ -62,7 +72,7 @@ def run_opponents(
 
 @lean_kernel
 def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
-    """Mark the boats of ours that more than one opponent can come near to, as far as the tables tell.
+    """Mark the boats of ours of more than one opponent of which the tables tell something, at whatever thrust.
 
     Each table knows of one opponent only: two may each leave a way out, and not the same. Opponents of such a boat
     are run through for some time as well, before they are looked up: then one manoeuvre has to do for all.
@@ -75,9 +85,39 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
         _note_place(state[i], boats.ready_thrust[i], work.place[i])
         count = 0
         for j in range(n):
-            if j != i and work.near[i, j] and looked_up(i, j, i, ours, boats, work):
-                count += 1 if table_margin(i, j, work.place[i], work.ways[j], -FAR, boats, work) < FAR else 0
-        work.beset[i] = count > 1
+            if j == i or not work.near[i, j] or not tabled(i, j, ours, boats, work):
+                continue
+            told_m = boats.tables.axes[boats.table[i, j], CAP] - work.radius[i, j] - boats.table_margin_m - 1e-9
+            if table_margin(i, j, work.place[i], work.ways[j], told_m, boats, work) < FAR:
+                count += 1
+                if count > 1:
+                    work.beset[i] = True
+                    break
+
+
+@lean_kernel
+def out_of_reach(
+    i: int, j: int, slot: int, closing_m: float, state: Array, boats: Boats, tuning: Tuning, work: Work
+) -> bool:
+    """Whether no run of opponent j, looked up at its end, can bring the margin on the path in ``slot`` below its cap.
+
+    It cannot when the opponent, straight at where the boat is then, stays where the table tells enough for all headings
+    and speeds, and cannot come near before. ``closing_m`` is the most the distance shrinks by from sample to sample.
+    """
+    k, kept_m = int(work.ready[slot, READY_SAMPLE]), work.radius[i, j]
+    if k < 0 or kept_m > boats.told_radius_m:
+        return False
+    path, course = work.path[slot], work.course[j]
+    dx, dy = path[0, 0] - course[0], path[0, 1] - course[1]
+    before_m = kept_m + tuning.margin_cap_m + k * closing_m
+    if not dx * dx + dy * dy > before_m * before_m:
+        return False
+    table = boats.table[i, j]
+    cell = own_speed_cell(boats.tables, table, work.ready[slot, READY_SPEED])
+    way = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED]) * k * boats.sample_s
+    dx, dy = path[k, 0] - course[0], path[k, 1] - course[1]
+    there_m = boats.told_range_m[table, cell] + way
+    return dx * dx + dy * dy > there_m * there_m
 
 
 @lean_kernel
@@ -187,6 +227,19 @@ def margin_at_once(i: int, j: int, slot: int, enough_m: float, boats: Boats, wor
     For ``enough_m`` see `table_margin`.
     """
     return table_margin(i, j, work.place[slot], work.ways[j], enough_m, boats, work)
+
+
+@lean_kernel
+def worst_at_once(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """`margin_at_once`, kept: one step on it is the same for every manoeuvre."""
+    place, known = work.place[slot], work.looked[i, j]
+    same = place[PLACE_X] == known[PLACE_X] and place[PLACE_Y] == known[PLACE_Y]
+    if same and place[PLACE_HEADING] == known[PLACE_HEADING] and place[PLACE_SPEED] == known[PLACE_SPEED]:
+        return known[MARGIN_THERE]
+    margin = margin_at_once(i, j, slot, -FAR, boats, work)
+    copy_row(known, place)
+    known[MARGIN_THERE] = margin
+    return margin
 
 
 @lean_kernel
