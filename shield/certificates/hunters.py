@@ -38,6 +38,14 @@ def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float
 
 
 @lean_kernel
+def fade_over(lasts: int, i: int, boats: Boats) -> float:
+    """Factor per sample of negative margins over a hunt of so many samples: they fade as much by the end of any."""
+    if lasts == boats.hunt_samples[i]:
+        return boats.fade[i]
+    return boats.fade[i] ** (boats.hunt_samples[i] / lasts)
+
+
+@lean_kernel
 def clear_of_hunter(
     i: int,
     j: int,
@@ -62,9 +70,7 @@ def clear_of_hunter(
     lasts = boats.hunt_samples[i] + boats.thrust_samples[i]
     if ready >= 0:
         lasts = min(lasts, ready + boats.hunt_samples[i])
-    fade = boats.fade[i]
-    if lasts != boats.hunt_samples[i]:
-        fade **= boats.hunt_samples[i] / lasts
+    fade = fade_over(lasts, i, boats)
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)

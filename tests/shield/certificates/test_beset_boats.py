@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from stages import stages_of
+from stages import decided, screened, stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.clearance import FAR, MARGIN
-from steerclear.shield.certificates.hunters import _run_hunter, worst_hunter
+from steerclear.shield.certificates.hunters import _run_hunter, closing, fade_over, worst_hunter
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import look_around, worst_clearance
 from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
-from steerclear.shield.certificates.values import margin_at_once
+from steerclear.shield.certificates.values import margin_at_once, out_of_reach, run_opponents, worst_at_once
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
 from steerclear.shield.tables.files import load_table, stack_tables
@@ -49,9 +49,17 @@ def around(random, count):
 
 
 def test_one_opponent_besets_nobody_and_two_that_the_tables_tell_of_do():
-    ahead, abeam, far = boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0), boat(0.0, -200.0, 0.0)
+    ahead, abeam, far = boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0), boat(0.0, -500.0, 180.0)
     for others, beset in [((ahead,), False), ((ahead, far), False), ((ahead, abeam), True)]:
         assert looked_around(boat(0.0, 0.0, 0.0), *others).work.beset[0] == beset
+
+
+@pytest.mark.parametrize("thrust", [100.0, 91.0, 89.0, 30.0])
+def test_a_boat_that_lacks_thrust_is_beset_all_the_same(thrust):
+    """Else it would be rated better for having slowed down: its opponents one by one, a moment later."""
+    own = boat(0.0, 0.0, 0.0, 2.0)
+    own[L.THRUST] = thrust
+    assert looked_around(own, boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0)).work.beset[0]
 
 
 @pytest.mark.parametrize("done", [0, 1])
@@ -75,10 +83,11 @@ def test_runs_end_after_some_seconds_where_the_full_model_is(done, speed_mps, si
 
 def run_and_looked_up(at, j, tables):
     """Least margin of opponent j over all its manners, by runs and by the table at their ends."""
-    least, ready = FAR, at.work.ready[0]
+    least, ready = 2.0, at.work.ready[0]
     lasts = int(ready[READY_SAMPLE] + at.boats.hunt_samples[0])
+    fade = fade_over(lasts, 0, at.boats)
     for manner in range(6):
-        faded = _run_hunter(0, j, 0, manner, lasts, True, at.state, at.boats, at.tuning, at.work, -FAR, 2.0)
+        faded = _run_hunter(0, j, 0, manner, lasts, fade, True, at.state, at.boats, at.tuning, at.work, -FAR, 2.0)
         least = min(least, at.work.spare[MARGIN])
         hunter = at.work.hunter
         there = hunter[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
@@ -90,28 +99,158 @@ def run_and_looked_up(at, j, tables):
     return least
 
 
-def test_the_margin_is_the_least_of_the_look_up_at_once_and_of_the_runs():
+def rated(at):
+    """Margins against the opponents on the path laid for the first boat, nothing known before."""
+    at.work.hunters_known[:] = False
+    at.work.looked[:] = np.nan
+    worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+    worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+    work = at.work
+    told = work.joint_m[0], work.threat_m[0], work.fails[0], work.sealed[0], work.clear[0, MARGIN], work.bound[0]
+    return (*work.threats_m[0], *told)
+
+
+def test_each_opponent_has_its_look_up_at_once_and_all_have_the_least_of_their_runs():
     tables, random, at_once, later = stack_tables([load_table("surveyor", "surveyor")]), np.random.default_rng(3), 0, 0
     for _ in range(160):
         at = looked_around(boat(0.0, 0.0, 0.0, random.uniform(0.5, 3.0)), *around(random, 2))
         if not at.work.beset[0]:
             continue
         laid(at, -1.0, 60.0)
+        at.work.threat_target_m[0], at.work.joint_target_m[0] = -FAR, -FAR
+        rated(at)
+        first = [margin_at_once(0, j, 0, -FAR, at.boats, at.work) for j in (1, 2)]
+        runs = [run_and_looked_up(at, j, tables) for j in (1, 2)]
+        np.testing.assert_array_equal(at.work.threats_m[0, 1:], first)
+        assert at.work.joint_m[0] == pytest.approx(min(runs), abs=1e-9)
+        assert at.work.threat_m[0] == pytest.approx(min(first + runs), abs=1e-9)
+        at_once += min(first) < min(runs)
+        later += min(runs) < min(first)
+    assert at_once > 10
+    assert later > 10
+
+
+@pytest.mark.parametrize(("target_m", "fails"), [(-FAR, False), (0.0, False), (2.0, True)])
+def test_runs_have_a_target_of_their_own(target_m, fails):
+    """One for all opponents; short of it the boat fails, whatever tables tell at once."""
+    at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 35.0, 180.0), boat(30.0, 0.0, -90.0))
+    laid(at, -1.0, 120.0)
+    at.work.threat_target_m[0], at.work.joint_target_m[0] = -FAR, target_m
+    rated(at)
+    assert 0.0 < at.work.joint_m[0] < 2.0
+    assert at.work.fails[0] == fails
+    at.work.joint_m[0] = -1.0
+    rated(at)
+    assert at.work.joint_m[0] > 0.0
+
+
+def test_a_manoeuvre_that_lets_thrust_go_before_several_is_lost():
+    at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 30.0, 180.0), boat(25.0, 5.0, -90.0))
+    laid(at, 1.0, 0.0, 0.0)
+    assert at.work.ready[0, READY_SAMPLE] == -1.0
+    at.work.place[0, 4] = 1.0  # where it is looked up first its thrust is still there
+    rated(at)
+    assert at.work.joint_m[0] == -at.work.radius[0, 1]
+
+
+def test_runs_left_out_would_have_ended_at_the_cap():
+    random, left_out = np.random.default_rng(5), 0
+    for _ in range(120):
+        rows = [boat(0.0, 0.0, 0.0, random.uniform(2.0, 3.0))]
+        for angle in random.uniform(-math.pi, math.pi, 3):
+            far = random.uniform(15.0, 120.0)
+            heading = random.uniform(-180.0, 180.0)
+            rows.append(boat(far * math.sin(angle), far * math.cos(angle), heading, random.uniform(0.0, 3.0)))
+        at = looked_around(*rows)
+        if not at.work.beset[0]:
+            continue
+        laid(at, random.choice([-1.0, 0.5]), random.uniform(0.0, 180.0), done=random.integers(0, 2))
+        at.work.threat_target_m[0], at.work.joint_target_m[0] = 1.0, 1.5
+        short, told_m = rated(at), at.boats.told_range_m.copy()
+        for j in range(1, 4):
+            closing_m = closing(0, j, at.state, at.boats, at.tuning)
+            left_out += out_of_reach(0, j, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+        at.boats.told_range_m[:] = np.inf
+        full = rated(at)
+        at.boats.told_range_m[:] = told_m
+        assert short == full
+    assert left_out > 50
+
+
+def test_wider_tracks_are_not_left_out():
+    """The ranges hold for the radius of the settings; a track that may be further off is run through."""
+    far = boat(0.0, 90.0, 0.0)
+    at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0), far)
+    laid(at)
+    closing_m = closing(0, 3, at.state, at.boats, at.tuning)
+    assert out_of_reach(0, 3, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+    at.work.radius[0, 3] += 0.01
+    assert not out_of_reach(0, 3, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+
+
+def test_what_is_known_of_a_path_is_what_would_be_found_again():
+    random = np.random.default_rng(7)
+    for _ in range(60):
+        at = looked_around(boat(0.0, 0.0, 0.0, random.uniform(0.5, 3.0)), *around(random, 3))
+        laid(at, random.choice([-1.0, 1.0]), random.uniform(0.0, 180.0), done=1)
+        at.work.threat_target_m[0], at.work.joint_target_m[0] = random.uniform(-1.0, 1.0), 0.5
+        fresh = rated(at)
+        assert at.work.hunters_known[0]
+        at.work.clear[0, MARGIN], at.work.bound[0] = FAR, -1
         worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
-        at.work.threat_target_m[0] = -FAR
         worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
-        for j in (1, 2):
-            first, runs = margin_at_once(0, j, 0, -FAR, at.boats, at.work), run_and_looked_up(at, j, tables)
-            assert at.work.threats_m[0, j] == pytest.approx(min(first, runs), abs=1e-9)
-            at_once += first < runs
-            later += runs < first
-    assert at_once > 10 < later
+        assert (at.work.clear[0, MARGIN], at.work.bound[0]) == fresh[-2:]
+        assert (*at.work.threats_m[0],) == fresh[: len(at.state)]
+
+
+def test_nothing_is_known_of_a_path_whose_search_stopped_or_of_another_path():
+    at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 8.0, 180.0), boat(6.0, 5.0, -90.0))
+    laid(at)
+    at.work.threat_target_m[0] = 1.0
+    worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+    worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, 0.5)
+    assert at.work.fails[0]
+    assert not at.work.hunters_known[0]
+    rated(at)
+    assert at.work.hunters_known[0]
+    laid(at, -1.0)
+    assert not at.work.hunters_known[0]
+    rated(at)
+    run_opponents(1, at.ours, at.state, at.boats, at.tuning, at.work, at.work.ways)
+    assert not at.work.hunters_known[0]
+
+
+def test_a_look_up_is_kept_for_its_place_only():
+    at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0))
+    laid(at, done=1)
+    for column, change in [(None, 0.0), (0, 0.5), (1, 0.5), (2, 0.1), (3, -0.5), (None, 0.0)]:
+        if column is not None:
+            at.work.place[0, column] += change
+        for _ in range(2):
+            margin = margin_at_once(0, 1, 0, -FAR, at.boats, at.work)
+            assert worst_at_once(0, 1, 0, at.boats, at.work) == margin
+
+
+def test_the_margin_of_runs_is_remembered_once_for_all_opponents():
+    """And asked for at the rate of margins of manoeuvres; of each opponent the look-up at once is remembered."""
+    rows = boat(0.0, 0.0, 0.0), boat(0.0, 35.0, 180.0), boat(30.0, 0.0, -90.0)
+    at = stages_of(ShieldConfig(), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
+    screened(at, np.array([[3.0, -90.0]] * 3))
+    decided(at, True)
+    assert at.memory.joint_m[0] == at.work.joint_m[0] == pytest.approx(1.0, abs=1.0)
+    np.testing.assert_array_equal(at.memory.threat_m[0], at.work.threats_m[0])
+    screened(at, np.array([[3.0, -90.0]] * 3))
+    assert at.work.joint_target_m[0] == pytest.approx(math.exp(-0.1) * min(at.memory.joint_m[0], at.boats.cap_m[0]))
+    alone = stages_of(ShieldConfig(), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
+    alone.memory.joint_m[0] = 1.0
+    decided(alone, screened(alone, np.array([[3.0, -90.0]] * 2)))
+    assert alone.memory.joint_m[0] == 0.0
 
 
 def test_a_boat_of_one_opponent_is_looked_up_and_not_run_through():
     at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 20.0, 180.0))
     laid(at)
-    worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
     at.work.threat_target_m[0] = -FAR
-    worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+    rated(at)
     assert at.work.threats_m[0, 1] == margin_at_once(0, 1, 0, -FAR, at.boats, at.work)
+    assert at.work.joint_m[0] == FAR

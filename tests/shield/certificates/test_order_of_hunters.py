@@ -58,8 +58,9 @@ def orders():
 
 
 def first(at, j, manner):
-    """Set who is looked at first, and how it is followed first."""
+    """Set who is looked at first, and how it is followed first; all have to be asked again."""
     at.work.first_hunter[:], at.work.first_manner[:] = j, manner
+    at.work.hunters_known[:] = False
 
 
 @pytest.mark.parametrize("crew", CREWS)

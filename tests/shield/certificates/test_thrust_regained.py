@@ -10,7 +10,7 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.certificates.clearance import MARGIN
-from steerclear.shield.certificates.hunters import _run_hunter, clear_of_hunter
+from steerclear.shield.certificates.hunters import _run_hunter, clear_of_hunter, fade_over
 from steerclear.shield.certificates.laying import HUNTERS, HUNTERS_TILL_READY, NO_HUNTERS, hunters_run, lay_path
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
@@ -88,7 +88,7 @@ def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends()
         lasts = int(at.boats.hunt_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
         runs, values = [], []
         for manner in range(6):
-            faded = _run_hunter(0, 1, 0, manner, lasts, True, *seen)
+            faded = _run_hunter(0, 1, 0, manner, lasts, fade_over(lasts, 0, at.boats), True, *seen)
             runs.append(at.work.spare[MARGIN])
             margin = value_margin(at, tables)
             if margin is not None:
@@ -195,7 +195,8 @@ def test_margins_of_long_hunts_fade_as_much_by_their_end():
         laid(at, 1.0, 0.0, 2.0)
         hunt, build = herons_samples(at)
         lasts = min(int(at.work.ready[0, READY_SAMPLE]) + hunt, hunt + build)
-        faded.append(_run_hunter(0, 1, 0, 0, lasts, False, at.state, at.boats, at.tuning, at.work, -1e6, 1e6))
+        fade = fade_over(lasts, 0, at.boats)
+        faded.append(_run_hunter(0, 1, 0, 0, lasts, fade, False, at.state, at.boats, at.tuning, at.work, -1e6, 1e6))
     np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
 
 
