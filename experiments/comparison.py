@@ -56,7 +56,7 @@ class Contest:
     @property
     def totals(self) -> dict[str, dict[str, Any]]:
         """Figures of every guard over the common families."""
-        return {guard: _pool([cells[family] for family in self.families]) for guard, cells in self.cells.items()}
+        return {guard: pool([cells[family] for family in self.families]) for guard, cells in self.cells.items()}
 
     @property
     def winner(self) -> str | None:
@@ -105,8 +105,8 @@ def _contest(
     return Contest(own, other, conditions, seed, tuple(common), left_out, by_guard)
 
 
-def _pool(cells: Sequence[Cell]) -> dict[str, Any]:
-    """Counts added up, means weighted with encounters (None without any); what nobody judged may be avoidable.
+def pool(cells: Sequence[Cell]) -> dict[str, Any]:
+    """Add up counts, and weight means with encounters (None without any); what nobody judged may be avoidable.
 
     A mean of `LATER_MEANS` is None where a cell lacks it: of the other families alone it would be no total.
     """

@@ -9,7 +9,8 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
-from .comparison import NO_GUARD, Contest, cells_of, contests_of
+from .comparison import NO_GUARD, Cell, Contest, cells_of, contests_of, pool
+from .encounters.summary import upper_bound
 from .markdown import MADE, table
 from .tables import number_text
 
@@ -48,20 +49,25 @@ def comparison_page(contests: Sequence[Contest], picture: Path, versions: Sequen
     lines = ["# Guards on the same encounters", "", MADE, "", _intro(versions), "", f"![plot]({picture.name})", ""]
     for contest in contests:
         lines += [f"## {contest.title}", "", _winner_line(contest), "", *_totals_table(contest), ""]
-        lines += ["Encounters breached, and share of commands changed:", "", *_families_table(contest), ""]
+        if len(contest.cells) == 1:
+            lines += ["Family by family:", "", *_one_guards_families_table(contest), ""]
+        else:
+            lines += ["Encounters breached, and share of commands changed:", "", *_families_table(contest), ""]
     return "\n".join(lines)
 
 
 def _intro(versions: Sequence[str]) -> str:
     return (
-        f"Results of `steerclear encounters`, steerclear {', '.join(versions)}. All guards of a section met the same "
-        "encounters. *Breached* counts encounters in which an own boat came within the radius of another boat, "
-        "*avoidable* those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % "
-        "upper limit of the probability. *Time to goal* is that without a guard times the number; own boats that "
-        "*never arrived* had not reached their goal by the end of an encounter, though without a guard they do (empty: "
-        "results of an earlier version). The filters of the literature are those of `steerclear.experiments.textbook`, "
-        "with gains chosen by their own sweep on these platforms; `reach` is `steerclear.experiments.reach_guard`, the "
-        "value tables alone."
+        f"Results of `steerclear encounters`, steerclear {', '.join(versions)}. "
+        "All guards of a section met the same encounters. "
+        "*Breached* counts encounters in which an own boat came within the radius of another boat, *avoidable* "
+        "those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % upper limit "
+        "of the probability. *Started outside* are encounters at whose first decision every own boat had an "
+        "escape by the default shield's certificate. *Time to goal* is that without a guard times the number; own "
+        "boats that *never arrived* had not reached their goal by the end of an encounter, though without a guard "
+        "they do (empty: results of an earlier version). The filters of the literature are those of "
+        "`steerclear.experiments.textbook`, with gains chosen by their own sweep on these platforms; `reach` is "
+        "`steerclear.experiments.reach_guard`, the value tables alone."
     )
 
 
@@ -104,11 +110,35 @@ def _families_table(contest: Contest) -> list[str]:
     return table(["", *contest.cells], rows)
 
 
+def _one_guards_families_table(contest: Contest) -> list[str]:
+    heads = ["", "breached", "avoidable", "unavoidable", "started outside", "of these breached", "commands changed",
+             "time to goal", "never arrived"]  # fmt: skip
+    (cells,) = contest.cells.values()
+    return table(heads, [_family_row(family, cells[family]) for family in contest.families])
+
+
+def _family_row(family: str, cell: Cell) -> list[Any]:
+    one, outside = pool([cell]), cell.get("started_outside")
+    return [
+        family, _bounded(one, "breached"), _bounded(one, "avoidable"), one["unavoidable"],
+        "" if outside is None else f"{outside:,}",
+        _count(cell["breaches_outside"], upper_bound(cell["breaches_outside"], outside)) if outside else "",
+        f"{one['changed_percent']:.1f} %", _number(one["goal_time_ratio"], 2),
+        _percent(one["never_arrived_percent"]),
+    ]  # fmt: skip
+
+
 def _bounded(figures: Mapping[str, Any], key: str) -> str:
     count = str(figures[key])
     if key == "avoidable" and figures["not_judged"]:
         count += f" to {figures[key] + figures['not_judged']}"
-    return f"{count} [{100.0 * figures[f'{key}_upper']:.2g} %]"
+    return _count(count, figures[f"{key}_upper"])
+
+
+def _count(count: int | str, upper: float) -> str:
+    """A count and the upper limit of its probability."""
+    percent = 100.0 * upper
+    return f"{count} [{percent:.0f} %]" if percent >= 99.5 else f"{count} [{percent:.2g} %]"
 
 
 def _percent(value: float | None) -> str:

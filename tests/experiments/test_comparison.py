@@ -139,6 +139,18 @@ def test_the_page_shows_what_the_results_say(tmp_path):
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
+def test_of_one_guard_every_family_has_its_figures():
+    outside = {"started_outside": 1000, "breaches_outside": 0}
+    cells = [
+        cell("shield", "head_on", n=1000, never_arrived_percent=0.0, **outside),
+        cell("shield", "at_rest", breached=99, avoidable=90, changed=60.0, never_arrived_percent=2.0),
+    ]
+    lines = comparison_page([one_contest(content(*cells))], Path("plot.png"), ["9.9"]).splitlines()
+    assert "| head_on | 0 [0.3 %] | 0 [0.3 %] | 0 | 1,000 | 0 [0.3 %] | 5.0 % | 1.10 | 0.00 % |" in lines
+    assert "| at_rest | 99 [100 %] | 90 [94 %] | 9 |  |  | 60.0 % | 1.10 | 2.00 % |" in lines
+    assert not any(line.startswith("Encounters breached, and") for line in lines)
+
+
 def test_bad_results_are_refused(tmp_path):
     broken = cell("a", "head_on")
     del broken["avoidable"]
