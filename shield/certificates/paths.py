@@ -90,7 +90,7 @@ def trace_path(
         samples: number of samples after sample 0.
         least: number of them after which the path may end.
         beyond: number of them after the one where thrust is full that the path goes on for.
-        earliest: first sample at which that counts.
+        earliest: first sample at which that counts, at most ``samples``.
         ready_thrust: thrust, percent, from which the boat has all of it.
         path: shape (>= samples + 1, 2), float64.
         ready: shape (4,), what is noted, see `READY_SAMPLE`.

@@ -10,7 +10,7 @@ from steerclear.shield.certificates.clearance import FAR, MARGIN
 from steerclear.shield.certificates.hunters import _run_hunter, closing, fade_over, worst_hunter
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import look_around, worst_clearance
-from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
+from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail, trace_path
 from steerclear.shield.certificates.values import margin_at_once, out_of_reach, run_opponents, worst_at_once
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
@@ -254,3 +254,26 @@ def test_a_boat_of_one_opponent_is_looked_up_and_not_run_through():
     rated(at)
     assert at.work.threats_m[0, 1] == margin_at_once(0, 1, 0, -FAR, at.boats, at.work)
     assert at.work.joint_m[0] == FAR
+
+
+@pytest.mark.parametrize("speed_mps", [0.5, 2.0, 3.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+def test_nothing_is_noted_beyond_the_end_of_a_path(speed_mps, turn_deg):
+    """A path that ends before runs do, of short settings, is looked up where it ends or not at all."""
+    at = looked_around(boat(0.0, 0.0, 0.0, speed_mps), boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0))
+    for samples in range(1, 12):
+        path, ready = np.full((samples + 1, 2), np.nan), np.full(4, -1.0)
+        for earliest in range(samples + 1):
+            trace_path(
+                at.boats.params[0], at.state[0].copy(), 1.0, turn_deg, 3.0, 0.1, 1, at.boats.stride, samples, samples,
+                0, earliest, at.boats.ready_thrust[0], path, ready,
+            )  # fmt: skip
+            assert ready[READY_SAMPLE] <= samples
+            assert np.isfinite(path).all()
+    hunt, thrust = at.boats.hunt_samples.copy(), at.boats.thrust_samples.copy()
+    at.boats.hunt_samples[0], at.boats.thrust_samples[0] = 3, 0
+    try:
+        laid(at, 1.0, turn_deg)
+        assert at.work.ready[0, READY_SAMPLE] <= 3
+    finally:
+        at.boats.hunt_samples[:], at.boats.thrust_samples[:] = hunt, thrust
