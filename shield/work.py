@@ -28,6 +28,9 @@ class Work(NamedTuple):
         threats_m: (n + 1, n) the same against each, m; as far as they were looked at. Of one that is looked up without
             the run before.
         threat_by: (n + 1,) the opponent the least margin is from, -1 for none.
+        threat_at: (n + 1,) the sample at which it comes about.
+        failed_at: (n + 1,) the first sample at which one is below what must be kept; infinite when none is.
+        told_m: (n + 1,) the least margin that tables tell where they are looked up first, m.
         hunters_known: (n + 1,) whether the margins against opponents are all those of the path that is there.
         joint_m: (n + 1,) the least of these runs, m; `FAR` where none were made.
         fails: (n + 1,) whether one of these is below what must be kept.
@@ -70,6 +73,9 @@ class Work(NamedTuple):
     threat_m: Array
     threats_m: Array
     threat_by: IntArray
+    threat_at: Array
+    failed_at: Array
+    told_m: Array
     hunters_known: BoolArray
     joint_m: Array
     fails: BoolArray
@@ -116,6 +122,9 @@ def new_work(boats: int, samples: int) -> Work:
             threat_m=np.zeros(boats + 1),
             threats_m=np.zeros((boats + 1, boats)),
             threat_by=np.full(boats + 1, -1, np.int64),
+            threat_at=np.full(boats + 1, np.inf),
+            failed_at=np.full(boats + 1, np.inf),
+            told_m=np.zeros(boats + 1),
             hunters_known=np.zeros(boats + 1, np.bool_),
             joint_m=np.zeros(boats + 1),
             fails=np.zeros(boats + 1, np.bool_),

@@ -168,40 +168,87 @@ def hunts(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
 
 
 @lean_kernel
-def _note_margin(margin_m: float, out: Array) -> None:
-    """Write a margin that comes about at once, and whose direction nobody asks for."""
-    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = margin_m, 0.0, 1.0, 0.0
+def _forget_threats(slot: int, work: Work) -> None:
+    """Make ready for the threats to the path in ``slot``."""
+    work.threats_m[slot, :] = FAR
+    work.joint_m[slot], work.told_m[slot], work.threat_m[slot] = FAR, FAR, FAR
+    work.threat_by[slot], work.threat_at[slot], work.failed_at[slot] = -1, np.inf, np.inf
+    work.fails[slot], work.sealed[slot] = False, False
 
 
 @lean_kernel
-def _lower_clear_to_threat(slot: int, work: Work) -> None:
-    """Lower the margin of the path in ``slot`` to the least one from hunters where that is less."""
-    if work.threat_m[slot] < work.clear[slot, MARGIN]:
-        work.clear[slot, MARGIN], work.bound[slot] = work.threat_m[slot], work.threat_by[slot]
+def _note_threat(j: int, slot: int, target_m: float, work: Work) -> None:
+    """Note the margin from boat j in ``work.out``: whether it is short of its target, and whether it is the least."""
+    margin, at = work.out[MARGIN], work.out[SAMPLE]
+    if margin < target_m:
+        work.fails[slot], work.failed_at[slot] = True, min(work.failed_at[slot], at)
+    if margin < work.threat_m[slot]:
+        work.threat_m[slot], work.threat_at[slot], work.threat_by[slot] = margin, at, j
 
 
 @lean_kernel
-def _clear_of_one_of_several(
+def _clear_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> None:
+    """Margin from opponent j where a table is looked up first, into ``work.out``."""
+    margin = worst_at_once(i, j, slot, boats, work)
+    work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = margin, 0.0, 1.0, 0.0
+    work.told_m[slot] = min(work.told_m[slot], margin)
+    if margin < work.threat_target_m[i, j]:
+        work.sealed[slot] = True
+
+
+@lean_kernel
+def _clear_by_run(
     i: int,
     j: int,
     slot: int,
+    floor_m: float,
     state: Array,
     ours: BoolArray,
     boats: Boats,
     tuning: Tuning,
     work: Work,
-    floor_m: float,
 ) -> None:
-    """Clearance of a beset boat from opponent j, run through for a while and looked up from there, at most the cap.
+    """Clearance of a beset boat from opponent j, run through for a while and looked up from there, into ``work.out``.
 
-    On a manoeuvre on which thrust never is full the boat is lost.
+    At most the cap; on a manoeuvre on which thrust never is full the boat is lost.
     """
+    work.out[SAMPLE] = 0.0
     if work.ready[slot, READY_SAMPLE] < 0.0:
-        _note_margin(-work.radius[i, j], work.out)
+        work.out[MARGIN] = -work.radius[i, j]
     elif out_of_reach(i, j, slot, closing(i, j, state, boats, tuning), state, boats, tuning, work):
-        _note_margin(tuning.margin_cap_m, work.out)
+        work.out[MARGIN] = tuning.margin_cap_m
     else:
         clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+    work.joint_m[slot] = min(work.joint_m[slot], work.out[MARGIN])
+
+
+@lean_kernel
+def _clear_of_threat(
+    i: int,
+    j: int,
+    slot: int,
+    level_m: float,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    tuning: Tuning,
+    work: Work,
+) -> bool:
+    """Note what is feared of opponent j; False when it is short of its target and below the level."""
+    floor_m, told = min(work.threat_target_m[i, j], level_m), looked_up(i, j, slot, ours, boats, work)
+    if told:
+        _clear_by_table(i, j, slot, boats, work)
+    else:
+        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
+        clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+    work.threats_m[slot, j] = work.out[MARGIN]
+    _note_threat(j, slot, work.threat_target_m[i, j], work)
+    if not work.out[MARGIN] >= floor_m or not told or not work.beset[i]:
+        return work.out[MARGIN] >= floor_m
+    floor_m = min(work.joint_target_m[i], level_m)
+    _clear_by_run(i, j, slot, floor_m, state, ours, boats, tuning, work)
+    _note_threat(j, slot, work.joint_target_m[i], work)
+    return work.out[MARGIN] >= floor_m
 
 
 @lean_kernel
@@ -225,50 +272,19 @@ def worst_hunter(
     ``work.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
     first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
-    if work.hunters_known[slot]:
-        _lower_clear_to_threat(slot, work)
-        return
-    work.hunters_known[slot] = True
-    first, threat_by = work.first_hunter[i], -1
-    refused, fails = False, False
-    at_best, threat = FAR, FAR
-    threat_at, failed_at = np.inf, np.inf
-    work.threats_m[slot, :] = FAR
-    work.joint_m[slot] = FAR
-    for number in range(state.shape[0]):
-        j = first_then_rest(first, number)
-        if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
-            continue
-        # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-        floor_m = min(work.threat_target_m[i, j], level_m)
-        tells = looked_up(i, j, slot, ours, boats, work)
-        if tells:
-            _note_margin(worst_at_once(i, j, slot, boats, work), work.out)
-            at_best = min(at_best, work.out[MARGIN])
-            refused = refused or work.out[MARGIN] < work.threat_target_m[i, j]
-        else:
-            clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
-        work.threats_m[slot, j] = work.out[MARGIN]
-        enough = work.out[MARGIN] >= floor_m
-        if work.out[MARGIN] < work.threat_target_m[i, j]:
-            fails, failed_at = True, min(failed_at, work.out[SAMPLE])
-        if work.out[MARGIN] < threat:
-            threat, threat_at, threat_by = work.out[MARGIN], work.out[SAMPLE], j
-        if tells and enough and work.beset[i]:
-            floor_m = min(work.joint_target_m[i], level_m)
-            _clear_of_one_of_several(i, j, slot, state, ours, boats, tuning, work, floor_m)
-            work.joint_m[slot] = min(work.joint_m[slot], work.out[MARGIN])
-            enough = work.out[MARGIN] >= floor_m
-            if work.out[MARGIN] < work.joint_target_m[i]:
-                fails, failed_at = True, min(failed_at, work.out[SAMPLE])
-            if work.out[MARGIN] < threat:
-                threat, threat_at, threat_by = work.out[MARGIN], work.out[SAMPLE], j
-        if not enough:
-            work.first_hunter[i] = j
-            work.hunters_known[slot] = False
-            break
-    work.sealed[slot] = refused and threat >= at_best
-    work.threat_m[slot], work.threat_by[slot] = threat, threat_by
-    work.fails[slot] = fails
-    work.decided[slot] = max(threat_at, failed_at)
-    _lower_clear_to_threat(slot, work)
+    if not work.hunters_known[slot]:
+        work.hunters_known[slot] = True
+        _forget_threats(slot, work)
+        first = work.first_hunter[i]
+        for number in range(state.shape[0]):
+            j = first_then_rest(first, number)
+            if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
+                continue
+            if not _clear_of_threat(i, j, slot, level_m, state, ours, boats, tuning, work):
+                work.first_hunter[i] = j
+                work.hunters_known[slot] = False
+                break
+        work.sealed[slot] = work.sealed[slot] and work.threat_m[slot] >= work.told_m[slot]
+        work.decided[slot] = max(work.threat_at[slot], work.failed_at[slot])
+    if work.threat_m[slot] < work.clear[slot, MARGIN]:
+        work.clear[slot, MARGIN], work.bound[slot] = work.threat_m[slot], work.threat_by[slot]
