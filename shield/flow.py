@@ -99,26 +99,29 @@ def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
 
 
 @lean_kernel
-def _as_before(count: int, plan: Plan) -> bool:
-    """Whether the movers' commands are those in ``plan.answer``, bit for bit."""
+def _as_before(count: int, boats: Boats, plan: Plan) -> bool:
+    """Whether some mover looks opponents up, and all movers' commands are those in ``plan.answer``, bit for bit."""
+    looking = False
     for m in range(count):
         i = plan.movers[m]
+        looking = looking or boats.look[i] > 0
         if plan.commands[i, 0] != plan.answer[i, 0] or plan.commands[i, 1] != plan.answer[i, 1]:
             return False
-    return True
+    return looking
 
 
 @lean_kernel
 def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) -> int:
     """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`.
 
-    The rows do not know everything that the check does (runs of several opponents): where the program leaves all as it
-    was there is nothing to check, and nothing to linearise anew.
+    Of boats that look opponents up the rows do not know everything that the check does (runs of several opponents):
+    where the program leaves all as it was there is nothing to check, and nothing to linearise anew. Of others the check
+    may find another manoeuvre, and that other rows.
     """
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
     for m in range(count):
         copy_row(plan.answer[plan.movers[m]], plan.commands[plan.movers[m]])
-    if not take_answer(z, count, state, boats, tuning, plan) or _as_before(count, plan):
+    if not take_answer(z, count, state, boats, tuning, plan) or _as_before(count, boats, plan):
         return NO_ANSWER
     if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
         return SAFE
