@@ -32,7 +32,8 @@ class ShieldConfig:
         give_way_after_s: time a team-mate alongside may keep a boat from turning where it wants before one of the
             two gives way, s; inf never.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
-        margin_cap_m: margins above this shrink freely and are reported as infinite, m, at most 50.
+        margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
+            near, m, at most 50.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of

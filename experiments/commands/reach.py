@@ -39,6 +39,13 @@ Radius = Annotated[
         metavar="M", help="Separation radius to check the table for, m; may be repeated.", show_default="2.5, 4"
     ),
 ]
+DrawnRadius = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--radius", metavar="M", help="Separation radius that --picture draws, m; may be repeated.",
+        show_default="2.5, 4",
+    ),
+]  # fmt: skip
 OutFile = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="File to write.", show_default="the user's cache folder")
 ]
@@ -117,17 +124,21 @@ def show(
     own: OwnBoat,
     other: OtherBoat,
     other_may: OtherMay = "worst-case",
-    radius: Radius = None,
+    radius: DrawnRadius = None,
     file: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A table file instead of the installed one.")
     ] = None,
     picture: Picture = None,
 ) -> None:
     """Show a table's card and the sets in which a radius cannot be kept."""
+    radii = tuple(radius) if radius else RADII_M
+    if radius and picture is None:
+        raise TableError("--radius is what --picture draws; the card has its own radii: give --picture FILE as well")
     table = _open(own, other, other_may, file)
+    check_radii(problem_of(own, other, other_may), radii)
     show_card(out(), table.card)
     if picture is not None:
-        draw_sets(table, tuple(radius) if radius else RADII_M, picture)
+        draw_sets(table, radii, picture)
         out().print(f"picture: {picture}", soft_wrap=True)
 
 

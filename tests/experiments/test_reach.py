@@ -94,6 +94,13 @@ def test_a_missing_table_names_the_command():
     failed = run("show", "--own", "large_usv", "--other", "heron")
     assert failed.exit_code == ExitCode.BAD_INPUT
     assert "steerclear reach solve --own large_usv --other heron --other-may worst-case" in flat(failed.output)
+    shown = run("show", "--own", "heron", "--other", "heron", "--radius", "3")
+    assert shown.exit_code == ExitCode.BAD_INPUT
+    assert "give --picture FILE as well" in shown.output
+    for radius in ("-1", "300"):
+        drawn = run("show", "--own", "heron", "--other", "heron", "--radius", radius, "--picture", "sets.png")
+        assert drawn.exit_code == ExitCode.BAD_INPUT
+        assert "choose one within" in drawn.output
     other = run("show", "--own", "surveyor", "--other", "heron", "--file", HERON)
     assert other.exit_code == ExitCode.BAD_INPUT
     assert (
