@@ -83,7 +83,8 @@ def meets_new(fleet: Fleet, stayed: Stayed, boats: Boats, tuning: Tuning) -> Boo
     """Boats, (n,), that one which was not there before can come near to while paths are looked at."""
     fresh = np.ones(len(fleet), np.bool_)
     fresh[stayed.now] = False
-    samples = np.maximum(boats.samples, boats.hunt_samples + boats.thrust_samples).max() + 1
+    hunted = boats.hunt_samples + boats.thrust_samples + boats.chased_samples
+    samples = np.maximum(boats.samples, hunted).max() + 1
     horizon_s = samples * boats.sample_s + tuning.tail_s
     top: Array = np.maximum(boats.fastest_mps, np.abs(fleet.speed_mps))
     apart = fleet.position_m[:, None] - fleet.position_m[None]

@@ -29,6 +29,9 @@ class Boats(NamedTuple):
         samples: path samples of each boat's horizon, (n,).
         hunt_samples: path samples over which hunting opponents are followed once thrust is full, (n,), at least
             ``samples``.
+        chase_samples: path samples for which a hunting opponent (column) no faster than the boat (row) is followed
+            beyond that, (n, n).
+        chased_samples: the most of them for each boat, (n,).
         ready_thrust: thrust, percent, from which each boat is taken to have all of it, (n,).
         thrust_samples: path samples until a boat has its thrust back at the latest, (n,): so much longer hunters are
             followed at most.
@@ -61,6 +64,8 @@ class Boats(NamedTuple):
     granted_loss: Array
     samples: IntArray
     hunt_samples: IntArray
+    chase_samples: IntArray
+    chased_samples: IntArray
     ready_thrust: Array
     thrust_samples: IntArray
     fade: Array
@@ -143,4 +148,4 @@ class Scene(NamedTuple):
 
 def path_samples(boats: Boats) -> int:
     """Path samples that the working memory of these boats must hold."""
-    return int((boats.hunt_samples + boats.thrust_samples).max(initial=1))
+    return int((boats.hunt_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))

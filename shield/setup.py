@@ -37,6 +37,13 @@ With 5 s as few surveyors are hit by two and three rammers, but more commands ar
 hit, since hunters are less than the worst there is.
 """
 
+CHASE_S = 30.0
+"""Time over which opponents no faster than a boat are followed as hunters, s.
+
+On the boat's quarter they close in for so long on an all but parallel course: of herons two such leave less room than
+either. Of faster ones a run that long says that all is lost, which it is not.
+"""
+
 STATIC_REACTION_S = 0.5
 """Time beyond a half turn over which fixed things are looked at, s."""
 
@@ -105,7 +112,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             told_range_m=looked.told_range_m,
             told_radius_m=_widest_m(config),
             feared=np.asarray((looked.table >= 0).any(axis=0)),
-            **_horizons(config, kinds, limits, stride * config.dt_s, granted > 0.0),
+            **_horizons(config, kinds, limits, team, stride * config.dt_s, granted > 0.0),
         )
     )
 
@@ -124,7 +131,12 @@ def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], 
 
 
 def _horizons(
-    config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], sample_s: float, hunters: bool
+    config: ShieldConfig,
+    kinds: tuple[Platform, ...],
+    limits: list[Limits],
+    team: tuple[int, ...],
+    sample_s: float,
+    hunters: bool,
 ) -> dict[str, Any]:
     """How many samples each boat's paths, hunters and fixed things are followed for."""
     certificate = CERTIFICATES[config.certificate]
@@ -136,13 +148,26 @@ def _horizons(
         thrust_s.append(limit.thrust_s if hunters else 0.0)
         if hunters:
             hunt_s[i] = max(horizon_s[i], config.hunt_s or certificate.hunt_s(limit))
+    chase = _chases(kinds, team, hunt_s, hunters and config.hunt_s is None, sample_s)
     return {
+        "chase_samples": chase,
+        "chased_samples": chase.max(axis=1, initial=0),
         "samples": _samples(horizon_s, sample_s, 2),
         "hunt_samples": _samples(hunt_s, sample_s, 2),
         "thrust_samples": _samples(thrust_s, sample_s, 0),
         "fade": np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
         "static_samples": _samples(static_s, sample_s, 2),
     }
+
+
+def _chases(
+    kinds: tuple[Platform, ...], team: tuple[int, ...], hunt_s: list[float], hunters: bool, sample_s: float
+) -> IntArray:
+    """Samples beyond its own hunt for which each boat (row) is followed by each opponent that is no faster, (n, n)."""
+    top, side = np.array([kind.pack()[L.MAX_SPEED] for kind in kinds]), np.array(team)
+    longer = _samples([max(0.0, CHASE_S - value) if hunters else 0.0 for value in hunt_s], sample_s, 0)
+    follows = (side[:, None] != side[None]) & (top[None] <= top[:, None])
+    return np.where(follows, longer[:, None], 0)
 
 
 def _ready_thrust(params: Array, limits: list[Limits], with_table: BoolArray) -> Array:

@@ -28,6 +28,9 @@ FORGOTTEN_LOSS = 0.1
 LEAD_SHARE = 0.15
 """Share of the time that the hunt lasts by which a hunter leads the boat at most."""
 
+CHASE_LEAD_SHARE = 0.3
+"""The same of one that is no faster than the boat and follows it for longer."""
+
 
 @lean_kernel
 def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
@@ -67,16 +70,19 @@ def clear_of_hunter(
     """
     ready = int(work.ready[slot, READY_SAMPLE])
     till_ready = ready >= 0 and tabled(i, j, ours, boats, work)
-    lasts = boats.hunt_samples[i] + boats.thrust_samples[i]
+    closely = boats.hunt_samples[i] + boats.thrust_samples[i]
     if ready >= 0:
-        lasts = min(lasts, ready + boats.hunt_samples[i])
+        closely = min(closely, ready + boats.hunt_samples[i])
+    lasts = closely + (0 if till_ready else boats.chase_samples[i, j])
     fade = fade_over(lasts, i, boats)
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
         manner = first_then_rest(first, number)
-        weight = _run_hunter(i, j, slot, manner, lasts, fade, till_ready, state, boats, tuning, work, floor_m, cap_m)
+        weight = _run_hunter(
+            i, j, slot, manner, lasts, closely, fade, till_ready, state, boats, tuning, work, floor_m, cap_m
+        )
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -93,6 +99,7 @@ def _run_hunter(
     slot: int,
     manner: int,
     lasts: int,
+    closely: int,
     fade: float,
     till_ready: bool,
     state: Array,
@@ -123,9 +130,10 @@ def _run_hunter(
         boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
         RUDDERS[manner // 2] * turn,
         manner % 2 == 1,
-        LEAD_SHARE * lasts,
+        (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
         sample_s,
         samples,
+        closely,
         closing(i, j, state, boats, tuning),
         work.radius[i, j],
         fade,

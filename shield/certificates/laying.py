@@ -85,12 +85,12 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
     how = hunters_run(i, slot, boats, work)
     samples = boats.samples[i]
     if how != NO_HUNTERS:
-        samples = boats.hunt_samples[i] + boats.thrust_samples[i]
+        samples = boats.hunt_samples[i] + boats.thrust_samples[i] + boats.chased_samples[i]
     earliest = 0 if done == 1 else (boats.look[i] + boats.stride - 1) // boats.stride
     if work.beset[i]:
         earliest = max(earliest, boats.joint_samples)
     earliest = min(earliest, samples)
-    beyond = boats.hunt_samples[i] if how == HUNTERS else 0
+    beyond = boats.hunt_samples[i] + boats.chased_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     trace_path(
@@ -105,6 +105,7 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         samples,
         boats.samples[i],
         beyond,
+        boats.hunt_samples[i],
         earliest,
         boats.ready_thrust[i],
         work.path[slot],

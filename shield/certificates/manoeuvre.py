@@ -59,7 +59,8 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
             top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
             samples = max(boats.samples[i], boats.samples[j])
             if boats.team[i] != boats.team[j]:
-                samples = max(samples, max(work.reach_samples[i], work.reach_samples[j]))
+                reach_i = work.reach_samples[i] + boats.chase_samples[i, j]
+                samples = max(samples, max(reach_i, work.reach_samples[j] + boats.chase_samples[j, i]))
             horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
             radius = tuning.radius_m + margin_m[i] + margin_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]

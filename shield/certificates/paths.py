@@ -26,6 +26,13 @@ STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
 
 
+SETTLES_BY = 0.995
+"""A straight run's speed settles when less than this share of its gain in one step is gained in the next,"""
+
+SETTLED_MPS = 1e-3
+"""and when that takes it this near, m/s, to the speed commanded, which is not 0: there it would be cut off."""
+
+
 @lean_kernel
 def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
     """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
@@ -71,6 +78,7 @@ def trace_path(
     samples: int,
     least: int,
     beyond: int,
+    closely: int,
     earliest: int,
     ready_thrust: float,
     path: Array,
@@ -90,6 +98,7 @@ def trace_path(
         samples: number of samples after sample 0.
         least: number of them after which the path may end.
         beyond: number of them after the one where thrust is full that the path goes on for.
+        closely: number of them for which it follows the model; a straight run then goes on as its speed settles.
         earliest: first sample at which that counts, at most ``samples``.
         ready_thrust: thrust, percent, from which the boat has all of it.
         path: shape (>= samples + 1, 2), float64.
@@ -109,6 +118,7 @@ def trace_path(
             samples,
             least,
             beyond,
+            closely,
             earliest,
             ready_thrust,
             path,
@@ -143,6 +153,7 @@ def _trace_usv(
     samples: int,
     least: int,
     beyond: int,
+    closely: int,
     earliest: int,
     ready_thrust: float,
     path: Array,
@@ -161,6 +172,7 @@ def _trace_usv(
     sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
+    gained = 0.0
     turning = True
     k, step = 0, done - 1
     if done == 1:
@@ -194,21 +206,82 @@ def _trace_usv(
         x += mx * mean * dt_s
         y += my * mean * dt_s
         change = abs(mean - v) + abs(thrust - last)
+        gained_before, gained = gained, mean - v
         v = min(max(mean, 0.0), top)
         step += 1
         if step % stride == 0:
             path[k, 0], path[k, 1] = x, y
-            if turning:
-                ready[TURNING_SAMPLE] = k
+            ready[TURNING_SAMPLE] = k if turning else ready[TURNING_SAMPLE]
             if ready[READY_SAMPLE] < 0.0:
                 _note_ready(k, earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)
             k += 1
-        if togo_deg <= 0.0 and turn == 0.0 and change < STEADY_SPEED and 0 < k <= samples:
-            _note_ready(max(k, earliest), earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)  # as now
-            if ready[READY_SAMPLE] >= 0.0:
-                samples = min(samples, max(least, int(ready[READY_SAMPLE]) + beyond))
-            _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, samples, path)
-            return
+        if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= samples:
+            if change < STEADY_SPEED:
+                _note_ready(max(k, earliest), earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)  # as now
+                last = _last_sample(samples, least, beyond, ready)
+                _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, last, path)
+                return
+            rate = _rate(gained, gained_before, k - closely, ready)
+            settled = _settled(v, gained, rate, min(speed_mps, top))
+            if settled > 0.0:
+                last = _last_sample(samples, least, beyond, ready)
+                _settle(x, y, ux * dt_s, uy * dt_s, v, settled, rate, step, k, stride, last, path)
+                return
+
+
+@lean_kernel
+def _last_sample(samples: int, least: int, beyond: int, ready: Array) -> int:
+    """Last sample of a path that is straight and steady from here on."""
+    if ready[READY_SAMPLE] < 0.0:
+        return samples
+    return min(samples, max(least, int(ready[READY_SAMPLE]) + beyond))
+
+
+@lean_kernel
+def _rate(gained: float, gained_before: float, followed: int, ready: Array) -> float:
+    """What a step gained over what the one before did, 0 where the model is to be followed on."""
+    if not 0.0 <= ready[READY_SAMPLE] < followed or gained_before == 0.0:
+        return 0.0
+    return gained / gained_before
+
+
+@lean_kernel
+def _settled(speed_mps: float, gained_mps: float, rate: float, commanded_mps: float) -> float:
+    """Speed, m/s, at which a boat settles that gained so much in this step; 0 where that is not what was commanded."""
+    if not 0.0 < rate < SETTLES_BY:
+        return 0.0
+    settled_mps = speed_mps + gained_mps * rate / (1.0 - rate)
+    if commanded_mps <= SETTLED_MPS or abs(settled_mps - commanded_mps) >= SETTLED_MPS:
+        return 0.0
+    return settled_mps
+
+
+@lean_kernel
+def _settle(
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    speed_mps: float,
+    settled_mps: float,
+    rate: float,
+    step: int,
+    k: int,
+    stride: int,
+    samples: int,
+    path: Array,
+) -> None:
+    """Fill the rest of a path with a straight run whose speed settles: what it still gains falls geometrically.
+
+    ``(ux, uy)`` is the way of a step per m/s; ``rate`` is what a step gains over what the one before did.
+    """
+    short = (speed_mps - settled_mps) * rate / (1.0 - rate)
+    left, per_sample = rate ** (k * stride - step), rate**stride
+    while k <= samples:
+        way = (k * stride - step) * settled_mps + short * (1.0 - left)
+        path[k, 0], path[k, 1] = x + way * ux, y + way * uy
+        left *= per_sample
+        k += 1
 
 
 @lean_kernel

@@ -10,6 +10,9 @@ from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 LONGEST_STRIDE = 6
 """Samples a hunter far away is moved on at once."""
 
+CHASE_STRIDE = 4
+"""Samples a hunter that is near is moved on at once when it follows a boat that has long run straight."""
+
 
 @lean_kernel
 def _note_faded(
@@ -116,6 +119,7 @@ def clear_of_pursuer(
     ahead: float,
     sample_s: float,
     samples: int,
+    closely: int,
     closing_m: float,
     radius_m: float,
     fade: float,
@@ -146,6 +150,7 @@ def clear_of_pursuer(
         ahead: most samples by which it leads the boat.
         sample_s: time between samples, s.
         samples: last sample.
+        closely: sample from which on the boat runs straight: it is followed in longer strides.
         closing_m: most the distance can shrink per sample, m.
         radius_m: radius to keep, m.
         fade: factor of negative margins per sample, 0 to 1.
@@ -168,13 +173,14 @@ def clear_of_pursuer(
     x0, y0 = own[0, 0] - x, own[0, 1] - y
     k = 0
     while k < samples:
-        stride = 1
+        stride = 1 if k < closely else CHASE_STRIDE
         square = x0 * x0 + y0 * y0
         if square > worth:
-            stride = int((math.sqrt(square) - root) / closing_m)
-            if stride >= samples - k and not to_end:
+            free = int((math.sqrt(square) - root) / closing_m)
+            if free >= samples - k and not to_end:
                 break
-            stride = min(stride, LONGEST_STRIDE, samples - k)
+            stride = max(stride, min(free, LONGEST_STRIDE))
+        stride = min(stride, samples - k)
         c, s = c1, s1
         for _ in range(stride - 1):
             c, s = c * c1 - s * s1, s * c1 + c * s1

@@ -87,7 +87,9 @@ def run_and_looked_up(at, j, tables):
     lasts = int(ready[READY_SAMPLE] + at.boats.hunt_samples[0])
     fade = fade_over(lasts, 0, at.boats)
     for manner in range(6):
-        faded = _run_hunter(0, j, 0, manner, lasts, fade, True, at.state, at.boats, at.tuning, at.work, -FAR, 2.0)
+        faded = _run_hunter(
+            0, j, 0, manner, lasts, lasts, fade, True, at.state, at.boats, at.tuning, at.work, -FAR, 2.0
+        )
         least = min(least, at.work.spare[MARGIN])
         hunter = at.work.hunter
         there = hunter[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
@@ -266,7 +268,7 @@ def test_nothing_is_noted_beyond_the_end_of_a_path(speed_mps, turn_deg):
         for earliest in range(samples + 1):
             trace_path(
                 at.boats.params[0], at.state[0].copy(), 1.0, turn_deg, 3.0, 0.1, 1, at.boats.stride, samples, samples,
-                0, earliest, at.boats.ready_thrust[0], path, ready,
+                0, samples, earliest, at.boats.ready_thrust[0], path, ready,
             )  # fmt: skip
             assert ready[READY_SAMPLE] <= samples
             assert np.isfinite(path).all()

@@ -88,7 +88,7 @@ def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends()
         lasts = int(at.boats.hunt_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
         runs, values = [], []
         for manner in range(6):
-            faded = _run_hunter(0, 1, 0, manner, lasts, fade_over(lasts, 0, at.boats), True, *seen)
+            faded = _run_hunter(0, 1, 0, manner, lasts, lasts, fade_over(lasts, 0, at.boats), True, *seen)
             runs.append(at.work.spare[MARGIN])
             margin = value_margin(at, tables)
             if margin is not None:
@@ -124,7 +124,7 @@ def nimble(thrust, speed_mps, *others):
 
 def herons_samples(at):
     """Path samples that hunters are followed for at full thrust, and until thrust is back from rest."""
-    return int(at.boats.hunt_samples[0]), int(at.boats.thrust_samples[0])
+    return int(at.boats.hunt_samples[0] + at.boats.chase_samples[0, 1]), int(at.boats.thrust_samples[0])
 
 
 @pytest.mark.parametrize(("thrust", "speed_mps"), [(0.0, 0.0), (40.0, 1.0), (80.0, 1.6), (86.0, 1.7), (100.0, 2.0)])
@@ -196,7 +196,9 @@ def test_margins_of_long_hunts_fade_as_much_by_their_end():
         hunt, build = herons_samples(at)
         lasts = min(int(at.work.ready[0, READY_SAMPLE]) + hunt, hunt + build)
         fade = fade_over(lasts, 0, at.boats)
-        faded.append(_run_hunter(0, 1, 0, 0, lasts, fade, False, at.state, at.boats, at.tuning, at.work, -1e6, 1e6))
+        faded.append(
+            _run_hunter(0, 1, 0, 0, lasts, lasts, fade, False, at.state, at.boats, at.tuning, at.work, -1e6, 1e6)
+        )
     np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
 
 

@@ -1,0 +1,23 @@
+"""Encounters of a heron and two rammers, one on each quarter, that hunts of a few seconds lose."""
+
+import numpy as np
+from steerclear.experiments.encounters.families import draw
+from steerclear.experiments.encounters.play import play
+from steerclear.experiments.encounters.scenes import Conditions, join
+from steerclear.shield.platforms import layout as L
+
+NUMBERS = (173, 189, 253, 397, 403, 437, 480, 498, 503, 627)
+
+
+def closest_m(guard):
+    scenes = join([draw("rammer_2", "heron", "heron", Conditions(), 0, number, 1) for number in NUMBERS])
+    place = play(scenes, guard, Conditions()).state[..., [L.X, L.Y]]
+    return np.linalg.norm(place[:, :, :1] - place[:, :, 1:], axis=-1).min(axis=(0, 2))
+
+
+def test_two_that_close_in_from_both_quarters_are_seen_coming():
+    assert (closest_m("shield") >= 2.5).all()
+
+
+def test_hunts_of_a_few_seconds_lose_them():
+    assert (closest_m("shield:hunt_s=6.4") < 2.5).mean() > 0.5
