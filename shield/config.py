@@ -37,9 +37,9 @@ class ShieldConfig:
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of
-            gaining top speed again, at most 60 s, and of those no faster than the boat at least 30 s; never less than the escape takes. For a boat that lacks thrust the
-            time until it is back comes on top. Less asks for fewer interventions
-            and promises less, also near in time: hunters lead the boat by a share of it.
+            gaining top speed again, at most 60 s, and for those no faster than the boat at least 30 s; never less than
+            the escape takes. For a boat that lacks thrust the time until it is back comes on top. Less asks for fewer
+            interventions and promises less, also near in time: hunters lead the boat by a share of it.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
         position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
