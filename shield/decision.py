@@ -13,7 +13,7 @@ import numpy as np
 from . import plan
 from .certificates.rating import FIXED_THING
 from .commands import Commands
-from .fleet import Fleet
+from .fleet import FIELD, Fleet
 from .jit import Array, BoolArray, IntArray
 
 
@@ -145,7 +145,7 @@ class Decisions(Sequence[Decision]):
 
     def _binding(self, bound: int) -> tuple[str, ...]:
         if bound == FIXED_THING:
-            return ("field",)
+            return (FIELD,)
         return (self.fleet.names[bound],) if bound >= 0 else ()
 
     def _no_table(self, i: int) -> tuple[str, ...] | None:

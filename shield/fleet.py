@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +14,9 @@ from .platforms import Platform, get_platform
 from .platforms import layout as L
 
 _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
+
+FIELD = "field"
+"""What decisions name as binding where no boat is: walls, circles, edges. No boat may be called so."""
 
 LARGEST = 1e9
 """Values beyond this (m, m/s, deg, percent) are faults of the source: squares of them lose the metres."""
@@ -95,7 +98,8 @@ class Fleet:
             position_error_m: (n,) bound on the position error, m.
 
         Raises:
-            FleetError: shapes do not fit together, or two boats have the same name.
+            FleetError: shapes do not fit together, a value cannot be used, two boats have the same name, or one is
+                called "field".
             PlatformError: a platform is unknown.
         """
         position = _shaped("position_m", position_m, (None, 2))
@@ -118,12 +122,14 @@ class Fleet:
             state=state,
             team=teams,
             platforms=_kinds(platforms, n),
-            controlled=teams == 0 if controlled is None else _shaped("controlled", controlled, (n,)).astype(np.bool_),
+            controlled=teams == 0 if controlled is None else _yes_or_no("controlled", controlled, n),
             names=tuple(f"boat_{i}" for i in range(n)) if names is None else tuple(names),
             age_s=None if age_s is None else _shaped("age_s", age_s, (n,)),
             position_error_m=None if position_error_m is None else _shaped("position_error_m", position_error_m, (n,)),
         )
         fleet.check()
+        if FIELD in fleet.names:
+            raise FleetError(f"names holds {FIELD!r}, by which decisions name walls and edges; give that boat another")
         twins = sorted({name for name in fleet.names if fleet.names.count(name) > 1})
         if twins:
             raise FleetError(f"names holds {twins[0]!r} more than once; give every boat a name of its own")
@@ -149,8 +155,13 @@ class Fleet:
             value = getattr(self, name)
             if value is not None and len(value) != n:
                 raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
-        if self.controlled.dtype != np.bool_:
-            raise FleetError(f"controlled is of {self.controlled.dtype}; give True or False per boat")
+        if not isinstance(self.controlled, np.ndarray) or self.controlled.dtype != np.bool_:
+            kind = getattr(self.controlled, "dtype", type(self.controlled).__name__)
+            raise FleetError(f"controlled is of {kind}; give an array of True or False per boat")
+        for name in ("team", "age_s", "position_error_m"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, np.ndarray):
+                raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
         if not sound(self.state):
             self._name_fault()
         error = self.position_error_m
@@ -210,12 +221,22 @@ def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tupl
     """Platforms of n boats, each a known one."""
     if platforms is None:
         raise FleetError("platforms is None; give a platform's name, or one for each boat")
+    if not isinstance(platforms, (str, Platform, Iterable)):
+        raise FleetError(f"platforms is {platforms!r}; give a platform's name, or one for each boat")
     kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
     for kind in kinds:
         if not isinstance(kind, (str, Platform)):
             raise FleetError(f"platforms holds {kind!r}; give names of platforms, or Platform objects")
         get_platform(kind)
     return kinds
+
+
+def _yes_or_no(name: str, value: ArrayLike, n: int) -> BoolArray:
+    """Values as booleans; what is neither true nor false, as NaN, is refused."""
+    values = _shaped(name, value, (n,))
+    if not ((values == 0.0) | (values == 1.0)).all():
+        raise FleetError(f"{name} holds a value that is neither True nor False: {values.tolist()}")
+    return values == 1.0
 
 
 def _whole(name: str, values: Array) -> IntArray:
