@@ -12,7 +12,7 @@ from ..scene import Boats, Tuning
 from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .paths import READY_SAMPLE
-from .pursuer import clear_of_pursuer
+from .pursuer import clear_of_pursuer, stays_away
 from .values import looked_up, margin_when_ready, out_of_reach, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
@@ -74,6 +74,9 @@ def clear_of_hunter(
     if ready >= 0:
         closely = min(closely, ready + boats.hunt_samples[i])
     lasts = closely + (0 if till_ready else boats.chase_samples[i, j])
+    if not till_ready and _never_near(i, j, slot, lasts, state, boats, tuning, work, cap_m):
+        work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = cap_m, lasts, 1.0, 0.0
+        return
     fade = fade_over(lasts, i, boats)
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
@@ -90,6 +93,16 @@ def clear_of_hunter(
             if work.out[MARGIN] < floor_m:
                 work.first_manner[i, j] = manner
                 return
+
+
+@lean_kernel
+def _never_near(
+    i: int, j: int, slot: int, lasts: int, state: Array, boats: Boats, tuning: Tuning, work: Work, cap_m: float
+) -> bool:
+    """Whether no run of opponent j, however it steers, ends with less than the cap: most need not be made."""
+    way = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED]) * boats.sample_s
+    closing_m, radius_m = closing(i, j, state, boats, tuning), work.radius[i, j]
+    return stays_away(work.path[slot], work.course[j, 0], work.course[j, 1], way, lasts, closing_m, radius_m, cap_m)
 
 
 @lean_kernel
