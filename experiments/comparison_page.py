@@ -1,25 +1,20 @@
-"""Text and plot of the comparison page."""
+"""Text of the comparison page."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
-from .comparison import NO_GUARD, Cell, Contest, cells_of, contests_of, pool
+from .comparison import Cell, Contest, cells_of, contests_of, pool
+from .comparison_plot import plot_contests
 from .encounters.summary import upper_bound
 from .markdown import MADE, table
 from .tables import number_text
 
 STEM = "comparison"
-COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
-MARKS = ("o", "s", "^", "D")
-LEGEND_LETTER_IN, LEGEND_MARK_IN, LEGEND_LINE_IN = 0.06, 0.55, 0.17
-"""Room in a legend of 8 points, inches: a letter, a mark with its gaps, a line."""
-OTHERS = ("#b5532a", "#6a4c93", "#2e7d32", "#c99700", "#ad1457", "#37474f")
 
 
 def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, list[Path]]:
@@ -46,7 +41,7 @@ def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path) -> tupl
 
 def comparison_page(contests: Sequence[Contest], picture: Path, versions: Sequence[str]) -> str:
     """Write the page."""
-    lines = ["# Guards on the same encounters", "", MADE, "", _intro(versions), "", f"![plot]({picture.name})", ""]
+    lines = [_heading(contests), "", MADE, "", _intro(versions), "", f"![plot]({picture.name})", ""]
     for contest in contests:
         lines += [f"## {contest.title}", "", _winner_line(contest), "", *_totals_table(contest), ""]
         if len(contest.cells) == 1:
@@ -54,6 +49,11 @@ def comparison_page(contests: Sequence[Contest], picture: Path, versions: Sequen
         else:
             lines += ["Encounters breached, and share of commands changed:", "", *_families_table(contest), ""]
     return "\n".join(lines)
+
+
+def _heading(contests: Sequence[Contest]) -> str:
+    guards = {guard for contest in contests for guard in contest.cells}
+    return "# Guards on the same encounters" if len(guards) > 1 else f"# Encounters with {guards.pop()}"
 
 
 def _intro(versions: Sequence[str]) -> str:
@@ -75,7 +75,7 @@ def _winner_line(contest: Contest) -> str:
     families = f"Families: {', '.join(contest.families)}; seed {contest.seed}."
     if contest.left_out:
         families += f" Not met equally by all guards and left out: {', '.join(contest.left_out)}."
-    if contest.winner is None:
+    if contest.winner is None or len(contest.cells) == 1:
         return families
     rule = "fewest avoidable or unjudged, then fewest breached, then fewest commands changed"
     return f"Best ({rule}): **{contest.winner}**. {families}"
@@ -86,7 +86,7 @@ def _totals_table(contest: Contest) -> list[str]:
              "time to goal", "never arrived", "deadlocked", "reversals / min", "µs per decision"]  # fmt: skip
     rows = []
     for guard, one in contest.totals.items():
-        name = f"**{guard}**" if guard == contest.winner else guard
+        name = f"**{guard}**" if guard == contest.winner and len(contest.cells) > 1 else guard
         rows.append([
             name, f"{one['encounters']:,}", _bounded(one, "avoidable"), one["unavoidable"], one["not_judged"],
             _bounded(one, "breached"), f"{one['changed_percent']:.1f} %", _number(one["goal_time_ratio"], 2),
@@ -147,54 +147,3 @@ def _percent(value: float | None) -> str:
 
 def _number(value: float | None, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f}"
-
-
-def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
-    """Draw share of encounters breached, with its upper limit, over share of commands changed: one panel each."""
-    from matplotlib.figure import Figure  # without pyplot: no window system is touched
-
-    across = min(len(contests), 3)
-    down = math.ceil(len(contests) / across)
-    names = list(dict.fromkeys(guard for contest in contests for guard in contest.cells))
-    columns = legend_columns(names, 4.4 * across)
-    height_in = 3.6 * down + LEGEND_LINE_IN * math.ceil(len(names) / columns)
-    canvas = Figure(figsize=(4.4 * across, height_in), layout="constrained", dpi=150)
-    axes = canvas.subplots(down, across, squeeze=False).ravel()
-    looks = looks_of(names)
-    for axis, contest in zip(axes, contests, strict=False):
-        _draw(axis, contest, looks)
-    for axis in axes[len(contests) :]:
-        axis.set_visible(False)
-    handles, labels = axes[0].get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
-    canvas.savefig(path)
-    return path
-
-
-def legend_columns(names: Sequence[str], width_in: float) -> int:
-    """How many columns of these names fit beside each other, 1 to 4: of a wider legend the sides are cut off."""
-    widest_in = LEGEND_MARK_IN + LEGEND_LETTER_IN * max((len(name) for name in names), default=0)
-    return max(1, min(4, int(width_in / widest_in)))
-
-
-def looks_of(guards: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Colour and mark of each guard; where colours run out they come again with another mark."""
-    others = [guard for guard in guards if guard not in COLOURS]
-    pairs = [(colour, mark) for mark in MARKS for colour in OTHERS]
-    looks = {guard: pairs[k % len(pairs)] for k, guard in enumerate(others)}
-    return {guard: looks.get(guard, (COLOURS.get(guard, ""), MARKS[0])) for guard in guards}
-
-
-def _draw(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, str]]) -> None:
-    for guard, one in contest.totals.items():
-        share = 100.0 * one["breached"] / one["encounters"]
-        above = [[0.0], [100.0 * one["breached_upper"] - share]]
-        colour, mark = looks[guard]
-        axis.errorbar(one["changed_percent"], share, above, fmt=mark, capsize=3, color=colour, label=guard)
-    axis.set_yscale("symlog", linthresh=0.1)
-    axis.set_ylim(bottom=-0.02)
-    axis.set_title(contest.title, fontsize=9)
-    axis.set_xlabel("commands changed, %", fontsize=8)
-    axis.set_ylabel("encounters breached, %", fontsize=8)
-    axis.tick_params(labelsize=8)
-    axis.spines[["top", "right"]].set_visible(False)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments.comparison import cells_of, contests_of
-from steerclear.experiments.comparison_page import comparison_page, legend_columns, looks_of
+from steerclear.experiments.comparison_page import comparison_page
+from steerclear.experiments.comparison_plot import legend_columns, looks_of, plot_contests
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError
 
@@ -149,6 +150,23 @@ def test_of_one_guard_every_family_has_its_figures():
     assert "| head_on | 0 [0.3 %] | 0 [0.3 %] | 0 | 1,000 | 0 [0.3 %] | 5.0 % | 1.10 | 0.00 % |" in lines
     assert "| at_rest | 99 [100 %] | 90 [94 %] | 9 |  |  | 60.0 % | 1.10 | 2.00 % |" in lines
     assert not any(line.startswith("Encounters breached, and") for line in lines)
+    assert lines[0] == "# Encounters with shield"
+    assert not any("Best" in line or "**shield**" in line for line in lines)
+
+
+def test_the_plot_of_one_guard_has_a_line_for_every_family(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    saved = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, path: saved.append(self))
+    told = {"started_outside": 50, "breaches_outside": 5}
+    cells = [cell("shield", "head_on", **told), cell("shield", "rammer_1", breached=7), cell("shield", "at_rest")]
+    plot_contests([one_contest(content(*cells))], tmp_path / "plot.png")
+    (axis,) = saved[0].axes
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["head_on", "rammer_1", "at_rest"]
+    every, outside = axis.containers
+    assert list(every.lines[0].get_xdata()) == [0.0, 7.0, 0.0]
+    assert list(outside.lines[0].get_xdata()) == [10.0]
 
 
 def test_bad_results_are_refused(tmp_path):
