@@ -7,9 +7,11 @@ import math
 import numpy as np
 
 from .certificates.assign import assign_plans, hold
+from .certificates.candidates import candidate, remembered
 from .certificates.clearance import MARGIN
 from .certificates.fixed_things import clear_of_near_obstacles
-from .certificates.manoeuvre import told_margin
+from .certificates.laying import lay_path
+from .certificates.manoeuvre import clear_of_boat, told_margin
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, STRAIGHT_SAFE, only_fixed, worst_merit, worst_off
 from .certificates.values import run_opponents
 from .easing import ease
@@ -97,6 +99,39 @@ def _join(ours: BoolArray, work: Work, plan: Plan) -> int:
 
 
 @lean_kernel
+def _in_the_way(
+    i: int, j: int, slot: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work
+) -> bool:
+    """Whether boat i on the path in ``slot`` would come too near to team-mate j on its manoeuvre."""
+    if j == i or not ours[j] or not work.near[i, j]:
+        return False
+    clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, 0.0, 0.0)
+    return work.out[MARGIN] < 0.0
+
+
+@lean_kernel
+def _make_room(
+    state: Array, ours: BoolArray, boats: Boats, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+) -> int:
+    """Make movers of the boats that passed and lie in the way of an escape that a mover has held until now.
+
+    The mover may since have been given another, which others keep it from: then nobody tells of this one any more.
+    """
+    trial = state.shape[0]
+    for m in range(list_movers(plan)):
+        i = plan.movers[m]
+        heading = state[i, L.HEADING]
+        if work.merit[i] >= PAIR_SAFE or not remembered(i, 0, heading, memory):
+            continue
+        side, togo, speed = candidate(i, 0, 0.0, heading, boats, plans, memory)
+        lay_path(i, trial, side, togo, speed, 0, state, boats, tuning, work)
+        for j in range(ours.shape[0]):
+            if not plan.moving[j] and _in_the_way(i, j, trial, state, ours, boats, tuning, work):
+                plan.moving[j] = True
+    return list_movers(plan)
+
+
+@lean_kernel
 def _assign_escapes(
     count: int,
     state: Array,
@@ -155,8 +190,8 @@ def ladder(
     keeps them is carried out only as far as they ask for, see `easing`.
 
     Boats that passed have escapes that fit the others' after the wanted commands, maybe not those they had: where
-    an escape would bring a mover into one of them, that boat is a mover, too. All together had escapes that fit at the
-    last decision, and these are what is tried first.
+    an escape that a mover has, or has held until now, would bring it into one of them, that boat is a mover, too. All
+    together had escapes that fit at the last decision, and these are what is tried first.
     """
     before, eases = worst_merit(ours, work), only_fixed(ours, work)
     for i in range(ours.shape[0]):
@@ -165,7 +200,10 @@ def ladder(
     good = False
     for _ in range(ours.shape[0]):
         good = _assign_escapes(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        movers = count if good else _join(ours, work, plan)
+        movers = count
+        if not good:
+            _join(ours, work, plan)
+            movers = _make_room(state, ours, boats, plans, tuning, memory, work, plan)
         if movers == count:
             break
         count = movers
