@@ -27,10 +27,12 @@ STEADY_SPEED = 1e-4
 
 
 SETTLES_BY = 0.995
-"""A straight run's speed settles when less than this share of its gain in one step is gained in the next,"""
+"""A straight run's speed settles when less than this share of what it gains in one step is gained in the next,"""
 
 SETTLED_MPS = 1e-3
-"""and when that takes it this near, m/s, to the speed commanded, which is not 0: there it would be cut off."""
+"""and when that takes it this near, m/s, to the speed commanded, which is not 0: there it would be cut off.
+
+Only of a boat that gains speed: one that slows down may seem to settle there for one step of its way below."""
 
 
 @lean_kernel
@@ -247,8 +249,8 @@ def _rate(gained: float, gained_before: float, followed: int, ready: Array) -> f
 
 @lean_kernel
 def _settled(speed_mps: float, gained_mps: float, rate: float, commanded_mps: float) -> float:
-    """Speed, m/s, at which a boat settles that gained so much in this step; 0 where that is not what was commanded."""
-    if not 0.0 < rate < SETTLES_BY:
+    """Speed, m/s, at which a boat that gained so much in this step settles; 0 where that is not the one commanded."""
+    if not 0.0 < rate < SETTLES_BY or gained_mps <= 0.0:
         return 0.0
     settled_mps = speed_mps + gained_mps * rate / (1.0 - rate)
     if commanded_mps <= SETTLED_MPS or abs(settled_mps - commanded_mps) >= SETTLED_MPS:

@@ -42,20 +42,33 @@ def test_a_time_that_is_asked_for_holds_for_all():
     assert chase_s(boats("heron", "heron", opponent_share=0.0)) < 8.0
 
 
+def any_boat(random, params):
+    """State and commanded speed, m/s: drawn at random, or of a boat that has held a speed for a while."""
+    top = float(params[L.MAX_SPEED])
+    row = fresh_state(0.0, 0.0, random.uniform(0.0, 360.0), random.uniform(0.0, top))
+    row[L.THRUST] = random.uniform(0.0, 100.0)
+    if random.random() < 0.5:
+        row[[L.SPEED_ERROR, L.HEADING_ERROR]] = 0.0
+        held_mps = random.uniform(0.0, top)
+        for _ in range(random.integers(300)):
+            sail(params, row, 1.0, 0.0, held_mps, 0.1)
+    return row, random.choice([top, 0.0, random.uniform(0.0, top)])
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
 @pytest.mark.parametrize("seed", range(6))
-def test_a_straight_run_whose_speed_settles_is_where_the_model_says(seed):
+def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, seed):
     """The speed of what is left of the way settles geometrically: no step of the model is needed for it."""
-    random, params = np.random.default_rng(seed), get_platform("heron").pack()
-    for _ in range(40):
-        row = fresh_state(0.0, 0.0, random.uniform(0.0, 360.0), random.uniform(0.0, 2.0))
-        row[L.THRUST] = random.uniform(0.0, 100.0)
-        speed, togo = random.choice([2.0, 2.0, 1.3, 0.0]), random.choice([0.0, 30.0, 90.0, 180.0])
+    random, params = np.random.default_rng(seed), get_platform(platform).pack()
+    for _ in range(80):
+        row, speed = any_boat(random, params)
+        togo = random.choice([0.0, 30.0, 90.0, 180.0])
         path, ready = np.full((400, 2), np.nan), np.zeros(4)
         trace_path(params, row.copy(), 1.0, togo, speed, 0.1, 1, 2, 217, 28, 151, 30, 0, 85.0, path, ready)
         last = 217 if ready[0] < 0 else min(217, max(28, int(ready[0]) + 151))
         assert np.isfinite(path[: last + 1]).all()
         for k in range(last + 1):
-            np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=1e-2)
+            np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=2e-2)
             for _ in range(2):
                 togo = sail(params, row, 1.0, togo, speed, 0.1)
 
