@@ -21,7 +21,7 @@ from .scene import Scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay
+from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
 
 
@@ -48,6 +48,7 @@ def decide_games(
     ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
     for b in range(state.shape[0]):
         ahead[:] = state[b]
+        turn_round(ahead, ours[b])
         fill_memory(ahead, boats.params)
         run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
         for i in range(n):

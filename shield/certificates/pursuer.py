@@ -119,7 +119,7 @@ def stays_away(
         free = (math.sqrt(dx * dx + dy * dy) - way * k - root) / closing_m - spare
         if not free >= 1.0:
             return False
-        k += int(min(free, samples))
+        k += int(min(free, samples + 1))
     return True
 
 

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from shield_scenes import bits, finite_commands, fleet_of, fleets, head_on, quick, relative
-from steerclear.shield import Commands, Reason, Shield
+from steerclear.shield import Commands, Reason, Shield, ShieldConfig
+from steerclear.shield.batch import BatchedShield
 
 ODD = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1.0 + 2**-52, 179.99999999999997, -180.0, 180.0, 359.0]
 
@@ -108,3 +109,14 @@ def test_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_
     assert ahead[0].certificate_m < 0.2
     np.testing.assert_allclose(ahead.sent.values, astern.sent.values, atol=1e-9)
     assert ahead[0].certificate_m == pytest.approx(astern[0].certificate_m, abs=1e-9)
+
+
+@pytest.mark.parametrize(("gap_m", "speed_mps"), [(9.0, 2.0), (20.0, 8.0), (30.0, 20.0)])
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_in_a_batch_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_mps):
+    fleet = fleet_of([(0, 0, 0, 1.5), (0.3, gap_m, 0.0, -speed_mps)], [0, 1], platform, thrust=[80.0, 80.0])
+    wanted, batch = [(1.5, 0.0), (1.0, 9.0)], BatchedShield(ShieldConfig(), 1, (platform,) * 2, (0, 1))
+    sent = batch.decide(fleet.state[None], np.array(wanted)[None], np.array([[True, False]]))[0]
+    single = Shield().decide(fleet, relative(*wanted))
+    np.testing.assert_allclose(sent, single.sent.values, atol=1e-6)
+    assert batch.certificate_m[0, 0] == pytest.approx(single[0].certificate_m, abs=1e-9)
