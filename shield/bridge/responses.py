@@ -61,19 +61,17 @@ class Responder:
         """
         onset = self._onset
         if onset is None or onset.response != response:
-            heading = math.radians(float(row[L.HEADING])) % TWO_PI
-            speed = max(0.0, float(row[L.SPEED]))
-            onset = _Onset(response, float(row[L.X]), float(row[L.Y]), heading, speed)
+            onset = _Onset(response, float(row[L.X]), float(row[L.Y]), _heading(row), max(0.0, float(row[L.SPEED])))
             self._onset = onset
         if response == "hold_course":
             return onset.speed_mps, onset.heading_rad
         if response == "slow":
             return 0.5 * onset.speed_mps, onset.heading_rad
         if response == "hold_station":
-            return self._steer(row, onset.x_m, onset.y_m, STATION_M, onset.heading_rad)
+            return self._steer(row, onset.x_m, onset.y_m, STATION_M)
         if response == "return":
-            return self._steer(row, *self._inside(row), 0.5, onset.heading_rad)
-        return 0.0, onset.heading_rad
+            return self._steer(row, *self._inside(row), 0.5)
+        return _rest(row)
 
     def _inside(self, row: Array) -> tuple[float, float]:
         """The nearest place well inside the fence."""
@@ -83,11 +81,24 @@ class Responder:
             _between(float(row[L.Y]), fence.ymin_m, fence.ymax_m),
         )
 
-    def _steer(self, row: Array, x_m: float, y_m: float, near_m: float, rest_rad: float) -> tuple[float, float]:
+    def _steer(self, row: Array, x_m: float, y_m: float, near_m: float) -> tuple[float, float]:
         dx, dy = x_m - float(row[L.X]), y_m - float(row[L.Y])
         if math.hypot(dx, dy) <= near_m:
-            return 0.0, rest_rad
+            return _rest(row)
         return self._slow_mps, math.atan2(dx, dy) % TWO_PI
+
+
+def _heading(row: Array) -> float:
+    return math.radians(float(row[L.HEADING])) % TWO_PI
+
+
+def _rest(row: Array) -> tuple[float, float]:
+    """No speed, on the heading the boat has by now.
+
+    Turned away from an edge or a boat it lets it be. Sent back to the heading it had it would have to be turned away
+    again, for which it takes thrust, and never come to rest.
+    """
+    return 0.0, _heading(row)
 
 
 def _between(value: float, low: float, high: float) -> float:

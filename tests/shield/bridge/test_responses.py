@@ -2,12 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
 from bridge_fakes import fleet_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from steerclear.shield import Commands, Fleet, Shield, Surroundings
 from steerclear.shield.bridge.responses import STRENGTH, Responder, strongest
 from steerclear.shield.platforms import fresh_state, get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.step import step_boat
 
 FENCE = fleet_of().geofence
 
@@ -27,6 +31,35 @@ def test_hold_course_keeps_what_was_when_it_began():
 def test_slow_halves_and_stop_stops():
     assert responder().wanted("slow", fresh_state(0.0, 0.0, -90.0, 2.0)) == (1.0, pytest.approx(1.5 * math.pi))
     assert responder().wanted("stop", fresh_state(0.0, 0.0, 0.0, 2.0)) == (0.0, 0.0)
+
+
+def test_a_boat_told_to_stop_takes_the_heading_it_was_turned_to():
+    made = responder()
+    assert made.wanted("stop", fresh_state(0.0, 0.0, 90.0, 2.0)) == (0.0, pytest.approx(0.5 * math.pi))
+    assert made.wanted("stop", fresh_state(0.0, 0.0, 120.0, 2.0)) == (0.0, pytest.approx(math.radians(120.0)))
+
+
+@pytest.mark.parametrize("heading_deg", [-34.4, 0.0, 20.0, 75.0])
+def test_a_boat_told_to_stop_near_an_edge_comes_to_rest_inside(heading_deg):
+    """Sent back to the heading it had, towards the edge, it crept along it for minutes."""
+    heron, shield = get_platform("heron").pack(), Shield(surroundings=Surroundings(field=(-5, -5, 85, 45)))
+    state = fresh_state(45.0, 41.5, heading_deg, 1.7)
+    state[L.THRUST] = 80.0
+    made = responder()
+    for _ in range(400):
+        fleet = Fleet.of(
+            position_m=state[None, [L.X, L.Y]],
+            heading_rad=np.radians(state[[L.HEADING]]),
+            speed_mps=state[[L.SPEED]],
+            team=[0],
+            platforms="heron",
+            thrust=state[[L.THRUST]],
+        )
+        sent = shield.decide(fleet, Commands.absolute_rad([made.wanted("stop", state)])).sent.values[0]
+        error = (math.degrees(sent[1]) - state[L.HEADING] + 180.0) % 360.0 - 180.0
+        step_boat(heron, state, sent[0], error, 0.1)
+        assert state[L.Y] < 45.0
+    assert state[L.SPEED] < 0.1
 
 
 def test_hold_station_steers_back_when_far():
