@@ -38,6 +38,8 @@ def read_arrays(path: str | os.PathLike[str], what: str, remedy: str) -> dict[st
         TraceError: the file is missing, cut or no such file.
     """
     source = Path(path)
+    if source.is_dir():
+        raise TraceError(f"{source} is a folder; name a {what} in it (.npz)")
     if not source.is_file():
         raise TraceError(f"there is no {what} {source}; check the path, or record a game first")
     if not zipfile.is_zipfile(source):  # numpy would take it for a pickle and advise to trust it

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import pygame
 from steerclear.shield.exceptions import ConfigError
+
+UNSEEN = ("dummy", "offscreen")
+"""Drivers SDL falls back to where there is no display: windows open, and nobody sees them."""
 
 
 class Window:
@@ -20,6 +25,8 @@ class Window:
     def __init__(self, size_px: tuple[int, int], title: str) -> None:
         try:
             pygame.display.init()
+            if pygame.display.get_driver() in UNSEEN and "SDL_VIDEODRIVER" not in os.environ:
+                raise pygame.error("no display")
             self._screen = pygame.display.set_mode(size_px)
         except pygame.error as error:
             pygame.display.quit()

@@ -7,14 +7,14 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
-from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.exceptions import SteerclearError
+
+from .files import check_files
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 MAX_WIDTH = 100
@@ -52,7 +52,7 @@ def command(function: Command) -> Command:
     def guarded(*args: Any, **kwargs: Any) -> Any:
         logging.captureWarnings(True)
         try:
-            check_json_file(kwargs.get("json_file"))
+            check_files(function, kwargs)
             return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
@@ -62,22 +62,6 @@ def command(function: Command) -> Command:
             _leave("interrupted", ExitCode.INTERRUPTED)
 
     return guarded  # type: ignore[return-value]
-
-
-def check_json_file(path: Path | None) -> None:
-    """Find out before hours of work that the file of ``--json`` cannot be written.
-
-    Raises:
-        ConfigError: it is a folder, its name is none, or the nearest folder that exists takes no files.
-    """
-    if path is None:
-        return
-    try:
-        if path.is_dir():
-            raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
-        TemporaryFile(dir=next(folder for folder in path.absolute().parents if folder.exists())).close()
-    except OSError as error:
-        raise ConfigError(f"--json {path} cannot be written ({error.strerror}); name a file elsewhere") from error
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:

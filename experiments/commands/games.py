@@ -27,6 +27,9 @@ from .console import Interrupted, err, out, progress
 
 KEYBOARD = "keyboard"
 
+MOST_GAMES = 100_000
+"""Games of a pairing at most: all are listed before the first is played."""
+
 
 def check_settings(settings: AblationSettings) -> None:
     """Find every bad name or number before the first game is played.
@@ -34,8 +37,8 @@ def check_settings(settings: AblationSettings) -> None:
     Raises:
         SteerclearError: a policy, preset, platform, game or shield setting is unusable.
     """
-    if settings.games < 1:
-        raise ConfigError(f"--games must be at least 1; got {settings.games}")
+    if not 1 <= settings.games <= MOST_GAMES:
+        raise ConfigError(f"--games must be at least 1 and at most {MOST_GAMES:,}; got {settings.games:,}")
     check_penalty(settings.penalty)
     check_judge(settings.judge)
     check_shield(settings.shield)

@@ -74,6 +74,8 @@ def play(
 
     Exit status: 0 done, 2 bad input, 130 interrupted.
     """
+    if keyboard and own not in ("medium", "keyboard"):
+        raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {own}")
     own = "keyboard" if keyboard else own
     spec = MatchSpec(
         preset=preset,

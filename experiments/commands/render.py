@@ -40,9 +40,9 @@ def render(records: Records, to: To = None, at: At = None, speed: Speed = 4.0, j
     Exit status: 0 done, 2 bad input, 130 interrupted.
     """
     started = time.perf_counter()
-    to = to or records[0].with_suffix(".html")
-    check_endings([to])
+    check_endings([to] if to else [])
     games = [load(path) for path in records]
+    to = to or records[0].with_suffix(".html")
     if len(games) > 1 and to.suffix.lower() != ".html":
         raise ConfigError(f"only a replay (.html) takes several games; give one record for {to.suffix}")
     path = write_replay(games, to) if to.suffix.lower() == ".html" else save_record(games[0], to, at, speed)

@@ -17,6 +17,7 @@ from ..replay_html import write_replay
 from ..store import write_json
 from . import options as o
 from .console import command, finish, out
+from .files import check_ending
 
 Log = Annotated[Path, typer.Argument(help="Black-box log (.mcap) that deploy wrote.")]
 WithoutShield = Annotated[
@@ -45,6 +46,9 @@ def replay(
     Exit status: 0 the same, 1 a decision differs, 2 bad input, 130 interrupted.
     """
     started = time.perf_counter()
+    check_ending(html, "--html", (".html", ".htm"))
+    check_ending(record, "--record", (".npz",))
+    check_ending(mended, "--mend", (".mcap",))
     with LogReader(log) as reader:
         found = replay_log(reader, keep_tracks=without_shield or html is not None or record is not None)
     draw(found)

@@ -21,6 +21,9 @@ from .summary import summarise
 from .tally import Columns
 
 Pair = tuple[str, str]
+MOST_ENCOUNTERS = 1_000_000
+"""Encounters of a family, platform and guard at most: all are listed before the first is played."""
+
 COLUMNS_VERSION = 3
 """Goes up when columns change, so that results kept by an earlier version are played anew."""
 
@@ -51,8 +54,8 @@ class Settings:
     judge: bool = True
 
     def __post_init__(self) -> None:
-        if self.n < 1:
-            raise ConfigError(f"--n must be at least 1; got {self.n}")
+        if not 1 <= self.n <= MOST_ENCOUNTERS:
+            raise ConfigError(f"--n must be at least 1 and at most {MOST_ENCOUNTERS:,}; got {self.n:,}")
         check_seed(self.seed)
         for name in self.families:
             get_family(name)

@@ -251,6 +251,16 @@ def test_no_display_is_one_clear_error(monkeypatch, game):
         Renderer(game.config, "human", WIDTH_PX).draw(game.view())
 
 
+def test_a_window_nobody_would_see_is_no_window(monkeypatch, game):
+    """Without a display SDL opens windows that are nowhere, and a game by keyboard would wait for keys for ever."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    with pytest.raises(ConfigError, match="no display"):
+        Renderer(game.config, "human", WIDTH_PX).draw(game.view())
+    assert not pygame.display.get_init()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
