@@ -17,6 +17,7 @@ from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
+from .same_games import check_same_games
 from .scene import Scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .shared import share
@@ -104,8 +105,9 @@ class BatchedShield:
         if len(platforms) != len(team) or not platforms:
             raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
         self.config, self.flag_of = config, flag_of
+        self.platforms, self.team = tuple(platforms), tuple(int(one) for one in team)
         n = len(platforms)
-        boats = boats_of(config, tuple(platforms), tuple(int(t) for t in team))
+        boats = boats_of(config, self.platforms, self.team)
         self._memory = new_memory(games, n)
         self._scene = share(
             Scene(
@@ -182,14 +184,29 @@ class BatchedShield:
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
 
         Raises:
-            ConfigError: the shield was built for the other team's flag.
+            ConfigError: the shield was built for the other team's flag. When it is called: the shield was built for
+                other games.
         """
         if self.flag_of not in (None, team):
             raise ConfigError(f"this shield keeps off the flag of team {self.flag_of}; build another for team {team}")
 
+        checked: Any = None
+
         def command_filter(core: Any, commands: Array) -> Array:
+            nonlocal checked
+            if checked is not core:
+                self.check_games(core)
+                checked = core
             ours = np.broadcast_to(core.team == team, core.driven.shape)
             ours = ours.copy() if shield_autopilot else ours & ~core.driven
             return self.decide(core.state, commands, ours)
 
         return command_filter
+
+    def check_games(self, core: Any) -> None:
+        """Check that games are those the shield was built for: boats, teams, number and step.
+
+        Raises:
+            ConfigError: they are not.
+        """
+        check_same_games(core, len(self.reason), self.platforms, self.team, self.config.dt_s)

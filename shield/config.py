@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
+from numbers import Integral, Real
 from typing import Any
 
 from .exceptions import ConfigError
@@ -89,7 +90,7 @@ class ShieldConfig:
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)
-            if isinstance(value, int):  # compiled code knows numbers by their kind: it would be compiled anew
+            if isinstance(value, Real):  # compiled code knows numbers by their kind: it would be compiled anew
                 object.__setattr__(self, entry.name, float(value))
         if not 0.0 <= self.opponent_share <= 1.0:
             raise ConfigError(f"opponent_share is {self.opponent_share}; give a share between 0 and 1")
@@ -140,16 +141,17 @@ def _check_number(name: str, value: object) -> None:
         return
     if value is None and name in _MAY_BE_NONE:
         return
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
+    if isinstance(value, bool) or not isinstance(value, Real) or value != value:
         raise ConfigError(f"{name} is {value!r}; give a number")
-    if isinstance(value, int) and abs(value) > 1e300:  # no float holds it
+    if isinstance(value, Integral) and abs(int(value)) > 1e300:  # no float holds it
         raise ConfigError(f"{name} is too large; give a finite number")
-    if math.isinf(value) and name not in _MAY_BE_INFINITE:
+    number = float(value)
+    if math.isinf(number) and name not in _MAY_BE_INFINITE:
         raise ConfigError(f"{name} is {value}; give a finite number")
-    if value < 0 or (value == 0 and name in _POSITIVE):
+    if number < 0 or (number == 0 and name in _POSITIVE):
         bound = "> 0" if name in _POSITIVE else ">= 0"
         raise ConfigError(f"{name} is {value}; it must be {bound}")
     low, high = _RANGES.get(name, (0.0, math.inf))
-    if not low <= value <= high:
+    if not low <= number <= high:
         first = "more than 0 and at most" if name in _POSITIVE and low == 0.0 else f"{low:g} to"
         raise ConfigError(f"{name} is {value}; give {first} {high:g} {name.rsplit('_')[-1]}")

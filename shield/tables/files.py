@@ -120,7 +120,11 @@ def read_table(path: Path) -> ValueTable:
     """
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            if not {"card", "steps"} <= set(file.files):
+                raise TableError(f"{path} is no value table; give one that steerclear reach solve has made")
             text, steps = str(file["card"]), file["steps"]
+    except TableError:
+        raise
     except FileNotFoundError as error:
         raise TableError(f"there is no table file {path}") from error
     except Exception as error:  # zip, zlib and numpy each have several ways to say that bytes make no sense

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..batch import BatchedShield
 from ..config import ShieldConfig
+from ..same_games import platforms_of
 from .mctf import surroundings_of
 from .reading import team_number
 
@@ -26,7 +27,5 @@ def games_shield(
     """
     number = team_number(team)
     settings = ShieldConfig(dt_s=core.config.dt_s) if config is None else config
-    kinds = core.config.platforms
-    platforms = tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * core.n_boats
     around = surroundings_of(core, number, keep_out)
-    return BatchedShield(settings, core.n_games, platforms, tuple(core.team.tolist()), around, number)
+    return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number)

@@ -13,7 +13,7 @@ from ..decision import Decisions
 from ..exceptions import FleetError
 from ..jit import Array
 from ..shield import Shield
-from .reading import GameReader, reader_of, team_number
+from .reading import GameReader, one_game_shield, reader_of, team_number
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
@@ -32,7 +32,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         reader: what reads the game, such as sensors that err; None: the env's own state, exact.
 
     Raises:
-        ConfigError: the env cannot be read, or the team is unknown.
+        ConfigError: the env cannot be read, the shield is none, or the team is unknown.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         reader: GameReader | None = None,
     ) -> None:
         super().__init__(env)
-        self.shield = shield
+        self.shield = one_game_shield(shield)
         self.team = team_number(team)
         self.shield_autopilot = shield_autopilot
         self.keep_out = keep_out

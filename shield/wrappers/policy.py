@@ -13,7 +13,7 @@ from ..decision import Decisions
 from ..exceptions import ConfigError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
-from .reading import GameReader, reader_of
+from .reading import GameReader, one_game_shield, reader_of
 
 logger = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class ShieldedTeamPolicy:
 
     def __init__(self, policy: Any, shield: Shield, keep_out: bool = True) -> None:
         self.policy = policy
-        self.shield = shield
+        self.shield: Shield = one_game_shield(shield)
         self.keep_out = keep_out
         self.name = f"shielded {getattr(policy, 'name', type(policy).__name__)}"
         self.decisions: Decisions | None = None
@@ -101,24 +101,46 @@ class ShieldedCallable:
         policy: ``policy(seen) -> Commands`` for all boats of the fleet.
         shield: the shield.
         read: ``read(seen) -> Fleet``.
+
+    Raises:
+        ConfigError: the shield or ``read`` is none.
     """
 
     def __init__(self, policy: Callable[[Any], Commands], shield: Shield, read: Callable[[Any], Fleet]) -> None:
+        if not callable(read):
+            raise ConfigError(f"read is {read!r}; give a function that turns what the policy sees into a Fleet")
         self.policy = policy
-        self.shield = shield
+        self.shield: Shield = one_game_shield(shield)
         self.read = read
         self.decisions: Decisions | None = None
+        self._relative = True
+        self._failure = ""
 
     def __call__(self, seen: Any) -> Commands:
-        """Safe commands. A policy that raises or answers something else holds all boats; the reason says so."""
+        """Safe commands, in the frame of the policy's last usable answer.
+
+        A policy that raises or answers something else holds all boats; the reason says so, and the log once for each
+        thing that is wrong. Before the first usable answer the frame is that of `Commands.relative_deg`.
+        """
         fleet = self.read(seen)
         try:
             wanted = _usable(self.policy(seen), len(fleet))
+            self._note("")
+            self._relative = wanted.relative
         except Exception as error:  # whatever a policy does, its boats must get commands
-            logger.error("policy failed (%s: %s); all boats hold", type(error).__name__, error)
-            wanted = Commands.relative_deg(np.full((len(fleet), 2), np.nan))
+            self._note(f"{type(error).__name__}: {error}")
+            nothing = np.full((len(fleet), 2), np.nan)
+            wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
         self.decisions = self.shield.decide(fleet, wanted)
         return self.decisions.sent
+
+    def _note(self, failure: str) -> None:
+        """Log a failure when it begins, or becomes another one, and when it is over."""
+        if failure and failure != self._failure:
+            logger.error("policy failed (%s); all boats hold", failure)
+        if self._failure and not failure:
+            logger.warning("policy answers again")
+        self._failure = failure
 
 
 def _usable(answer: Any, boats: int) -> Commands:

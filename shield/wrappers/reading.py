@@ -55,6 +55,18 @@ def team_number(team: str | int) -> int:
     return SIDES[str(team)]
 
 
+def one_game_shield(shield: Any) -> Any:
+    """The shield itself, if it is one for a single game.
+
+    Raises:
+        ConfigError: it decides for no fleet, such as the shield of a batch of games.
+    """
+    if isinstance(shield, type) or not callable(getattr(shield, "decide", None)) or hasattr(shield, "filter_for"):
+        found = shield.__name__ if isinstance(shield, type) else type(shield).__name__
+        raise ConfigError(f"{found} is no shield of one game; give steerclear.shield.Shield()")
+    return shield
+
+
 def reader_of(env: Any) -> GameReader:
     """The reader for an environment: ours, or a real Pyquaticus one.
 

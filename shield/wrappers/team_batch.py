@@ -45,7 +45,7 @@ class TeamBatch:
         seed: seed of games and opponent.
 
     Raises:
-        ConfigError: unknown team or kind of actions.
+        ConfigError: unknown team or kind of actions, or a shield that is none of these games.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class TeamBatch:
         self.boats = np.flatnonzero(core.team == self.team)
         self.others = np.flatnonzero(core.team != self.team)
         self.learners = core.n_games * len(self.boats)
-        self._filter = None if shield is None else shield.filter_for(self.team)
+        self._filter = None if shield is None else _filter_of(shield, core, self.team)
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
 
@@ -133,3 +133,15 @@ class TeamBatch:
 
     def _spread(self, games: BoolArray) -> BoolArray:
         return np.repeat(games, len(self.boats))
+
+
+def _filter_of(shield: Any, core: Any, team: int) -> Any:
+    """The command filter of a shield of these games.
+
+    Raises:
+        ConfigError: it is no shield of a batch, or one of other games.
+    """
+    if not isinstance(shield, BatchedShield):
+        raise ConfigError(f"{type(shield).__name__} is no shield of a batch of games; give games_shield(core)")
+    shield.check_games(core)
+    return shield.filter_for(team)

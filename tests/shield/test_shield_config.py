@@ -3,6 +3,7 @@
 import math
 from dataclasses import FrozenInstanceError, fields
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -198,3 +199,10 @@ def test_whole_numbers_are_kept_as_floats_for_compiled_code():
 def test_what_nothing_can_be_decided_for_is_refused(name, value):
     with pytest.raises(ConfigError, match=rf"{name} is .*; give .* [0-9]+ (s|m)$"):
         ShieldConfig(**{name: value})
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, int])
+def test_numbers_of_numpy_are_numbers(kind):
+    config = ShieldConfig(separation_m=kind(3))
+    assert config == ShieldConfig(separation_m=3.0)
+    assert type(config.separation_m) is float

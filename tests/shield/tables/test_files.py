@@ -100,7 +100,7 @@ def test_altered_values_are_refused(tmp_path):
     with pytest.raises(TableError, match="values do not fit its grid"):
         read_table(rewritten(tmp_path / "shape.npz", steps=np.zeros((2, 2), np.uint8)))
     np.savez(tmp_path / "no_card.npz", steps=np.zeros(3))
-    with pytest.raises(TableError, match="is damaged"):
+    with pytest.raises(TableError, match="is no value table"):
         read_table(tmp_path / "no_card.npz")
 
 
@@ -185,3 +185,10 @@ def test_stacked_tables_keep_their_places():
     tables = stack_tables([random_table(1), TABLE, random_table(2, n_rho=4)])
     assert tables.offset.tolist() == [0, TABLE.values.size, 2 * TABLE.values.size]
     assert tables.data.size == int(tables.offset[2] + random_table(2, n_rho=4).values.size)
+
+
+def test_arrays_of_something_else_are_no_table(tmp_path):
+    """Such as the record of a game, which is an ``.npz`` file too."""
+    np.savez(tmp_path / "game.npz", position=np.zeros((2, 2)))
+    with pytest.raises(TableError, match=r"game\.npz is no value table; give one that steerclear reach solve has made"):
+        read_table(tmp_path / "game.npz")

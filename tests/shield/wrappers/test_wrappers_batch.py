@@ -7,7 +7,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield import Reason, wrappers
+from steerclear.shield import Reason, Shield, wrappers
 from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch, games_shield
 from steerclear.shield.wrappers.reading import DISCRETE
@@ -82,6 +82,29 @@ def test_a_shield_for_games_takes_their_step_and_can_leave_the_flag_out():
         games_shield(core, team="green")
     with pytest.raises(ConfigError, match="build another for team 1"):
         with_flag.filter_for(1)
+
+
+@pytest.mark.parametrize(
+    ("games", "words"),
+    [
+        (BatchedMctf("mctf2025", n_games=GAMES), "boats surveyor, .*the games have heron"),
+        (BatchedMctf("aamas2024", n_games=2), "number of games 2, the games have 4"),
+        (BatchedMctf(GameConfig.preset("aamas2024", dt_s=0.2), n_games=GAMES), "step, s, 0.2, the games have 0.1"),
+    ],
+)
+def test_the_shield_of_other_games_is_refused(games, words):
+    """It would foresee other boats than are there, and keep nobody apart."""
+    core, shield = BatchedMctf("aamas2024", n_games=GAMES), games_shield(games)
+    with pytest.raises(ConfigError, match=words):
+        TeamBatch(core, shield=shield)
+    with pytest.raises(ConfigError, match="build the shield of these games with games_shield"):
+        core.step(np.zeros((GAMES, core.n_boats, 2)), shield.filter_for(0))
+
+
+@pytest.mark.parametrize("shield", [Shield(), 5, games_shield])
+def test_what_is_no_shield_of_games_is_refused(shield):
+    with pytest.raises(ConfigError, match=r"is no shield of a batch of games; give games_shield\(core\)"):
+        TeamBatch(BatchedMctf("aamas2024", n_games=GAMES), shield=shield)
 
 
 @pytest.mark.parametrize("team", ["blue", "red"])

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Reason, Shield
 from steerclear.shield.exceptions import ConfigError, PolicyError
-from steerclear.shield.wrappers import ShieldedCallable, ShieldedParallelEnv, ShieldedTeamPolicy
+from steerclear.shield.wrappers import ShieldedCallable, ShieldedParallelEnv, ShieldedTeamPolicy, games_shield
 
 OWN = ["agent_0", "agent_1", "agent_2"]
 
@@ -93,6 +94,15 @@ def test_misuse_is_refused():
         Shield().wrap(lambda seen: None)
     with pytest.raises(ConfigError, match="cannot wrap str"):
         Shield().wrap("medium")
+    with pytest.raises(ConfigError, match="read is 5; give a function"):
+        Shield().wrap(lambda seen: None, read=5)
+    for shield in (5, Shield, None, games_shield(BatchedMctf("aamas2024", n_games=1))):
+        with pytest.raises(ConfigError, match="is no shield of one game; give"):
+            ShieldedTeamPolicy(straight(), shield)
+        with pytest.raises(ConfigError, match="is no shield of one game; give"):
+            ShieldedCallable(straight, shield, near)
+        with pytest.raises(ConfigError, match="is no shield of one game; give"):
+            ShieldedParallelEnv(env, shield)
 
 
 def near(gap_m):
@@ -124,3 +134,17 @@ def test_a_function_that_fails_holds_the_boats(answer, caplog):
     assert sent.values[0, 0] == 0.0
     assert caplog.messages
     assert ("broken" in caplog.text) == (answer is ValueError)
+
+
+def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
+    """Absolute headings sent on as they are: a relative one among them would turn the boats."""
+    answers = [None, Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]]), None, None, "no", None, None]
+    answers[4:4] = [Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]])]
+    told, team = iter(answers), Shield().wrap(lambda gap_m: next(told), read=near)
+    sent = [team(60.0) for _ in answers]
+    assert [one.relative for one in sent] == [True] + [False] * 7
+    np.testing.assert_allclose(sent[2].values[0], [0.0, 0.0], atol=1e-12)
+    assert team.decisions[0].reason == Reason.HELD
+    failed = [record.message for record in caplog.records if "failed" in record.message]
+    assert len(failed) == 4, "once when it begins, and when it becomes another"
+    assert sum("answers again" in record.message for record in caplog.records) == 2
