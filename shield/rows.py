@@ -75,8 +75,10 @@ def _add_effect(
     """Add boat i's share to row r; ``gain`` holds d(psi)/d(z_t) in rad and d(v)/d(z_s) in m/s."""
     k = min(int(at), path.shape[0] - 2)
     part = min(1.0, at - k)
-    x = path[k, 0] + part * (path[k + 1, 0] - path[k, 0])
-    y = path[k, 1] + part * (path[k + 1, 1] - path[k, 1])
+    x, y = path[k, 0], path[k, 1]
+    if part > 0.0:  # at the end of a path nothing of it lies beyond
+        x += part * (path[k + 1, 0] - x)
+        y += part * (path[k + 1, 1] - y)
     rx, ry = x - work.next_state[i, L.X], y - work.next_state[i, L.Y]
     C[r, first] += sign * (nx * ry - ny * rx) * gain[i, 0]
     speed = max(work.next_state[i, L.SPEED], SLOW_MPS)
