@@ -12,7 +12,16 @@ from .certificates.clearance import MARGIN
 from .certificates.fixed_things import clear_of_near_obstacles
 from .certificates.laying import lay_path
 from .certificates.manoeuvre import clear_of_boat, told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, STRAIGHT_SAFE, only_fixed, worst_merit, worst_off
+from .certificates.rating import (
+    FIXED_LOST,
+    FIXED_THING,
+    PAIR_SAFE,
+    STRAIGHT_SAFE,
+    only_fixed,
+    rate_path,
+    worst_merit,
+    worst_off,
+)
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
@@ -110,12 +119,36 @@ def _in_the_way(
 
 
 @lean_kernel
+def _would_do(
+    i: int, slot: int, state: Array, ours: BoolArray, boats: Boats, fixed: Fixed, tuning: Tuning, work: Work
+) -> bool:
+    """Whether boat i on the path in ``slot`` would keep clear of everything but, maybe, of team-mates."""
+    for j in range(ours.shape[0]):
+        if ours[j]:
+            work.near[i, j] = False
+    merit = rate_path(i, slot, -1e9, state, ours, boats, fixed, tuning, work)
+    for j in range(ours.shape[0]):
+        if ours[j]:
+            work.near[i, j] = work.near[j, i]
+    return merit >= PAIR_SAFE
+
+
+@lean_kernel
 def _make_room(
-    state: Array, ours: BoolArray, boats: Boats, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> int:
     """Make movers of the boats that passed and lie in the way of an escape that a mover has held until now.
 
-    The mover may since have been given another, which others keep it from: then nobody tells of this one any more.
+    The mover may since have been given another, which others keep it from: then nobody tells of this one any more. Only
+    of one that would do but for team-mates, or they would make room for nothing.
     """
     trial = state.shape[0]
     for m in range(list_movers(plan)):
@@ -125,6 +158,8 @@ def _make_room(
             continue
         side, togo, speed = candidate(i, 0, 0.0, heading, boats, plans, memory)
         lay_path(i, trial, side, togo, speed, 0, state, boats, tuning, work)
+        if not _would_do(i, trial, state, ours, boats, fixed, tuning, work):
+            continue
         for j in range(ours.shape[0]):
             if not plan.moving[j] and _in_the_way(i, j, trial, state, ours, boats, tuning, work):
                 plan.moving[j] = True
@@ -144,7 +179,10 @@ def _assign_escapes(
     work: Work,
     plan: Plan,
 ) -> bool:
-    """Escapes of the movers from the present state; whether all boats of ours then keep clear."""
+    """Escapes of the movers from the present state; whether all boats of ours then keep clear.
+
+    Opponents are left where boats with tables look them up on such escapes.
+    """
     look = 1
     for m in range(count):
         i = plan.movers[m]
@@ -154,9 +192,7 @@ def _assign_escapes(
         work.fixed_target_m[i] = 0.0
         look = max(look, boats.look[i])
     run_opponents(look, ours, state, boats, tuning, work, work.ways)
-    good = assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
-    run_opponents(1, ours, state, boats, tuning, work, work.ways)
-    return good
+    return assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
 
 
 @lean_kernel
@@ -203,10 +239,11 @@ def ladder(
         movers = count
         if not good:
             _join(ours, work, plan)
-            movers = _make_room(state, ours, boats, plans, tuning, memory, work, plan)
+            movers = _make_room(state, ours, boats, fixed, plans, tuning, memory, work, plan)
         if movers == count:
             break
         count = movers
+    run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for m in range(count):
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
