@@ -34,12 +34,14 @@ def plot_contests(contests: Sequence[Contest], path: Path) -> Path:
     across = min(len(contests), 3)
     down = math.ceil(len(contests) / across)
     looks = looks_of(list(dict.fromkeys(guard for contest in contests for guard in contest.cells)))
-    tall_in = max(PANEL_IN[1], 1.0 + FAMILY_IN * max(len(c.families) if _alone(c) else 0 for c in contests))
+    most_families = max(len(contest.families) if _alone(contest) else 0 for contest in contests)
+    tall_in = max(PANEL_IN[1], 1.0 + FAMILY_IN * most_families)
     canvas = Figure(figsize=(PANEL_IN[0] * across, tall_in * down), layout="constrained", dpi=150)
     axes = canvas.subplots(down, across, squeeze=False).ravel()
     for axis, contest in zip(axes, contests, strict=False):
         (_draw_families if _alone(contest) else _draw_guards)(axis, contest, looks)
         _dress(axis, contest.title)
+    _alike([axis for axis, contest in zip(axes, contests, strict=False) if _alone(contest)], most_families)
     for axis in axes[len(contests) :]:
         axis.set_visible(False)
     _legend(canvas, axes[: len(contests)])
@@ -89,10 +91,17 @@ def _draw_families(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, s
     ]
     _draw_shares(axis, outside, 0.15, fmt="x", color=OUTSIDE, label=f"{guard}, started outside the unavoidable set")
     axis.set_yticks(range(len(contest.families)), contest.families)
-    axis.set_ylim(len(contest.families) - 0.5, -0.5)
     axis.set_xscale("symlog", linthresh=LINEAR_PERCENT)
     axis.set_xlim(left=-0.02)
     axis.set_xlabel("encounters breached, %", fontsize=8)
+
+
+def _alike(axes: Sequence[Any], families: int) -> None:
+    """Give panels of families one scale: as much room for each family, however few, and the same shares."""
+    most = max((axis.get_xlim()[1] for axis in axes), default=1.0)
+    for axis in axes:
+        axis.set_ylim(families - 0.5, -0.5)
+        axis.set_xlim(right=most)
 
 
 def _draw_shares(axis: Any, counts: Sequence[tuple[int | None, int | None]], shift: float, **looks: Any) -> None:

@@ -169,6 +169,20 @@ def test_the_plot_of_one_guard_has_a_line_for_every_family(tmp_path, monkeypatch
     assert list(outside.lines[0].get_xdata()) == [10.0]
 
 
+def test_panels_of_one_guard_have_one_scale(tmp_path, monkeypatch):
+    """Two families take two lines of room beside a panel of more, and shares are drawn alike."""
+    from matplotlib.figure import Figure
+
+    saved = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, path: saved.append(self))
+    few = one_contest(content(cell("shield", "head_on", breached=50), cell("shield", "rammer_1")))
+    many = one_contest(content(*(cell("shield", family) for family in ("head_on", "rammer_1", "at_rest", "crowd_6"))))
+    plot_contests([few, many], tmp_path / "plot.png")
+    assert [axis.get_ylim() for axis in saved[0].axes] == [(3.5, -0.5)] * 2
+    assert saved[0].axes[0].get_xlim() == saved[0].axes[1].get_xlim()
+    assert saved[0].axes[0].get_xlim()[1] > 50.0
+
+
 def test_bad_results_are_refused(tmp_path):
     broken = cell("a", "head_on")
     del broken["avoidable"]
