@@ -22,6 +22,7 @@ from .certificates.rating import (
     worst_merit,
     worst_off,
 )
+from .certificates.surroundings import beyond_field
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, copy_row, lean_kernel
@@ -45,6 +46,13 @@ A wanted turn sent whenever it looks a little better keeps a hunted boat from ev
 
 WORSE_BY_FIXED = 1e-6
 """The same where only fixed things are at stake: rounding, since what is given away is so in every step."""
+
+STRAYED_M = 0.5
+"""A boat beyond the field by more carries out its escape whatever is wanted.
+
+One step of a turn back outwards costs nothing that a margin tells of; taken every other step it costs the boat its
+thrust, and herons came back at a sixth of their speed.
+"""
 
 
 @lean_kernel
@@ -130,7 +138,7 @@ def _would_do(
     for j in range(ours.shape[0]):
         if ours[j]:
             work.near[i, j] = work.near[j, i]
-    return merit >= PAIR_SAFE
+    return merit >= PAIR_SAFE or (merit >= FIXED_LOST and merit > work.merit[i] + CLEARLY)
 
 
 @lean_kernel
@@ -184,9 +192,10 @@ def _assign_escapes(
     Opponents are left where boats with tables look them up on such escapes.
     """
     look = 1
+    for i in range(ours.shape[0]):
+        work.target[i] = 0.0
     for m in range(count):
         i = plan.movers[m]
-        work.target[i] = 0.0
         work.threat_target_m[i, :] = 0.0
         work.joint_target_m[i] = 0.0
         work.fixed_target_m[i] = 0.0
@@ -202,6 +211,27 @@ def _clearly(before: float, ours: BoolArray, boats: Boats, work: Work) -> float:
     if i >= 0 and boats.look[i] > 0 and work.merit[i] >= STRAIGHT_SAFE and before < FIXED_LOST:
         return CLEARLY_BY_TABLES
     return CLEARLY
+
+
+@lean_kernel
+def _strayed(count: int, state: Array, fixed: Fixed, plan: Plan) -> bool:
+    """Whether some mover is well beyond the field."""
+    for m in range(count):
+        i = plan.movers[m]
+        if beyond_field(state[i, L.X], state[i, L.Y], fixed.field) > STRAYED_M:
+            return True
+    return False
+
+
+@lean_kernel
+def _better_than_escapes(
+    before: float, count: int, state: Array, ours: BoolArray, boats: Boats, fixed: Fixed, work: Work, plan: Plan
+) -> bool:
+    """Whether the program's answer, of the worst merit ``before``, is to be kept rather than the escapes held now."""
+    after = worst_merit(ours, work)
+    if before > after + _clearly(before, ours, boats, work):
+        return True
+    return before >= FIXED_LOST and before >= after - WORSE_BY_FIXED and not _strayed(count, state, fixed, plan)
 
 
 @lean_kernel
@@ -247,9 +277,7 @@ def ladder(
     for m in range(count):
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-    after = worst_merit(ours, work)
-    clearly = _clearly(before, ours, boats, work)
-    if not good and (before > after + clearly or (before >= FIXED_LOST and before >= after - WORSE_BY_FIXED)):
+    if not good and _better_than_escapes(before, count, state, ours, boats, fixed, work, plan):
         for m in range(count):
             i = plan.movers[m]
             copy_row(plan.commands[i], plan.answer[i])
@@ -261,5 +289,5 @@ def ladder(
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
         plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
-    if good and eases and after >= PAIR_SAFE:
+    if good and eases and worst_merit(ours, work) >= PAIR_SAFE:
         ease(count, state, ours, boats, fixed, tuning, memory, work, plan)

@@ -15,14 +15,14 @@ import math
 from ..jit import Array, lean_kernel
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 
-RETURN_S = 30.0
+RETURN_S = 10.0
 """How long a boat outside the field is followed straight on from the end of its path, s."""
 
-HOME_M = 10.0
+HOME_M = 1.0
 """A path that leads so far inside by then leads back, m."""
 
-FARTHEST_M = 1000.0
-"""Falling short of that by more is no worse, m."""
+FARTHEST_M = 100.0
+"""Boats farther outside are looked at as if they were that far, m: what tells their paths apart is the same."""
 
 RETURN_WORTH = 0.01
 """What a metre of a path outside the field counts beside a metre that the boat is outside now."""
@@ -39,6 +39,15 @@ def _inside(side: int, x: float, y: float, field: Array) -> float:
     """How far inside one side of a rectangle (left, low, right, high) a point is, m; infinite where there is none."""
     at = x if side % 2 == 0 else y
     return at - field[side] if side < 2 else field[side] - at
+
+
+@lean_kernel
+def beyond_field(x: float, y: float, field: Array) -> float:
+    """How far beyond the field a point is, m, by the side that it is furthest beyond; negative inside."""
+    least = FAR
+    for side in range(4):
+        least = min(least, _inside(side, x, y, field))
+    return -least
 
 
 @lean_kernel
@@ -69,9 +78,10 @@ def _way_back(side: int, here: Array, path: Array, last: int, sample_s: float, f
     now_m, least_m = _inside(side, here[0], here[1], field), FAR
     for k in range(last + 1):
         least_m = min(least_m, _inside(side, path[k, 0], path[k, 1], field))
-    short_m = min(FARTHEST_M, max(0.0, HOME_M - end_m))
+    farther_m = max(0.0, -now_m - FARTHEST_M)
+    short_m = max(0.0, HOME_M - end_m - farther_m)
     nx, ny = _inwards(side)
-    _lower(out, now_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m)), last, nx, ny)
+    _lower(out, now_m + farther_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m)), last, nx, ny)
 
 
 @lean_kernel

@@ -114,3 +114,23 @@ def test_what_was_kept_from_other_things_is_not_asked_of_new_ones():
     assert not shield.decide(fleet, wanted, Surroundings(**near)).intervened[0]
     kept = Shield(ShieldConfig(), Surroundings(**near))
     assert not kept.decide(fleet, wanted).intervened[0]
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_a_boat_beyond_the_field_comes_back_at_speed_whatever_is_wanted(platform):
+    """Turned back outwards in every other step it would come back, too, but in two minutes."""
+    beyond_m = 30.0
+    start = begin(platform, (40.0, 120.0), (FIELD[3] + beyond_m, FIELD[3] + beyond_m + 0.1))
+    position, _, _ = press(platform, start, lambda boats: np.zeros(GAMES), Surroundings(field=FIELD))
+    inside_s = np.argmax(position[..., 1] <= FIELD[3], axis=0) * 0.1
+    top = get_platform(platform).max_speed_mps
+    assert (position[..., 1].min(axis=0) <= FIELD[3]).all()
+    assert inside_s.max() < beyond_m / top + 25.0
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("beyond_m", [150.0, 600.0, 5000.0])
+def test_a_boat_far_beyond_the_field_heads_home(platform, beyond_m):
+    start = begin(platform, (40.0, 120.0), (FIELD[3] + beyond_m, FIELD[3] + beyond_m + 0.1))
+    position, _, _ = press(platform, start, lambda boats: np.zeros(GAMES), Surroundings(field=FIELD))
+    assert (position[0, :, 1] - position[-1, :, 1]).min() > 50.0
