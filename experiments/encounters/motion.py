@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from steerclear.env.randomness import next_uniform
 from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
@@ -19,13 +19,8 @@ NOISE_MEMORY_S = 2.0
 
 @kernel
 def uniform(seeds: Array, b: int) -> float:
-    """Next number of game b's own stream in (0, 1): SplitMix64."""
-    seeds[b] += np.uint64(0x9E3779B97F4A7C15)
-    z = seeds[b]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return (float(z >> np.uint64(11)) + 0.5) / 9007199254740992.0
+    """Next number of game b's own stream in (0, 1): never 0, whose logarithm is asked for."""
+    return next_uniform(seeds, b) + 0.5 / 9007199254740992.0
 
 
 @kernel

@@ -9,15 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from steerclear.env.randomness import GAMMA, MIX_1, mix
 from steerclear.shield.jit import lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .layout import HEIGHT, WIDTH, Game
-
-_GAMMA = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-_TO_UNIT = 1.0 / 9007199254740992.0  # 2**-53
 
 
 @lean_kernel
@@ -71,21 +67,6 @@ def wrap_deg(angle: float) -> float:
 
 
 @lean_kernel
-def mix(word: np.uint64) -> np.uint64:
-    """SplitMix64's output function: every bit of the result depends on every bit of ``word``."""
-    word = (word ^ (word >> np.uint64(30))) * _MIX_1
-    word = (word ^ (word >> np.uint64(27))) * _MIX_2
-    return word ^ (word >> np.uint64(31))
-
-
-@lean_kernel
-def draw(streams: np.ndarray, slot: int) -> float:
-    """Next number in [0, 1) of the slot's own stream, which advances in place."""
-    streams[slot] += _GAMMA
-    return float(mix(streams[slot]) >> np.uint64(11)) * _TO_UNIT
-
-
-@lean_kernel
 def seed_streams(seeds: np.ndarray, boats: np.ndarray, chosen: np.ndarray, streams: np.ndarray) -> None:
     """Start one independent stream per boat in the chosen games, in place.
 
@@ -98,4 +79,4 @@ def seed_streams(seeds: np.ndarray, boats: np.ndarray, chosen: np.ndarray, strea
     for g in range(seeds.size):
         for slot in range(boats.size):
             if chosen[g]:
-                streams[g, slot] = mix(mix(seeds[g] + _GAMMA) ^ (np.uint64(boats[slot] + 1) * _MIX_1))
+                streams[g, slot] = mix(mix(seeds[g] + GAMMA) ^ (np.uint64(boats[slot] + 1) * MIX_1))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from steerclear.env.randomness import next_uniform
 from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
-from .geometry import bearing_deg, draw, own_end_point, to_boat, wrap_deg
+from .geometry import bearing_deg, own_end_point, to_boat, wrap_deg
 from .layout import (
     GOAL,
     GOAL_X,
@@ -96,8 +97,8 @@ def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple
     clear_m = game.field[KEEPOUT] + game.limits[boat, RADIUS] + WAYPOINT_REACHED_M
     x = y = 0.0
     for _ in range(20):
-        x = spread(draw(streams, slot), game.field[WIDTH])
-        y = spread(draw(streams, slot), game.field[HEIGHT])
+        x = spread(next_uniform(streams, slot), game.field[WIDTH])
+        y = spread(next_uniform(streams, slot), game.field[HEIGHT])
         if math.hypot(x - home[0], y - home[1]) > clear_m:
             break
     return x, y
@@ -125,8 +126,8 @@ def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot:
 @lean_kernel
 def draw_course(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> None:
     """Put a new held course into the memory row."""
-    hold_s = HOLD_MIN_S + (HOLD_MAX_S - HOLD_MIN_S) * draw(streams, slot)
-    action = min(int(17.0 * draw(streams, slot)), 16)
+    hold_s = HOLD_MIN_S + (HOLD_MAX_S - HOLD_MIN_S) * next_uniform(streams, slot)
+    action = min(int(17.0 * next_uniform(streams, slot)), 16)
     speed = 0.0 if action == 16 else game.limits[boat, MAX_SPEED] * (1.0 if action < 8 else 0.5)
     heading = game.state[boat, L.HEADING] + (0.0 if action == 16 else 180.0 - 45.0 * (action % 8))
     ahead_m = WALL_MARGIN_M + game.limits[boat, MAX_SPEED] * hold_s
