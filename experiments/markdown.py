@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .tables import number_text
+from .tables import measured_text, number_text
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 
@@ -20,7 +20,7 @@ def bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:
     """Lines of the table of bars: what was measured, what is asked, whether it is met."""
     verdict = {True: "met", False: "**not met**", None: "no data"}
     rows = [
-        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
+        [bar["name"], measured_text(bar), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
         for bar in bars
     ]
     return table(["", "measured", "bar", ""], rows)

@@ -7,7 +7,7 @@ from typing import Any
 
 from .page import as_text
 from .report_plots import number
-from .tables import interval_text, number_text
+from .tables import interval_text, limits_text, measured_text, number_text
 from .tally import breach_column
 
 Summary = Mapping[str, Any]
@@ -58,8 +58,9 @@ def bars_table(bars: Sequence[Mapping[str, Any]]) -> str:
     for bar in bars:
         text, style = VERDICTS[bar["met"]]
         limit = f"{bar['sense']} {number_text(bar['limit'])}".replace("<=", "≤").replace(">=", "≥")
+        measured = as_text(measured_text(bar) + limits_text(bar))
         rows.append(
-            f'<tr><td>{as_text(bar["name"])}</td><td class="number">{as_text(interval_text(bar))}</td>'
+            f'<tr><td>{as_text(bar["name"])}</td><td class="number">{measured}</td>'
             f'<td class="number">{limit}</td><td><span class="verdict {style}">{text}</span></td></tr>'
         )
     head = "<tr><th>bar</th><th class='number'>measured</th><th class='number'>asked</th><th></th></tr>"

@@ -80,7 +80,7 @@ def titled(
 def bars_table(bars: Sequence[Mapping[str, Any]]) -> Group:
     """Build the table of bars: what is asked, what was measured, whether it is met."""
     rows = [
-        [bar["name"], number_text(bar["value"]), f"{bar['sense']} {number_text(bar['limit'])}", _VERDICTS[bar["met"]]]
+        [bar["name"], measured_text(bar), f"{bar['sense']} {number_text(bar['limit'])}", _VERDICTS[bar["met"]]]
         for bar in bars
     ]
     return titled("Bars", ["", "measured", "bar", ""], rows, wrap=True)
@@ -95,12 +95,16 @@ def interval_text(figure: Figure | None, limit_text: Callable[[float], str] | No
     """
     if figure is None or figure["value"] is None or figure["value"] != figure["value"]:
         return "-"
+    return number_text(figure["value"]) + limits_text(figure, limit_text)
+
+
+def limits_text(figure: Figure, limit_text: Callable[[float], str] | None = None) -> str:
+    """Write `` [low, high]``, nothing where there are no limits."""
     limits = [figure["low"], figure["high"]]
-    text = number_text(figure["value"])
     if any(limit is None or limit != limit for limit in limits):
-        return text
+        return ""
     low, high = ((limit_text or number_text)(float(limit)) for limit in limits if limit is not None)
-    return f"{text} [{low}, {high}]"
+    return f" [{low}, {high}]"
 
 
 def short_limit(value: float) -> str:
@@ -115,6 +119,16 @@ def number_text(value: float | None) -> str:
         return "-"
     size = abs(round(value, 2))
     return f"{value:,.0f}" if size >= 100 else f"{value:.1f}" if size >= 10 else f"{value:.2f}"
+
+
+def measured_text(bar: Mapping[str, Any]) -> str:
+    """Write what was measured for a bar, with so many digits that it differs from the limit where it does."""
+    value, limit = bar["value"], bar["limit"]
+    text = number_text(value)
+    if text == "-" or value == limit or text != number_text(limit):
+        return text
+    shown = (f"{value:.{digits}g}" for digits in range(2, 18))
+    return next(text for text in shown if float(text) != limit)
 
 
 def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Group:

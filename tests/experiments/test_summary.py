@@ -4,8 +4,10 @@ import math
 import numpy as np
 import pytest
 from rich.console import Console
+from steerclear.experiments.markdown import bars_table as bars_lines
+from steerclear.experiments.report_parts import bars_table as bars_html
 from steerclear.experiments.summary import metrics_of, summarise
-from steerclear.experiments.tables import bars_table, interval_text, number_text, pairing_table
+from steerclear.experiments.tables import bars_table, interval_text, measured_text, number_text, pairing_table
 
 
 def row(game, shielded, **columns):
@@ -128,6 +130,19 @@ def test_bars_say_whether_they_are_met():
     assert [line[-1] for line in lines if line[0] in ("hits", "steps")] == ["met", "met"]
     assert [line[-2] for line in lines if line[0] in ("hits", "steps")] == ["0.00", "not"]
     assert ">= 250,000" in text
+
+
+def test_a_bar_just_missed_does_not_look_as_if_it_were_met():
+    def text(value, limit):
+        return measured_text({"value": value, "limit": limit})
+
+    assert [text(1 / 300, 0.0), text(0.0, 0.0), text(0.9496, 0.95), text(250_000.4, 250_000.0), text(None, 0.0)] == [
+        "0.0033", "0.00", "0.9496", "250000.4", "-",
+    ]  # fmt: skip
+    missed = {"name": "hits", "value": 1 / 300, "sense": "<=", "limit": 0.0, "met": False}
+    assert "0.0033 <= 0.00 not met" in " ".join(printed(bars_table([missed]), 80).split())
+    assert "| hits | 0.0033 | <= 0.00 | **not met** |" in bars_lines([missed])
+    assert "0.0033 [0.00, 0.02]<" in bars_html([missed | {"low": 8e-5, "high": 0.0186}])
 
 
 def test_a_long_name_of_a_bar_takes_nothing_from_its_figures():
