@@ -79,7 +79,9 @@ def mark_relaxed(count: int, state: Array, boats: Boats, fixed: Fixed, work: Wor
     """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
     for m in range(count):
         i = plan.movers[m]
-        if plan.reason[i] == PASSED or plan.reason[i] == RIGHT_OF_WAY or not unchanged(i, plan):
+        if plan.keeps[i]:
+            plan.reason[i] = ESCAPE
+        elif plan.reason[i] == PASSED or plan.reason[i] == RIGHT_OF_WAY or not unchanged(i, plan):
             plan.reason[i] = QP_RELAXED
         plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
 
@@ -235,6 +237,60 @@ def _better_than_escapes(
 
 
 @lean_kernel
+def _take_answers(count: int, work: Work, plan: Plan) -> None:
+    """Give the movers the program's answers; their escapes are put aside, and whether they keep everything."""
+    for m in range(count):
+        i = plan.movers[m]
+        plan.keeps[i] = work.merit[i] >= FIXED_LOST
+        copy_row(plan.escape[i], plan.commands[i])
+        copy_row(plan.escape_held[i], plan.held[i])
+        copy_row(plan.commands[i], plan.answer[i])
+        copy_row(plan.held[i], plan.answer_held[i])
+
+
+@lean_kernel
+def _nobody_loses(i: int, ours: BoolArray, work: Work, plan: Plan) -> bool:
+    """Whether boat i now keeps everything, and every other boat of ours what it kept before."""
+    for j in range(ours.shape[0]):
+        if ours[j] and j != i and work.merit[j] < min(plan.merit[j], PAIR_SAFE) - WORSE_BY_FIXED:
+            return False
+    return work.merit[i] >= FIXED_LOST
+
+
+@lean_kernel
+def _take_escapes_that_keep(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> None:
+    """Give a mover its escape after all where that keeps everything, its answer does not, and nobody loses by it.
+
+    The worst margin of the team decides between answers and escapes; what a boat far away cannot keep is no reason for
+    this one to give up what it can.
+    """
+    for m in range(count):
+        i = plan.movers[m]
+        if not plan.keeps[i] or work.merit[i] >= FIXED_LOST:
+            plan.keeps[i] = False
+            continue
+        copy_row(plan.merit, work.merit)
+        copy_row(plan.commands[i], plan.escape[i])
+        copy_row(plan.held[i], plan.escape_held[i])
+        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        if not _nobody_loses(i, ours, work, plan):
+            plan.keeps[i] = False
+            copy_row(plan.commands[i], plan.answer[i])
+            copy_row(plan.held[i], plan.answer_held[i])
+            check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+
+
+@lean_kernel
 def ladder(
     count: int,
     state: Array,
@@ -251,7 +307,8 @@ def ladder(
 
     Escapes are searched from the present state, the one under way first. When even the best leaves somebody short
     (reason BEST_EFFORT) it is still carried out: avoidance does not switch itself off. A program's answer that
-    leaves a better worst margin than any escape is kept (reason QP_RELAXED). When only fixed things are at stake and
+    leaves a better worst margin than any escape is kept (reason QP_RELAXED), but for boats that only their escape keeps
+    safe. When only fixed things are at stake and
     no escape does better by them than the program's answer or the wanted command, that one is sent; an escape that
     keeps them is carried out only as far as they ask for, see `easing`.
 
@@ -278,11 +335,9 @@ def ladder(
         set_off(plan.movers[m], state, boats, tuning, work, plan)
     check(count, state, ours, boats, fixed, tuning, memory, work, plan)
     if not good and _better_than_escapes(before, count, state, ours, boats, fixed, work, plan):
-        for m in range(count):
-            i = plan.movers[m]
-            copy_row(plan.commands[i], plan.answer[i])
-            copy_row(plan.held[i], plan.answer_held[i])
+        _take_answers(count, work, plan)
         check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        _take_escapes_that_keep(count, state, ours, boats, fixed, tuning, memory, work, plan)
         mark_relaxed(count, state, boats, fixed, work, plan)
         return
     for m in range(count):

@@ -14,7 +14,7 @@ from .memory import Memory
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
-from .rows import FIXED_ROW, PAIR_ROW, build_rows, inputs_of
+from .rows import BOX_ROW, FIXED_ROW, build_rows, inputs_of
 from .scene import Boats, Fixed, Tuning
 from .screening import predict
 from .work import Work
@@ -101,18 +101,24 @@ def build(
 def add_slack(count: int, rows: int, plan: Plan) -> int:
     """Give rows their slack inputs, the last columns; returns the number of all inputs.
 
-    Boat rows share one. Rows of fixed things have one for each boat, so that none is let off by what another cannot
-    do. Limits have none.
+    Every boat has one for its rows from boats that do not take part and one for those of fixed things, so that none is
+    let off by what another cannot do. Rows between boats that take part share one. Limits have none.
     """
-    first, inputs = 2 * count, 3 * count + 1
+    own, shared = 2 * count, 3 * count
+    beside, inputs = shared + 1, 4 * count + 1
     for r in range(rows):
-        for s in range(first, inputs):
+        for s in range(own, inputs):
             plan.C[r, s] = 0.0
-        if plan.kind[r] == PAIR_ROW:
-            plan.C[r, first] = 1.0 / math.sqrt(SLACK_COST[PAIR_ROW])
-        elif plan.kind[r] == FIXED_ROW:
-            plan.C[r, first + 1 + plan.place[plan.label[r, 0]]] = 1.0 / math.sqrt(SLACK_COST[FIXED_ROW])
-    plan.z0[first:inputs] = 0.0
+        if plan.kind[r] == BOX_ROW:
+            continue
+        place, other = plan.place[plan.label[r, 0]], plan.label[r, 1]
+        column = own + place
+        if plan.kind[r] == FIXED_ROW:
+            column = beside + place
+        elif other >= 0 and plan.place[other] >= 0:
+            column = shared
+        plan.C[r, column] = 1.0 / math.sqrt(SLACK_COST[plan.kind[r]])
+    plan.z0[own:inputs] = 0.0
     return inputs
 
 

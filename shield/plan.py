@@ -18,7 +18,9 @@ LARGEST_COMMAND = 1e6
 class Plan(NamedTuple):
     """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows).
 
-    ``eased`` holds of each escape the turn, deg, the speed, m/s, and the merit, see `easing`.
+    ``eased`` holds of each escape the turn, deg, the speed, m/s, and the merit, see `easing`. One of ``answer`` and
+    ``escape`` is put aside while the other is tried; ``keeps`` says of whom the escape keeps everything. ``merit`` is
+    what every boat had before a trial.
     """
 
     commands: Array
@@ -27,6 +29,10 @@ class Plan(NamedTuple):
     held: Array
     answer: Array
     answer_held: Array
+    escape: Array
+    escape_held: Array
+    keeps: BoolArray
+    merit: Array
     eased: Array
     movers: IntArray
     place: IntArray
@@ -53,15 +59,19 @@ def new_plan(boats: int, rows: int) -> Plan:
             held=np.zeros((boats, 3)),
             answer=np.zeros((boats, 2)),
             answer_held=np.zeros((boats, 3)),
+            escape=np.zeros((boats, 2)),
+            escape_held=np.zeros((boats, 3)),
+            keeps=np.zeros(boats, np.bool_),
+            merit=np.zeros(boats),
             eased=np.zeros((boats, 3)),
             movers=np.zeros(boats, np.int64),
             place=np.full(boats, -1, np.int64),
             moving=np.zeros(boats, np.bool_),
             gain=np.zeros((boats, 3)),
-            z_now=np.zeros(3 * boats + 1),
-            z0=np.zeros(3 * boats + 1),
-            z=np.zeros(3 * boats + 1),
-            C=np.zeros((rows, 3 * boats + 1)),
+            z_now=np.zeros(4 * boats + 1),
+            z0=np.zeros(4 * boats + 1),
+            z=np.zeros(4 * boats + 1),
+            C=np.zeros((rows, 4 * boats + 1)),
             d=np.zeros(rows),
             kind=np.zeros(rows, np.int64),
             label=np.zeros((rows, 2), np.int64),
