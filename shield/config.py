@@ -35,6 +35,8 @@ class ShieldConfig:
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
             near, m, at most 50.
+        mate_cap_m: the same of margins from team-mates the shield decides for, whose escapes are known; their rate is
+            `response_per_s`.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of
@@ -70,6 +72,7 @@ class ShieldConfig:
     give_way_after_s: float = 3.0
     table_margin_m: float = 0.45
     margin_cap_m: float = 2.0
+    mate_cap_m: float = 0.2
     tail_s: float = 5.0
     horizon_s: float | None = None
     hunt_s: float | None = None
@@ -121,6 +124,7 @@ _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
 _POSITIVE = _RATES | {"give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
+    "mate_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 1.0),
     "horizon_s": (0.0, 120.0),
     "hunt_s": (0.0, 120.0),

@@ -196,6 +196,7 @@ def _assign_escapes(
     look = 1
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
+        work.mate_target_m[i] = 0.0
     for m in range(count):
         i = plan.movers[m]
         work.threat_target_m[i, :] = 0.0

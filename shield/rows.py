@@ -21,7 +21,7 @@ import math
 from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from .certificates.hunters import clear_of_hunter, hunts
-from .certificates.manoeuvre import clear_of_boat
+from .certificates.manoeuvre import clear_of_boat, must_keep
 from .certificates.values import WAYS, looked_up, table_slope
 from .jit import Array, BoolArray, IntArray, copy_row, lean_kernel
 from .platforms import layout as L
@@ -162,7 +162,7 @@ def _pair_row(
         if work.out[MARGIN] > work.spare2[MARGIN]:
             copy_row(work.out, work.spare2)
     k, nx, ny = work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y]
-    target = work.threat_target_m[i, j] if hunts(i, j, ours, boats) else work.target[i]
+    target = work.threat_target_m[i, j] if hunts(i, j, ours, boats) else must_keep(i, j, ours, work)
     lack = target + AIM_M - work.out[MARGIN]
     C[r, :] = 0.0
     _add_effect(C, r, i, 1.0, k, nx, ny, work.path[i], 2 * m, gain, work)

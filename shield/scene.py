@@ -119,6 +119,7 @@ class Tuning(NamedTuple):
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
+        mate_cap_m: margins from team-mates above this may shrink freely, m.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
         give_way_after_s: time a boat is kept from turning by a team-mate alongside before one of them gives way, s.
     """
@@ -130,6 +131,7 @@ class Tuning(NamedTuple):
     hysteresis_m: float
     margin_cap_m: float
     speed_weight: float
+    mate_cap_m: float
     fixed_decay: float
     give_way_after_s: float
 

@@ -39,15 +39,18 @@ def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, w
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
     What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
-    be let go at once.
+    be let go at once. That from team-mates of ours shrinks freely until it is small: what they will do is known.
     """
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
+        work.mate_target_m[i] = 0.0
         work.threat_target_m[i, :] = 0.0
         work.joint_target_m[i] = 0.0
         work.fixed_target_m[i] = 0.0
         if ours[i] and memory.kept[i]:
-            work.target[i] = boats.decay[i] * max(0.0, min(memory.margin_m[i], boats.cap_m[i]))
+            least_m = max(0.0, memory.margin_m[i])
+            work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
+            work.mate_target_m[i] = boats.joint_decay * min(least_m, tuning.mate_cap_m)
             work.joint_target_m[i] = boats.joint_decay * max(0.0, min(memory.joint_m[i], boats.cap_m[i]))
             work.fixed_target_m[i] = tuning.fixed_decay * max(0.0, min(memory.fixed_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):

@@ -34,7 +34,10 @@ class Work(NamedTuple):
         hunters_known: (n + 1,) whether the margins against opponents are all those of the path that is there.
         joint_m: (n + 1,) the least of these runs, m; `FAR` where none were made.
         fails: (n + 1,) whether one of these is below what must be kept.
-        target: (n,) margin the boat must keep, m.
+        short: (n + 1,) whether the margin from some team-mate, or from one that holds its course, is below what must be
+            kept.
+        target: (n,) margin the boat must keep from boats that are not ours, m.
+        mate_target_m: (n,) margin it must keep from those that are, m.
         threat_target_m: (n, n) margin it must keep against each hunting opponent, m.
         joint_target_m: (n,) margin it must keep on runs of several opponents, m.
         fixed_target_m: (n,) margin it must keep from fixed things, m.
@@ -79,7 +82,9 @@ class Work(NamedTuple):
     hunters_known: BoolArray
     joint_m: Array
     fails: BoolArray
+    short: BoolArray
     target: Array
+    mate_target_m: Array
     threat_target_m: Array
     joint_target_m: Array
     fixed_target_m: Array
@@ -128,7 +133,9 @@ def new_work(boats: int, samples: int) -> Work:
             hunters_known=np.zeros(boats + 1, np.bool_),
             joint_m=np.zeros(boats + 1),
             fails=np.zeros(boats + 1, np.bool_),
+            short=np.zeros(boats + 1, np.bool_),
             target=np.zeros(boats),
+            mate_target_m=np.zeros(boats),
             threat_target_m=np.zeros((boats, boats)),
             joint_target_m=np.zeros(boats),
             fixed_target_m=np.zeros(boats),

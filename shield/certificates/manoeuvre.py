@@ -26,6 +26,9 @@ from .values import find_beset, run_opponents
 REGAIN_M = 0.01
 """A pair inside the buffer must part by at least this in the next step, m."""
 
+ROUNDING_M = 1e-6
+"""Margins are looked at so far beyond what must be kept: one that is said to be above must not round to below."""
+
 RECOVERY_S = 1.5
 """When already inside the radius, manoeuvres are ranked by the distance they reach after this time, s."""
 
@@ -199,6 +202,12 @@ def clear_of_boat(
 
 
 @lean_kernel
+def must_keep(i: int, j: int, ours: BoolArray, work: Work) -> float:
+    """Margin boat i must keep from boat j, whatever else is feared of it, m."""
+    return work.mate_target_m[i] if ours[j] else work.target[i]
+
+
+@lean_kernel
 def worst_clearance(
     i: int,
     slot: int,
@@ -209,16 +218,21 @@ def worst_clearance(
     work: Work,
     floor_m: float,
 ) -> None:
-    """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses."""
+    """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses.
+
+    ``work.short[slot]`` says whether one of them is below what must be kept.
+    """
     clear = work.clear[slot]
     clear[MARGIN] = FAR
     work.bound[slot] = -1
+    work.short[slot] = False
     for j in range(state.shape[0]):
         if j == i or not work.near[i, j]:
             continue
-        clear_of_boat(
-            i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, min(clear[MARGIN], tuning.margin_cap_m)
-        )
+        least_m = must_keep(i, j, ours, work)
+        enough_m = max(least_m + ROUNDING_M, min(clear[MARGIN], tuning.margin_cap_m))
+        clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, enough_m)
+        work.short[slot] = work.short[slot] or work.out[MARGIN] < least_m
         if work.out[MARGIN] < clear[MARGIN]:
             copy_row(clear, work.out)
             work.bound[slot] = j

@@ -126,7 +126,7 @@ def rate_path(
         _ask_no_hunters(slot, work)
         return _rate_touching(i, slot, share, best, state, ours, boats, fixed, tuning, work)
     sure = clear[MARGIN]
-    short = sure < work.target[i]
+    short = work.short[slot]
     if short and STRAIGHT_BASE + sure <= best:
         _ask_no_hunters(slot, work)
         return STRAIGHT_BASE + sure
