@@ -35,8 +35,8 @@ class ShieldConfig:
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
             near, m, at most 50.
-        mate_cap_m: the same of margins from team-mates the shield decides for, whose escapes are known; their rate is
-            `response_per_s`.
+        mate_cap_m: the same of margins from team-mates that one program decides for (coordination "team"): their
+            escapes are known.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of

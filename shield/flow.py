@@ -11,12 +11,12 @@ import math
 import numpy as np
 
 from .certificates.clearance import MARGIN
-from .certificates.rating import FIXED_LOST
+from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .memory import Memory
-from .plan import BEST_EFFORT, ESCAPE, QP, Plan
+from .plan import BEST_EFFORT, ESCAPE, QP, Plan, unchanged
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .right_of_way import note_pressing
@@ -66,7 +66,22 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
         else:
             memory.threat_m[i, :] = work.threat_m[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
-        note_pressing(i, state, ours, tuning, memory, work, plan)
+        note_pressing(i, state, ours, boats, tuning, memory, work, plan)
+
+
+@lean_kernel
+def _note_causes(ours: BoolArray, work: Work, plan: Plan) -> None:
+    """Note what each boat's wanted command is short of."""
+    for i in range(ours.shape[0]):
+        plan.cause[i] = work.bound[i] if ours[i] and work.merit[i] < PAIR_SAFE else -1
+
+
+@lean_kernel
+def _tell_of_fixed_things(ours: BoolArray, work: Work, plan: Plan) -> None:
+    """Say of a command that was changed for fixed things, and keeps them now, that these bind and no boat."""
+    for i in range(ours.shape[0]):
+        if ours[i] and plan.cause[i] == FIXED_THING and work.merit[i] >= PAIR_SAFE and not unchanged(i, plan):
+            work.bound[i] = FIXED_THING
 
 
 @lean_kernel
@@ -78,6 +93,7 @@ def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) 
     else:
         count = pick_movers(ours, work, plan)
         ladder(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
+    _tell_of_fixed_things(ours, work, plan)
     commit(state, ours, boats, tuning, memory, work, plan)
 
 
@@ -86,8 +102,10 @@ def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: Bool
     """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_ESCAPE`."""
     boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
     if screen(state, wanted, margin_m, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan):
+        plan.cause[:] = -1
         finish(scene, True, 0, state, ours)
         return PASSES
+    _note_causes(ours, work, plan)
     return TO_ESCAPE if lost(ours, memory, work) else TO_SOLVE
 
 

@@ -227,14 +227,26 @@ def _strayed(count: int, state: Array, fixed: Fixed, plan: Plan) -> bool:
 
 
 @lean_kernel
+def _none_worse_off(ours: BoolArray, work: Work, plan: Plan) -> bool:
+    """Whether every boat of ours had as much by the program's answer, ``plan.merit``, as it has now."""
+    worse = False
+    for i in range(ours.shape[0]):
+        worse = worse or (ours[i] and plan.merit[i] < work.merit[i] - WORSE_BY_FIXED)
+    return not worse
+
+
+@lean_kernel
 def _better_than_escapes(
     before: float, count: int, state: Array, ours: BoolArray, boats: Boats, fixed: Fixed, work: Work, plan: Plan
 ) -> bool:
-    """Whether the program's answer, of the worst merit ``before``, is to be kept rather than the escapes held now."""
-    after = worst_merit(ours, work)
-    if before > after + _clearly(before, ours, boats, work):
+    """Whether the program's answer, of the worst merit ``before``, is to be kept rather than the escapes held now.
+
+    Where only fixed things are at stake, no boat may have less by it: what one is beyond an edge anyway is no leave for
+    another to go beyond its own.
+    """
+    if before > worst_merit(ours, work) + _clearly(before, ours, boats, work):
         return True
-    return before >= FIXED_LOST and before >= after - WORSE_BY_FIXED and not _strayed(count, state, fixed, plan)
+    return before >= FIXED_LOST and _none_worse_off(ours, work, plan) and not _strayed(count, state, fixed, plan)
 
 
 @lean_kernel
@@ -318,6 +330,7 @@ def ladder(
     together had escapes that fit at the last decision, and these are what is tried first.
     """
     before, eases = worst_merit(ours, work), only_fixed(ours, work)
+    copy_row(plan.merit, work.merit)
     for i in range(ours.shape[0]):
         if ours[i]:
             hold(i, plan.held, work)

@@ -18,9 +18,10 @@ LARGEST_COMMAND = 1e6
 class Plan(NamedTuple):
     """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows).
 
-    ``eased`` holds of each escape the turn, deg, the speed, m/s, and the merit, see `easing`. One of ``answer`` and
-    ``escape`` is put aside while the other is tried; ``keeps`` says of whom the escape keeps everything. ``merit`` is
-    what every boat had before a trial.
+    ``cause`` is what a boat's wanted command is short of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each
+    escape the turn, deg, the speed, m/s, and the merit, see `easing`. One of ``answer`` and ``escape`` is put aside
+    while the other is tried; ``keeps`` says of whom the escape keeps everything. ``merit`` is what every boat had
+    before a trial.
     """
 
     commands: Array
@@ -33,6 +34,7 @@ class Plan(NamedTuple):
     escape_held: Array
     keeps: BoolArray
     merit: Array
+    cause: IntArray
     eased: Array
     movers: IntArray
     place: IntArray
@@ -63,6 +65,7 @@ def new_plan(boats: int, rows: int) -> Plan:
             escape_held=np.zeros((boats, 3)),
             keeps=np.zeros(boats, np.bool_),
             merit=np.zeros(boats),
+            cause=np.full(boats, -1, np.int64),
             eased=np.zeros((boats, 3)),
             movers=np.zeros(boats, np.int64),
             place=np.full(boats, -1, np.int64),

@@ -50,7 +50,7 @@ def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, w
         if ours[i] and memory.kept[i]:
             least_m = max(0.0, memory.margin_m[i])
             work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
-            work.mate_target_m[i] = boats.joint_decay * min(least_m, tuning.mate_cap_m)
+            work.mate_target_m[i] = boats.decay[i] * min(least_m, tuning.mate_cap_m, boats.cap_m[i])
             work.joint_target_m[i] = boats.joint_decay * max(0.0, min(memory.joint_m[i], boats.cap_m[i]))
             work.fixed_target_m[i] = tuning.fixed_decay * max(0.0, min(memory.fixed_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):
@@ -90,7 +90,7 @@ def screen(
         if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
-        apply_right_of_way(i, state, ours, tuning, memory, work, plan)
+        apply_right_of_way(i, state, ours, boats, tuning, memory, work, plan)
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):

@@ -59,7 +59,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             hysteresis_m=config.hysteresis_m,
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
-            mate_cap_m=min(config.mate_cap_m, config.margin_cap_m),
+            mate_cap_m=config.mate_cap_m if config.coordination == "team" else config.margin_cap_m,
             fixed_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
         )

@@ -37,3 +37,18 @@ def test_a_boat_chased_along_an_edge_does_what_it_does_alone(ahead_m, course_deg
     assert (alone.reason[:, 0] > 0).any()  # or there would be nothing to hang on anything
     assert together.closest(np.array([False, False, True, True])) < 2.6  # mates with next to nothing to spare
     np.testing.assert_allclose(together.position[:, 0], alone.position[:, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_a_boat_outside_is_no_leave_for_another_to_go_out(platform):
+    """One lies a little beyond the lower edge, bow outwards; the other presses through the upper one, far away."""
+    top = 2.0 if platform == "heron" else 3.0
+    fleet = fleet_of([(500.0, -0.3, 180.0, 0.0), (100.0, 55.0, 30.0, top)], [0, 0], platform)
+    out = np.array([180.0, 30.0])
+
+    def wanted(step, state):
+        return np.stack([np.full(2, top), (out - state[:, L.HEADING] + 180.0) % 360.0 - 180.0], axis=-1)
+
+    run = sail(Shield(ShieldConfig(edge_m=0.2), Surroundings(field=FIELD)), fleet, wanted, 600)
+    assert (run.reason[:, 0] > 0).mean() > 0.2, "or it is not outside for long"
+    assert (FIELD[3] - run.position[:, 1, 1]).min() >= 0.15

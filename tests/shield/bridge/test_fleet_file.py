@@ -7,6 +7,7 @@ import pytest
 from bridge_fakes import fleet_of, fleet_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.exceptions import FleetFileError
 from steerclear.shield.platforms import Platform
@@ -152,3 +153,10 @@ def test_the_fence_holds_what_is_inside():
     assert fence.holds(0.0, 0.0)
     assert not fence.holds(101.0, 0.0)
     assert not fence.holds(math.nan, 0.0)
+
+
+def test_on_the_water_margins_from_team_mates_shrink_as_slowly_as_others():
+    assert parse_fleet(GOOD).shield_config.mate_cap_m == ShieldConfig().margin_cap_m > ShieldConfig().mate_cap_m
+    for setting, follows in (("mate_cap_m: 0.5", 0.5), ("margin_cap_m: 1.0", 1.0)):
+        told = parse_fleet(GOOD.replace("team: blue", f"team: blue\nshield: {{{setting}}}", 1))
+        assert told.shield_config.mate_cap_m == follows

@@ -1,0 +1,123 @@
+"""A boat that is kept from turning by an opponent that holds its course does not sail on beside it for good."""
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed, sail, sail_games, step_all
+from shield_scenes import fleet_of
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+
+GOAL_M = {"heron": 30.0, "surveyor": 72.0}
+STEPS = {"heron": 450, "surveyor": 600}
+COMES = {"heron": (-13.5, 6.75, 60.0, 1.96), "surveyor": (-33.0, 27.7, 53.0, 2.45)}
+"""Opponents that come from the left: east and north, m, heading, deg, speed, m/s."""
+CAP_M = ShieldConfig().mate_cap_m
+
+
+def crossing(platform):
+    """A boat heading north, and an opponent that will be where their ways cross when it is."""
+    return fleet_of([(0.0, 0.0, 0.0, get_platform(platform).max_speed_mps), COMES[platform]], [0, 1], platform)
+
+
+def towards_goal(platform, opponent):
+    """Commands: the boat makes for a place straight ahead, the opponent does what ``opponent(state)`` says."""
+    top = get_platform(platform).max_speed_mps
+
+    def wanted(step, state):
+        east, north = -state[0, L.X], GOAL_M[platform] - state[0, L.Y]
+        error = np.degrees(np.arctan2(east, north)) - state[0, L.HEADING]
+        return np.array([(top, (error + 180.0) % 360.0 - 180.0), (COMES[platform][-1], opponent(state))])
+
+    return wanted
+
+
+def arrives(run, platform):
+    return np.hypot(run.position[:, 0, 0], run.position[:, 0, 1] - GOAL_M[platform]).min() < 3.0
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_a_boat_turned_aside_by_one_that_holds_its_course_gets_past_it(platform):
+    stuck, run = (
+        sail(
+            Shield(ShieldConfig(give_way_after_s=after_s)),
+            crossing(platform),
+            towards_goal(platform, lambda _: 0.0),
+            STEPS[platform],
+        )
+        for after_s in (np.inf, ShieldConfig().give_way_after_s)
+    )
+    assert not arrives(stuck, platform), "or there is nothing to get out of"
+    assert arrives(run, platform)
+    assert (run.reason == Reason.RIGHT_OF_WAY).any()
+    assert run.closest(np.array([True, False])) >= 2.5
+    assert (run.reason[:, 0] != Reason.PASSED).sum() < 0.6 * (stuck.reason[:, 0] != Reason.PASSED).sum()
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_no_boat_gives_way_to_one_that_steers_at_it(platform):
+    """Turning away from a hunter alongside would only cost speed."""
+
+    def hunt(state):
+        way = state[0, :2] - state[1, :2]
+        error = np.degrees(np.arctan2(*way)) - state[1, L.HEADING]
+        return (error + 180.0) % 360.0 - 180.0
+
+    run = sail(Shield(), crossing(platform), towards_goal(platform, hunt), STEPS[platform])
+    ruled = run.reason[:, 0] == Reason.RIGHT_OF_WAY
+    assert (run.reason[:, 0] == Reason.QP).any()
+    assert ruled.mean() < 0.02
+    assert run.closest(np.array([True, False])) >= 2.5
+
+
+def test_margins_from_team_mates_shrink_freely_until_they_are_small():
+    """Two boats head on pass as they want until little is left; a far larger margin is asked for without that."""
+    top, closest, changed = 2.0, [], []
+    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
+        fleet = fleet_of([(0.0, 0.0, 0.0, top), (1.0, 40.0, 180.0, top)], [0, 0], "heron")
+        run = sail(Shield(ShieldConfig(mate_cap_m=cap_m)), fleet, lambda step, state: np.tile([top, 0.0], (2, 1)), 220)
+        closest.append(run.closest(np.ones(2, bool)))
+        changed.append((run.reason != Reason.PASSED).sum())
+    assert closest[0] >= 2.5
+    assert changed[0] < changed[1]
+
+
+def test_boats_that_cannot_talk_keep_the_rate_of_others():
+    """What team-mates will do is only known where one program decides for all."""
+    runs = []
+    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
+        config = ShieldConfig(coordination="per_boat", mate_cap_m=cap_m)
+        fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
+        runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 220))
+    np.testing.assert_array_equal(runs[0].sent, runs[1].sent)
+    assert (runs[0].reason != Reason.PASSED).any()
+
+
+def test_of_a_command_changed_for_an_edge_the_edge_is_told():
+    """Also where the program or the eased escape found what keeps it, and a team-mate is the nearest boat then."""
+    field = Surroundings(field=(0.0, 0.0, 80.0, 40.0))
+    fleet = fleet_of([(40.0, 34.0, 10.0, 2.0), (30.0, 10.0, 0.0, 0.0)], [0, 0], "heron")
+    shield, state, told = Shield(), fleet.state.copy(), []
+    fill(state, packed(fleet.platforms))
+    for _ in range(120):
+        now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
+        error = (10.0 - state[0, L.HEADING] + 180.0) % 360.0 - 180.0
+        decisions = shield.decide(now, Commands.relative_deg([(2.0, error), (0.0, 0.0)]), field)
+        found = decisions[0]
+        told += [found.binding] if found.intervened else []
+        step_all(packed(fleet.platforms), state[None], decisions.sent.values[None], 0.1)
+    assert len(told) > 20
+    assert set(told) == {("field",)}
+
+
+def test_batches_give_way_as_single_shields_do():
+    fleet = crossing("heron")
+    wanted = towards_goal("heron", lambda _: 0.0)
+    single = sail(Shield(), fleet, wanted, 200)
+    state = fleet.state[None].copy()
+    fill(state[0], packed(fleet.platforms))
+    games = sail_games(
+        ShieldConfig(), state, fleet.platforms, (0, 1), lambda step, now: wanted(step, now[0])[None], 200
+    )
+    np.testing.assert_array_equal(games.reason[:, 0, 0], single.reason[:, 0])
+    np.testing.assert_allclose(games.position[:, 0], single.position, atol=1e-6)
