@@ -14,6 +14,7 @@ from .conditions import words_of
 from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, bars_table, table
+from .played_sets_page import played_page
 from .reach_show import tables_page
 from .tables import interval_text
 from .tally import RADII_M, breach_column
@@ -22,7 +23,7 @@ from .verdicts import HEADS, verdict_rows
 
 Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
-SOURCES = "ablate, evaluate, bench, encounters or reach compare"
+SOURCES = "ablate, evaluate, bench, encounters, reach compare or reach play"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -79,6 +80,7 @@ def _encounters(found: Sequence[Mapping[str, Any]], folder: Path) -> Page:
 POOLED: dict[str, Callable[[Sequence[Mapping[str, Any]], Path], Page]] = {
     "encounters": _encounters,
     "reach": lambda found, folder: ("table_cards.md", tables_page([content["card"] for content in found]), []),
+    "reach-play": lambda found, folder: ("played_sets.md", played_page(found), []),
     "reach-compare": lambda found, folder: ("unsafe_sets.md", sets_page(found), []),
 }
 """Commands whose results go into one page together, and what makes it."""

@@ -227,6 +227,18 @@ SETS = {
     **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 
+PLAYED_SETS = {
+    **_PROVENANCE,
+    "sets[].own_mps": "own speed, m/s",
+    "sets[].other_mps": "the opponent's speed, m/s",
+    "sets[].heading_deg": "heading of the opponent relative to the own one, deg; 180 is head-on",
+    "sets[].reach_m2": "positions of the opponent whose value is below the radius, m^2",
+    "sets[].lost_m2": "others from which some opponent reached the shielded boat, m^2",
+    "sets[].played": "positions that were played",
+    "sets[].ratio": "both together, times the first",
+    **{f"bars[].{k}": v for k, v in _BAR.items()},
+}
+
 SIM_BOATS = {**_PROVENANCE, **_SIM_BOATS, **{f"breaches[].{name}": words for name, words in BREACH.items()}}
 
 RENDER = {**_PROVENANCE, "files[]": "what was written"}
@@ -246,6 +258,7 @@ KEYS = {
     "encounters": ENCOUNTERS,
     "attack": ATTACK,
     "reach compare": SETS,
+    "reach play": PLAYED_SETS,
     "render": RENDER,
     "deploy": DEPLOY,
     "preflight": DEPLOY,

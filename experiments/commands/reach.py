@@ -29,6 +29,7 @@ from ..reach_show import draw_sets, show_card
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 from .reach_compare import OtherBoat, OwnBoat, compare
+from .reach_play import play
 
 app = typer.Typer(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
 
@@ -155,6 +156,7 @@ def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable
 
 
 app.command()(compare)
+app.command()(play)
 
 
 @app.command()

@@ -1,0 +1,73 @@
+"""Played sets as table, JSON and page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from .markdown import MADE, bars_table, table
+from .played_sets import BAND_M, BEYOND, LONGEST_S, PlayedSet
+from .provenance import machine, versions
+from .unsafe_sets import RATIO_BAR
+
+HEADS = ("own/other m/s", "heading", "reachability, m²", "lost beside it, m²", "ratio", "positions played")
+TITLE = "# Sets from which the shield does not save a boat"
+WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield *promises*.
+Every position of the opponent whose worst-case value is below the radius counts as lost, as nobody can save the boat
+there. From those up to {BAND_M:g} m above, and from one in {BEYOND} of those of a higher value, which then counts for
+all of them, games are played with the shield as it comes: the boat's policy wants straight on at top speed, or straight
+at the opponent; the opponent does what the table calls worst, steers for the meeting point, or at the boat. A position
+counts as lost when the boats come within the radius in any of these six games, which last as long as the table looks
+ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the heading is the opponent's relative to the own one,
+180° is head-on. The bar is {RATIO_BAR:g} times the reachability set's area, in every row."""
+
+
+def rows_of(sets: Sequence[PlayedSet]) -> list[list[str]]:
+    """Rows under `HEADS`."""
+    return [
+        [
+            f"{one.own_mps:g}/{one.other_mps:g}",
+            f"{one.heading_deg:g}°",
+            f"{one.reach_m2:.1f}",
+            f"{one.lost_m2:.1f}",
+            f"{one.ratio:.2f}",
+            f"{one.played:,}",
+        ]
+        for one in sets
+    ]
+
+
+def bars_of(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
+    """The bar over all rows."""
+    ratio = max(one.ratio for one in sets)
+    name = "both sets by reachability's, largest"
+    bar = {"name": name, "value": ratio, "low": None, "high": None, "sense": "<=", "limit": RATIO_BAR}
+    return [{**bar, "met": ratio <= RATIO_BAR}]
+
+
+def content_of(settings: Mapping[str, Any], sets: Sequence[PlayedSet], wall_s: float) -> dict[str, Any]:
+    """The sets as JSON; `keys.PLAYED_SETS` describes it."""
+    return {
+        "command": "reach-play",
+        "settings": dict(settings),
+        "versions": versions(),
+        "machine": machine(),
+        "wall_s": wall_s,
+        "sets": [{**asdict(one), "ratio": one.ratio} for one in sets],
+        "bars": bars_of(sets),
+    }
+
+
+def played_page(contents: Sequence[Mapping[str, Any]]) -> str:
+    """Write the page of played sets from contents of `content_of`."""
+    lines = [TITLE, "", MADE, "", WORDS, ""]
+    for content in contents:
+        settings = content["settings"]
+        sets = [PlayedSet(**{name: one[name] for name in one if name != "ratio"}) for one in content["sets"]]
+        lines += [f"## {settings['own']} meets {settings['other']}, {settings['radius_m']:g} m", ""]
+        if settings["shield"]:
+            lines += [f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}.", ""]
+        lines += [*table(HEADS, rows_of(sets)), "", *bars_table(content["bars"]), ""]
+        lines += [f"steerclear {content['versions']['steerclear']}.", ""]
+    return "\n".join(lines)
