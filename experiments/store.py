@@ -50,9 +50,18 @@ class ResultStore:
             os.fsync(file.fileno())
 
     def load(self) -> dict[str, dict[str, Any]]:
-        """Return every complete result by key; the last one of a key counts, a cut last line is left out."""
+        """Return every complete result by key; the last one of a key counts, a cut last line is left out.
+
+        Raises:
+            ConfigError: the file cannot be read, or is no text.
+        """
+        try:
+            text = self.lines.read_text()
+        except (OSError, UnicodeDecodeError) as error:
+            why = "is no text" if isinstance(error, UnicodeDecodeError) else error.strerror
+            raise ConfigError(f"cannot read {self.lines} ({why}); move it away or choose another --out") from error
         found = {}
-        for number, line in enumerate(self.lines.read_text().splitlines(), start=1):
+        for number, line in enumerate(text.splitlines(), start=1):
             try:
                 entry = json.loads(line)
                 found[entry.pop("key")] = entry

@@ -69,6 +69,21 @@ def encounters(
     """
     guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_guards(text)))
     if scene:
+        _refuse_beside_scenes(
+            {
+                "--platform": platform != "heron,surveyor",
+                "--family": family != "all",
+                "--n": n != 1000,
+                "--radius": radius != 2.5,
+                "--delay": delay != 0.0,
+                "--noise": noise != 0.0,
+                "--current": current != 0.0,
+                "--seed": seed != 0,
+                "--jobs": workers is not None,
+                "--resume": resume,
+                "--json": json_file is not None,
+            }
+        )
         finish(play_scene_files(scene, guards, folder, not no_judge))
         return
     settings = Settings(
@@ -86,6 +101,19 @@ def encounters(
     if results["failed"]:
         raise ConfigError(f"{len(results['failed'])} chunks could not be played (see above); mend it, then --resume")
     finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
+
+
+def _refuse_beside_scenes(given: dict[str, bool]) -> None:
+    """Options of drawn encounters say nothing about scenes.
+
+    Raises:
+        ConfigError: one of them was given.
+    """
+    named = [option for option, is_given in given.items() if is_given]
+    if named:
+        raise ConfigError(
+            f"{', '.join(named)} beside --scene: a scene file holds its own; leave it out, or edit the file"
+        )
 
 
 def platform_pairs(text: str) -> tuple[Pair, ...]:

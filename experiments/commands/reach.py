@@ -18,7 +18,6 @@ from steerclear.shield.tables.files import (
     check_parameters,
     load_table,
     read_table,
-    remedy,
     save_table,
 )
 from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_radii, coarser, make_table
@@ -151,7 +150,7 @@ def _open(own: str, other: str, other_may: str, file: Path | None) -> ValueTable
         table = read_table(file)
         check_parameters(table.card, get_platform(own), get_platform(other), mode)
     except TableError as error:
-        raise TableError(f"{error}; make it with: {remedy(own, other, mode)} --out {file}") from error
+        raise TableError(f"{error}; {file} is left as it is: name that table's boats, or leave --file out") from error
     return table
 
 

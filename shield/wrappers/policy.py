@@ -60,7 +60,12 @@ class ShieldedTeamPolicy:
         """
         if self._reader is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
-        actions = dict(self.policy.act(observations, infos))
+        answer = self.policy.act(observations, infos)
+        if not isinstance(answer, Mapping):
+            raise PolicyError(
+                f"the policy answered {type(answer).__name__}; let act return a mapping of boat to action"
+            )
+        actions = dict(answer)
         fleet = self._reader.fleet(self._team, False)
         around = self._reader.surroundings(self._team, self.keep_out)
         wanted = Commands.relative_deg(self._reader.commands(actions))

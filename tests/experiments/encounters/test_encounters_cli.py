@@ -103,6 +103,7 @@ def _breaching(measure_chunk):
         (["--workers", "0"], "at least 1"),
         (["--resume"], "--resume needs the --out"),
         (["--scene", "missing.json"], "cannot read missing.json"),
+        (["--scene", "missing.json", "--radius", "4", "--resume"], "--radius, --resume beside --scene"),
     ],
 )
 def test_bad_input_is_one_line_and_status_two(arguments, words):

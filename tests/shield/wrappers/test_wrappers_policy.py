@@ -148,3 +148,19 @@ def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     failed = [record.message for record in caplog.records if "failed" in record.message]
     assert len(failed) == 4, "once when it begins, and when it becomes another"
     assert sum("answers again" in record.message for record in caplog.records) == 2
+
+
+def test_a_policy_that_answers_nothing_is_told_what_to_answer():
+    class Silent:
+        def reset(self, env, agent_ids, seed):
+            pass
+
+        def act(self, observations, infos):
+            return None
+
+    env, start = crowd()
+    env.reset(seed=1, options=start)
+    team = Shield().wrap(Silent())
+    team.reset(env, OWN, 0)
+    with pytest.raises(PolicyError, match="answered NoneType; let act return a mapping"):
+        team.act({}, {})
