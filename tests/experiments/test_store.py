@@ -36,11 +36,11 @@ def test_a_folder_with_results_is_not_written_to_by_accident(tmp_path):
 
 def test_results_that_are_no_text_are_one_clear_error(tmp_path):
     (tmp_path / "games.jsonl").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigError, match="cannot read .*games.jsonl .*is no text.*move it away"):
+    with pytest.raises(ConfigError, match=r"cannot read .*games.jsonl .*is no text.*move it away"):
         ResultStore(tmp_path, resume=True).load()
     (tmp_path / "games.jsonl").unlink()
     (tmp_path / "games.jsonl").mkdir()
-    with pytest.raises(ConfigError, match="games.jsonl|choose another --out"):
+    with pytest.raises(ConfigError, match=r"games\.jsonl|choose another --out"):
         ResultStore(tmp_path, resume=True).load()
 
 
