@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -28,8 +29,16 @@ from .unsafe_sets import values_m
 RINGS, BEARINGS = 200, 48
 BAND_M = 1.0
 """Every position is played whose value is between the radius and this much more; below nobody can save the boat."""
-BEYOND = 80
-"""Of those of a higher value one in so many, which then counts for all of them."""
+BEYOND = 79
+"""Of those of a higher value one in so many is tried; no whole part of a ring, so that all bearings have their turn."""
+REFUSED = {
+    "separation_m": "the sets are of the radius given with --radius",
+    "dt_s": "boats move, and tables are stepped, by 0.1 s",
+    "delay_s": "the value table knows no delay; widen the sets with --radius",
+    "position_error_m": "the value table takes positions as exact; widen the sets with --radius",
+    "coordination": "games are played in batches, which decide for whole teams",
+}
+"""Settings under which the games would be about something else, and why."""
 LONGEST_S = 60.0
 """Games last as long as the table looks ahead, but no longer."""
 MANNERS = (GREEDY, LEAD, PURE)
@@ -48,8 +57,10 @@ class PlayedSet:
         other_mps: the opponent's speed, m/s.
         heading_deg: heading of the opponent relative to the own one, deg; 180 is head-on.
         reach_m2: positions of the opponent whose value is below the radius, m^2: all count as lost.
-        lost_m2: others from which some opponent reached the shielded boat, m^2.
-        played: positions that were played, each against every opponent with every want.
+        lost_m2: positions of a value up to `BAND_M` above it from which some opponent reached the shielded boat, m^2.
+        played: how many of those were played, each against every opponent with every want.
+        tried: positions of higher values that were played.
+        tried_lost: those of them from which an opponent reached the boat.
     """
 
     own_mps: float
@@ -58,10 +69,12 @@ class PlayedSet:
     reach_m2: float
     lost_m2: float
     played: int
+    tried: int
+    tried_lost: int
 
     @property
     def ratio(self) -> float:
-        """Both together, times the reachability set."""
+        """The reachability set and what is lost beside it, times the former."""
         return (self.reach_m2 + self.lost_m2) / self.reach_m2
 
 
@@ -90,15 +103,20 @@ def play_set(task: Task) -> PlayedSet:
     config = ShieldConfig.of(separation_m=task.radius_m, **dict(task.settings))
     state, cells_m2 = _positions(values, task)
     value_m = values_m(values, state)
-    reach = value_m < task.radius_m
-    weight = np.where(value_m < task.radius_m + BAND_M, 1.0, 0.0)
-    beyond = np.flatnonzero(weight == 0.0)[::BEYOND]
-    weight[beyond] = BEYOND
-    chosen = np.flatnonzero(~reach & (weight > 0.0))
-    lost = games_lost(values, config, state[chosen], task.radius_m, min(LONGEST_S, values.card.horizon_s))
-    lost_m2 = float((cells_m2 * weight)[chosen][lost].sum())
-    reach_m2 = math.pi * task.radius_m**2 + float(cells_m2[reach].sum())
-    return PlayedSet(task.own_mps, task.other_mps, task.heading_deg, reach_m2, lost_m2, len(chosen))
+    reach, band = value_m < task.radius_m, value_m < task.radius_m + BAND_M
+    beside, beyond = np.flatnonzero(band & ~reach), np.flatnonzero(~band)[::BEYOND]
+    chosen, run_s = np.concatenate([beside, beyond]), min(LONGEST_S, values.card.horizon_s)
+    lost = games_lost(values, config, state[chosen], task.radius_m, run_s)
+    return PlayedSet(
+        own_mps=task.own_mps,
+        other_mps=task.other_mps,
+        heading_deg=task.heading_deg,
+        reach_m2=math.pi * task.radius_m**2 + float(cells_m2[reach].sum()),
+        lost_m2=float(cells_m2[beside][lost[: len(beside)]].sum()),
+        played=len(beside),
+        tried=len(beyond),
+        tried_lost=int(lost[len(beside) :].sum()),
+    )
 
 
 def _positions(values: ValueTable, task: Task) -> tuple[Array, Array]:
@@ -167,6 +185,18 @@ def move(
         step_boat(params[0], own, sent[b, 0, 0], sent[b, 0, 1], SUB_STEP_S)
         steer(params[1], other, rudder)
         reached[b] = math.hypot(other[L.X] - own[L.X], other[L.Y] - own[L.Y]) < radius_m
+
+
+def check_settings(settings: Mapping[str, Any]) -> None:
+    """Refuse settings of `REFUSED`, and those the shield does.
+
+    Raises:
+        ConfigError: one of them.
+    """
+    for name, why in REFUSED.items():
+        if name in settings:
+            raise ConfigError(f"{name} cannot be set here: {why}")
+    ShieldConfig.of(**settings)
 
 
 def tasks_of(

@@ -30,13 +30,14 @@ class ShieldConfig:
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         fixed_response_per_s: the same of margins from the edge, obstacles and circles.
-        give_way_after_s: time a team-mate alongside may keep a boat from turning where it wants before one of the
-            two gives way, s; inf never.
+        give_way_after_s: time a boat alongside may keep one from turning where it wants before one of the two gives
+            way, s; opponents that hold their course are given way to; inf never.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
             near, m, at most 50.
-        mate_cap_m: the same of margins from team-mates that one program decides for (coordination "team"): their
-            escapes are known.
+        mate_cap_m: the same of margins from team-mates whose escapes are known: one program decides for all
+            (coordination "team"), positions are exact, commands act at once and no current is feared; and opponents
+            are feared (as hunters or by tables), whose own margins are kept beside. Else `margin_cap_m` holds for them.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of

@@ -19,7 +19,7 @@ from .memory import Memory
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan, unchanged
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
-from .right_of_way import note_pressing
+from .right_of_way import forget_pressing, note_pressing
 from .scene import Boats, Scene, Tuning
 from .screening import lost, screen
 from .work import Work
@@ -49,6 +49,7 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
         if not ours[i]:
             memory.kept[i] = False
             memory.escaping[i] = False
+            forget_pressing(i, memory)
             continue
         memory.kept[i] = True
         memory.side[i] = work.plan[i, 0]

@@ -231,7 +231,7 @@ def _none_worse_off(ours: BoolArray, work: Work, plan: Plan) -> bool:
     """Whether every boat of ours had as much by the program's answer, ``plan.merit``, as it has now."""
     worse = False
     for i in range(ours.shape[0]):
-        worse = worse or (ours[i] and plan.merit[i] < work.merit[i] - WORSE_BY_FIXED)
+        worse = worse or (ours[i] and plan.merit[i] < min(work.merit[i], PAIR_SAFE) - WORSE_BY_FIXED)
     return not worse
 
 

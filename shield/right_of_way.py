@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from .certificates.rating import FIXED_THING
 from .jit import Array, BoolArray, lean_kernel
 from .memory import Memory
 from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan, unchanged
@@ -30,6 +31,8 @@ LOOKED_UP_M = 6.0
 """How much more it is of an opponent that is looked up: tables let none come nearer than about so much."""
 STEADY_DEG = 10.0
 """An opponent whose heading has changed by no more since a boat began to press holds its course."""
+PACE_SHARE = 0.25
+"""An opponent slower or faster by more, as a share of top speed, is passed or passes: that ends by itself."""
 ALIKE_DEG = 45.0
 """Courses that differ by no more are all but the same."""
 PRESSING_DEG = 15.0
@@ -63,6 +66,12 @@ def _kept_m(i: int, j: int, ours: BoolArray, boats: Boats, work: Work) -> float:
 def _steady(i: int, j: int, state: Array, ours: BoolArray, memory: Memory) -> bool:
     """Whether boat j is ours, or has held its course since boat i began to press."""
     return ours[j] or abs(wrap_degrees(state[j, L.HEADING] - memory.blocked_deg[i])) <= STEADY_DEG
+
+
+@lean_kernel
+def _keeps_pace(i: int, j: int, state: Array, ours: BoolArray, boats: Boats) -> bool:
+    """Whether boat j is ours, or about as fast as boat i."""
+    return ours[j] or abs(state[j, L.SPEED] - state[i, L.SPEED]) <= PACE_SHARE * boats.params[i, L.MAX_SPEED]
 
 
 @lean_kernel
@@ -117,7 +126,8 @@ def _who_blocks(
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
     j = _alongside(i, turn_deg, speed_mps, state, ours, boats, work)
-    return j if j >= 0 and _steady(i, j, state, ours, memory) else -1
+    stays = j >= 0 and _steady(i, j, state, ours, memory) and _keeps_pace(i, j, state, ours, boats)
+    return j if stays else -1
 
 
 @lean_kernel
@@ -162,7 +172,7 @@ def _press(
     memory.blocked_by[i] = j
     if j < 0:
         return
-    if memory.gives_way[j] != 0.0 and memory.blocked_by[j] == i:
+    if ours[j] and memory.gives_way[j] != 0.0 and memory.blocked_by[j] == i:
         return
     memory.pressed_s[i] += tuning.dt_s
     patience = PATIENCE if ours[j] and _stands_on(i, j, state) else 1.0
@@ -189,10 +199,21 @@ def apply_right_of_way(
 
 
 @lean_kernel
+def forget_pressing(i: int, memory: Memory) -> None:
+    """Boat i is kept from turning by nobody, and gives way to nobody."""
+    memory.gives_way[i], memory.pressed_s[i], memory.blocked_by[i] = 0.0, 0.0, -1
+
+
+@lean_kernel
 def note_pressing(
     i: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work, plan: Plan
 ) -> None:
-    """Note since when, on what headings, boat i is kept from turning: its turn towards another was changed."""
+    """Note since when, on what headings, boat i is kept from turning: its turn towards another was changed.
+
+    No boat gives way to an opponent into an edge or an obstacle: turned back from there it only loses its speed.
+    """
+    if plan.cause[i] == FIXED_THING and memory.gives_way[i] != 0.0 and not ours[memory.blocked_by[i]]:
+        forget_pressing(i, memory)
     if plan.reason[i] == RIGHT_OF_WAY:
         work.bound[i], memory.free_s[i] = memory.blocked_by[i], 0.0
         return
@@ -201,8 +222,7 @@ def note_pressing(
     if plan.reason[i] < QP or plan.reason[i] > BEST_EFFORT or j < 0 or unchanged(i, plan):
         return
     turn_deg, speed_mps = wrap_degrees(plan.kept_commands[i, 1]), plan.kept_commands[i, 0]
-    j = _alongside(i, turn_deg, speed_mps, state, ours, boats, work)
-    if j < 0:
+    if _alongside(i, turn_deg, speed_mps, state, ours, boats, work) != j:
         return
     memory.free_s[i] = 0.0
     if memory.pressed_s[i] == 0.0:

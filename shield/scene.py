@@ -121,7 +121,7 @@ class Tuning(NamedTuple):
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
         mate_cap_m: margins from team-mates above this may shrink freely, m.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
-        give_way_after_s: time a boat is kept from turning by a team-mate alongside before one of them gives way, s.
+        give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
     """
 
     dt_s: float

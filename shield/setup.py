@@ -59,11 +59,21 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             hysteresis_m=config.hysteresis_m,
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
-            mate_cap_m=config.mate_cap_m if config.coordination == "team" else config.margin_cap_m,
+            mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
             fixed_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
         )
     )
+
+
+def _mates_are_known(config: ShieldConfig) -> bool:
+    """Whether what team-mates will do is known: one program decides for all, and sees and steers them as they are.
+
+    Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
+    """
+    exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
+    feared = CERTIFICATES[config.certificate].hunters and config.opponent_share > 0.0
+    return config.coordination == "team" and exact and feared
 
 
 def plans_of(config: ShieldConfig) -> Array:

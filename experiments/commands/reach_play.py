@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import load_table
 from steerclear.shield.tables.make import check_radii
 from steerclear.shield.tables.settings import problem_of
 
-from ..played_sets import PlayedSet, Task, play_set, tasks_of
+from ..played_sets import PlayedSet, Task, check_settings, play_set, tasks_of
 from ..played_sets_page import HEADS, content_of, rows_of
 from ..pool import check_jobs, run_all
 from ..store import ResultStore, key_of, write_json
@@ -40,15 +39,14 @@ def play(
 ) -> None:
     """Play from positions all round the reachability set and beyond, and tell from which the shield saves no boat.
 
-    Exit status: 0 that set and the reachability set together are nowhere more than 1.15 times as large as the latter,
-    1 somewhere they are, 2 bad input, 130 interrupted.
+    Exit status: 0 what is lost and the reachability set together are nowhere more than 1.15 times as large as the
+    latter, and from no position tried beyond a boat was reached; 1 somewhere they are, or one was; 2 bad input, 130
+    interrupted.
     """
     values, started = load_table(own, other, "worst-case"), time.perf_counter()
     check_radii(problem_of(own, other), (radius,))
     given = o.key_values(shield_set, "--shield-set")
-    if "separation_m" in given:
-        raise ConfigError("separation_m cannot be set here: both sets are of the radius given with --radius")
-    ShieldConfig.of(separation_m=radius, **given)
+    check_settings(given)
     tasks = tasks_of(own, other, radius, given, places(values))
     store = ResultStore(out_folder or Path("results") / f"reach_play_{own}_{other}_{radius:g}", resume)
     sets = _played(tasks, store, check_jobs(jobs))

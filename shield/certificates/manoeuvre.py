@@ -220,21 +220,28 @@ def worst_clearance(
 ) -> None:
     """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses.
 
-    ``work.short[slot]`` says whether one of them is below what must be kept.
+    ``work.short[slot]`` says whether one of them is below what must be kept; then the one that is so by most binds,
+    of margins below 0 the least.
     """
     clear = work.clear[slot]
     clear[MARGIN] = FAR
     work.bound[slot] = -1
     work.short[slot] = False
+    shortest_m = 0.0
     for j in range(state.shape[0]):
         if j == i or not work.near[i, j]:
             continue
         least_m = must_keep(i, j, ours, work)
         enough_m = max(least_m + ROUNDING_M, min(clear[MARGIN], tuning.margin_cap_m))
         clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, enough_m)
-        work.short[slot] = work.short[slot] or work.out[MARGIN] < least_m
+        lacks_m = work.out[MARGIN] - least_m
+        if lacks_m < shortest_m:
+            work.short[slot], shortest_m = True, lacks_m
+            if clear[MARGIN] >= 0.0:
+                work.bound[slot] = j
         if work.out[MARGIN] < clear[MARGIN]:
             copy_row(clear, work.out)
-            work.bound[slot] = j
+            if not work.short[slot] or clear[MARGIN] < 0.0:
+                work.bound[slot] = j
             if clear[MARGIN] < floor_m:
                 return

@@ -74,12 +74,28 @@ def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, monkeypa
     assert (one.lost_m2, one.ratio) == (0.0, 1.0)
 
 
-def test_positions_that_are_not_all_played_count_for_those_they_stand_for(heron, few, monkeypatch):
+@pytest.mark.parametrize("sector", range(6))
+def test_positions_beyond_are_tried_on_all_bearings(heron, monkeypatch, sector):
+    """Lost in a sixth of all bearings: about a sixth of those tried must say so."""
+
+    def in_sector(values, config, start, *_):
+        bearing = np.arctan2(start[:, 1, L.X], start[:, 1, L.Y]) % (2.0 * math.pi)
+        return (bearing * 3.0 / math.pi).astype(int) == sector
+
+    monkeypatch.setattr(played_sets, "games_lost", in_sector)
+    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    assert one.tried > 50
+    assert one.tried_lost / one.tried == pytest.approx(1.0 / 6.0, abs=0.06)
+
+
+def test_all_that_is_lost_beside_the_reachability_set_counts_by_its_area(heron, few, monkeypatch):
+    monkeypatch.setattr(played_sets, "RINGS", 200)
+    monkeypatch.setattr(played_sets, "BEARINGS", 72)
     monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.ones(len(start), bool))
     one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
-    whole = math.pi * heron.card.make_grid().rho_last_m ** 2
-    assert one.reach_m2 + one.lost_m2 == pytest.approx(whole, rel=0.25)
-    assert one.played < played_sets.RINGS * played_sets.BEARINGS / 2
+    wider = area_m2(heron, RADIUS_M + played_sets.BAND_M, *HEAD_ON)
+    assert one.reach_m2 + one.lost_m2 == pytest.approx(wider, rel=0.03)
+    assert one.tried_lost == one.tried > 0
 
 
 def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few):
@@ -107,6 +123,9 @@ def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few
     ("arguments", "said"),
     [
         (["--shield-set", "separation_m=2"], "--radius"),
+        (["--shield-set", "dt_s=0.5"], "dt_s cannot be set here"),
+        (["--shield-set", "delay_s=0.5"], "delay_s cannot be set here"),
+        (["--shield-set", "coordination=per_boat"], "coordination cannot be set here"),
         (["--shield-set", "tail=1"], "did you mean 'tail_s'"),
         (["--radius", "9"], "choose one within"),
         (["--jobs", "0"], "at least 1"),
@@ -119,7 +138,11 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, arguments, said):
 
 
 def test_the_worst_row_is_judged():
-    fine, large = (PlayedSet(2.0, 2.0, 0.0, 30.0, lost, 100) for lost in (1.0, 6.0))
-    assert [bar["met"] for bar in bars_of([fine])] == [True]
-    assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR)]
-    assert dict(zip(HEADS, rows_of([large])[0], strict=True))["ratio"] == "1.20"
+    fine, large, beyond = (
+        PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
+    )
+    assert [bar["met"] for bar in bars_of([fine])] == [True, True]
+    assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
+    assert [bar["met"] for bar in bars_of([fine, beyond])] == [True, False]
+    row = dict(zip(HEADS, rows_of([large])[0], strict=True))
+    assert (row["ratio"], row["beyond: lost of tried"]) == ("1.20", "0 of 50")

@@ -121,3 +121,56 @@ def test_batches_give_way_as_single_shields_do():
     )
     np.testing.assert_array_equal(games.reason[:, 0, 0], single.reason[:, 0])
     np.testing.assert_allclose(games.position[:, 0], single.position, atol=1e-6)
+
+
+def test_a_boat_that_is_handed_over_while_it_gives_way_holds_nobody_up():
+    """Two press on each other; the one that gives way is then steered by hand, straight on."""
+    shield = Shield()
+    both = fleet_of([(0.0, 0.0, 0.0, 2.0), (2.7, 0.0, 0.0, 2.0)], [0, 0], "heron")
+    state, given = both.state.copy(), None
+    fill(state, packed(both.platforms))
+    ruled = []
+    for step in range(500):
+        by_hand = given is not None
+        controlled = np.array([not by_hand, True])
+        now = Fleet(state, both.team, both.platforms, controlled, both.names)
+        turns = np.array([0.0 if by_hand else 90.0, -90.0]) - state[:, L.HEADING]
+        wanted = np.stack([np.full(2, 2.0), (turns + 180.0) % 360.0 - 180.0], axis=-1)
+        decisions = shield.decide(now, Commands.relative_deg(wanted))
+        if given is None and decisions.reason[0] == Reason.RIGHT_OF_WAY:
+            given = step
+        if by_hand:
+            ruled.append(decisions.reason[1])
+        step_all(packed(both.platforms), state[None], decisions.sent.values[None], 0.1)
+        gap = np.hypot(*(state[0, :2] - state[1, :2]))
+        assert gap >= 2.5
+    assert given is not None
+    assert (np.array(ruled) != Reason.PASSED).mean() < 0.5
+    assert state[1, L.X] < state[0, L.X] - 2.5, "it got to the side where it wanted"
+
+
+def test_an_opponent_that_is_overtaken_is_not_given_way_to():
+    """The boat passes a slower one alongside, and its goal is ahead of that: this ends by itself."""
+    fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 15.0, 0.0, 0.8)], [0, 1], "heron")
+
+    def wanted(step, state):
+        error = np.degrees(np.arctan2(-state[0, L.X], 60.0 - state[0, L.Y])) - state[0, L.HEADING]
+        return np.array([(2.0, (error + 180.0) % 360.0 - 180.0), (0.8, 0.0)])
+
+    run = sail(Shield(), fleet, wanted, 350)
+    assert (run.reason[:, 0] == Reason.QP).any()
+    assert not (run.reason[:, 0] == Reason.RIGHT_OF_WAY).any()
+    assert run.position[:, 0, 1].max() > 57.0
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"opponent_share": 0.0}],
+)
+def test_where_nothing_is_exact_or_feared_team_mates_are_as_others(settings):
+    runs = []
+    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
+        config = ShieldConfig(mate_cap_m=cap_m, **settings)
+        fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
+        runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 150))
+    np.testing.assert_array_equal(runs[0].sent, runs[1].sent)

@@ -139,7 +139,7 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
     size = json.loads(message["field_size_m"])
     frame = json.loads(message["frame"])
     return {
-        "config": ShieldConfig.of(**restored(json.loads(message["shield"]))),
+        "config": ShieldConfig.of(**_settings(restored(json.loads(message["shield"])))),
         "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
         "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
         "boats": tuple(LoggedBoat(**row) for row in json.loads(message["boats"])),
@@ -156,6 +156,11 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
         "sources": str(message["sources"]),
         "machine": str(message["machine"]),
     }
+
+
+def _settings(told: dict[str, Any]) -> dict[str, Any]:
+    """Settings of the shield of a log; in those that do not know `mate_cap_m` team-mates' margins had the one cap."""
+    return {"mate_cap_m": told.get("margin_cap_m", ShieldConfig.margin_cap_m), **told}
 
 
 def platform_to_text(kind: Platform) -> str:
