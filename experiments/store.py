@@ -16,6 +16,7 @@ from typing import Any
 from steerclear.shield.exceptions import ConfigError
 
 LINES_FILE = "games.jsonl"
+RESULTS_FILE = "results.json"
 logger = logging.getLogger(__name__)
 
 
@@ -25,18 +26,23 @@ class ResultStore:
     Args:
         folder: created when missing.
         resume: read what an earlier run left there instead of refusing to write beside it.
+        command: whose results these are, as its results file says; those of another are not gone on with.
 
     Raises:
-        ConfigError: the folder already holds results and ``resume`` is off, or it cannot be written to.
+        ConfigError: the folder already holds results and ``resume`` is off, or others with it, or it cannot be written
+            to.
     """
 
-    def __init__(self, folder: Path, resume: bool = False) -> None:
+    def __init__(self, folder: Path, resume: bool = False, command: str | None = None) -> None:
         self.folder = folder
         self.lines = folder / LINES_FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if self.lines.exists() and not resume:
+            holds = self.lines.exists() and (not self.lines.is_file() or self.lines.stat().st_size > 0)
+            if not resume and (holds or (folder / RESULTS_FILE).exists()):
                 raise ConfigError(f"{folder} already holds results; add --resume to continue or choose another --out")
+            if resume and command is not None:
+                _check_whose(folder / RESULTS_FILE, command)
             self.lines.touch()
         except OSError as error:
             raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
@@ -68,6 +74,23 @@ class ResultStore:
             except (json.JSONDecodeError, KeyError, AttributeError):
                 logger.warning("%s line %d is not complete and is left out", self.lines, number)
         return found
+
+
+def _check_whose(results: Path, command: str) -> None:
+    """Refuse to go on in a folder whose results are another command's, or nobody's.
+
+    Raises:
+        ConfigError: they are.
+    """
+    if not results.exists():
+        return
+    try:
+        found = json.loads(results.read_text()).get("command")
+    except (OSError, ValueError, AttributeError):
+        found = None
+    if found != command:
+        whose = f"of {found!r}" if isinstance(found, str) else "that are not ours"
+        raise ConfigError(f"{results.parent} holds results {whose}, not of {command!r}; choose another --out")
 
 
 def cut_unfinished_line(file: Any) -> None:

@@ -72,7 +72,7 @@ def _run(searches: list[Search], folder: Path | None, workers: int | None, resum
     if resume and folder is None:
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder("attack")
-    processes, store, started = check_jobs(workers), ResultStore(folder, resume), time.perf_counter()
+    processes, store, started = check_jobs(workers), ResultStore(folder, resume, "attack"), time.perf_counter()
     try:
         with progress("searches", len(searches)) as notice:
             failed = run_searches(searches, store, processes, notice)

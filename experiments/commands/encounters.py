@@ -150,7 +150,7 @@ def _run(settings: Settings, folder: Path | None, workers: int | None, resume: b
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder("encounters")
     processes = check_jobs(workers)
-    campaign = Campaign(settings, ResultStore(folder, resume), processes)
+    campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), processes)
     started = time.perf_counter()
     try:
         with progress("encounters", campaign.encounters) as notice:

@@ -76,7 +76,7 @@ def run_games(
     if resume and folder is None:
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder(command)
-    campaign = Campaign(settings.specs(), ResultStore(folder, resume), processes)
+    campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), processes)
     if resume:
         warn(campaign.words_of_before)
     started = time.perf_counter()

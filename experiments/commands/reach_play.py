@@ -39,6 +39,8 @@ def play(
 ) -> None:
     """Play from positions all round the reachability set and beyond, and tell from which the shield saves no boat.
 
+    Each of 15 pairs of speed and heading takes one to a few minutes on a core; what is finished is kept.
+
     Exit status: 0 what is lost and the reachability set together are nowhere more than 1.15 times as large as the
     latter, and from no position tried beyond a boat was reached; 1 somewhere they are, or one was; 2 bad input, 130
     interrupted.
@@ -48,8 +50,10 @@ def play(
     given = o.key_values(shield_set, "--shield-set")
     check_settings(given)
     tasks = tasks_of(own, other, radius, given, places(values))
-    store = ResultStore(out_folder or Path("results") / f"reach_play_{own}_{other}_{radius:g}", resume)
-    sets = _played(tasks, store, check_jobs(jobs))
+    processes = check_jobs(jobs)
+    folder = out_folder or Path("results") / f"reach_play_{own}_{other}_{radius:g}"
+    store = ResultStore(folder, resume, "reach-play")
+    sets = _played(tasks, store, processes)
     settings = {"own": own, "other": other, "radius_m": radius, "shield": given}
     content = content_of(settings, sets, time.perf_counter() - started)
     out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(sets)))

@@ -44,6 +44,21 @@ def test_results_that_are_no_text_are_one_clear_error(tmp_path):
         ResultStore(tmp_path, resume=True).load()
 
 
+def test_a_folder_that_holds_something_else_is_neither_begun_nor_gone_on_with(tmp_path):
+    (tmp_path / "games.jsonl").touch()
+    ResultStore(tmp_path)  # an empty file is nothing to lose
+    (tmp_path / "results.json").write_text('{"my": "results"}')
+    with pytest.raises(ConfigError, match="already holds results"):
+        ResultStore(tmp_path)
+    with pytest.raises(ConfigError, match="that are not ours, not of 'encounters'; choose another --out"):
+        ResultStore(tmp_path, True, "encounters")
+    (tmp_path / "results.json").write_text('{"command": "ablate"}')
+    with pytest.raises(ConfigError, match="holds results of 'ablate', not of 'encounters'"):
+        ResultStore(tmp_path, True, "encounters")
+    ResultStore(tmp_path, True, "ablate")
+    assert (tmp_path / "results.json").read_text() == '{"command": "ablate"}'
+
+
 def test_an_unwritable_folder_is_one_clear_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="choose another --out"):
