@@ -26,7 +26,7 @@ from steerclear.shield.tables.moves import SUB_STEP_S, sub_steps
 from .jit import kernel
 from .unsafe_sets import values_m
 
-RINGS, BEARINGS = 200, 48
+RINGS, BEARINGS = 150, 36
 BAND_M = 1.0
 """Every position is played whose value is between the radius and this much more; below nobody can save the boat."""
 BEYOND = 79
@@ -39,7 +39,7 @@ REFUSED = {
     "coordination": "games are played in batches, which decide for whole teams",
 }
 """Settings under which the games would be about something else, and why."""
-LONGEST_S = 60.0
+LONGEST_S = 45.0
 """Games last as long as the table looks ahead, but no longer."""
 MANNERS = (GREEDY, LEAD, PURE)
 """What the opponent does: what the table calls worst, steer for the meeting point, steer at the boat."""
