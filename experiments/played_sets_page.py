@@ -11,15 +11,7 @@ from .played_sets import BAND_M, BEYOND, LONGEST_S, PlayedSet
 from .provenance import machine, versions
 from .unsafe_sets import RATIO_BAR
 
-HEADS = (
-    "own/other m/s",
-    "heading",
-    "reachability, m²",
-    "lost beside it, m²",
-    "ratio",
-    "played",
-    "beyond: lost of tried",
-)
+HEADS = ("own/other", "heading", "reach, m²", "lost, m²", "ratio", "played", "lost beyond")
 TITLE = "# Sets from which the shield does not save a boat"
 WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield *promises*.
 Every position of the opponent whose worst-case value is below the radius counts as lost, as nobody can save the boat
@@ -28,7 +20,8 @@ of those beyond, on all bearings, is tried. The boat's policy wants straight on 
 opponent; the opponent does what the table calls worst, steers for the meeting point, or at the boat. A position is lost
 when the boats come within the radius in any of these six games, looked at every 0.1 s, which last as long as the table
 looks ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the heading is the opponent's relative to the own
-one, 180° is head-on. The bars: {RATIO_BAR:g} times the reachability set's area, in every row, and none lost beyond."""
+one, 180° is head-on. *Reach* is the reachability set, *lost* what is lost of the positions *played* beside it, *lost
+beyond* how many of those tried beyond. The bars: {RATIO_BAR:g} times the reachability set's area, in every row, and none lost beyond."""
 
 
 def rows_of(sets: Sequence[PlayedSet]) -> list[list[str]]:

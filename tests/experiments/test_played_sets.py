@@ -145,4 +145,4 @@ def test_the_worst_row_is_judged():
     assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
     assert [bar["met"] for bar in bars_of([fine, beyond])] == [True, False]
     row = dict(zip(HEADS, rows_of([large])[0], strict=True))
-    assert (row["ratio"], row["beyond: lost of tried"]) == ("1.20", "0 of 50")
+    assert (row["ratio"], row["lost beyond"]) == ("1.20", "0 of 50")
