@@ -21,7 +21,7 @@ opponent; the opponent does what the table calls worst, steers for the meeting p
 when the boats come within the radius in any of these six games, looked at every 0.1 s, which last as long as the table
 looks ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the heading is the opponent's relative to the own
 one, 180° is head-on. *Reach* is the reachability set, *lost* what is lost of the positions *played* beside it, *lost
-beyond* how many of those tried beyond. The bars: {RATIO_BAR:g} times the reachability set's area, in every row, and none
+beyond* how many of those tried beyond. The bars: {RATIO_BAR:g} times the reachability set's area in every row, and none
 lost beyond."""
 
 
