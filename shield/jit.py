@@ -18,16 +18,22 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+COMPILE_NOTHING = ("shield/bridge", "shield/wrappers", "env/render", "policies/submissions")
+"""Folders that hold no compiled function, nor anything that one uses: changes there leave machine code as it is."""
+
+
 @cache
 def _tree_stamp() -> tuple[str, int]:
-    """Stamp of all sources that may be compiled into one another; the bridge to boats compiles nothing."""
-    here = Path(__file__).parent
-    folders = (here, here.parent / "env", here.parent / "policies")
-    files = sorted(path for folder in folders for path in folder.rglob("*.py") if here / "bridge" not in path.parents)
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(str(path).encode() + path.read_bytes())
-    return digest.hexdigest(), len(files)
+    """Stamp of all sources that may be compiled into one another, wherever they lie."""
+    root = Path(__file__).parent.parent
+    digest, files = hashlib.sha256(), 0
+    for folder in ("shield", "env", "policies"):
+        for path in sorted((root / folder).rglob("*.py")):
+            name = path.relative_to(root).as_posix()
+            if not name.startswith(COMPILE_NOTHING):
+                digest.update(name.encode() + path.read_bytes())
+                files += 1
+    return digest.hexdigest(), files
 
 
 def kernel(function: F) -> F:

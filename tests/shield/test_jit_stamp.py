@@ -1,20 +1,34 @@
 import re
 from pathlib import Path
 
+import pytest
 import steerclear.shield
-from steerclear.shield.jit import _tree_stamp
+from steerclear.shield.jit import COMPILE_NOTHING, _tree_stamp
+
+ROOT = Path(steerclear.shield.__file__).parent.parent
+SOURCES = sorted(path for name in ("shield", "env", "policies") for path in (ROOT / name).rglob("*.py"))
+COMPILES = re.compile(r"^@\w*kernel\b|import njit|jit import .*kernel\b", re.MULTILINE)
 
 
-def test_the_bridge_compiles_nothing():
-    """Its sources are left out of the stamp of compiled code, so none of them may come into it."""
-    for path in (Path(steerclear.shield.__file__).parent / "bridge").rglob("*.py"):
-        text = path.read_text()
-        assert "import njit" not in text, path
-        assert not re.search(r"^@\w*kernel\b", text, re.MULTILINE), path
-        assert not re.search(r"jit import .*kernel\b", text), path
+def _left_out(path):
+    return path.relative_to(ROOT).as_posix().startswith(COMPILE_NOTHING)
+
+
+@pytest.mark.parametrize("folder", COMPILE_NOTHING)
+def test_folders_left_out_compile_nothing(folder):
+    """Their sources are left out of the stamp of compiled code, so none of them may come into it."""
+    assert (ROOT / folder).is_dir()
+    for path in (ROOT / folder).rglob("*.py"):
+        assert not COMPILES.search(path.read_text()), path
+
+
+def test_nothing_that_compiles_uses_a_folder_left_out():
+    names = "|".join(folder.rpartition("/")[2] for folder in COMPILE_NOTHING)
+    uses = re.compile(rf"^from [\w.]*\b(?:{names})\b", re.MULTILINE)  # imports within functions compile nothing
+    for path in SOURCES:
+        if not _left_out(path) and COMPILES.search(path.read_text()):
+            assert not uses.search(path.read_text()), path
 
 
 def test_the_stamp_is_of_all_other_sources():
-    here = Path(steerclear.shield.__file__).parent
-    files = [path for name in ("shield", "env", "policies") for path in (here.parent / name).rglob("*.py")]
-    assert _tree_stamp()[1] == sum("bridge" not in path.relative_to(here.parent).parts for path in files)
+    assert _tree_stamp()[1] == sum(not _left_out(path) for path in SOURCES)
