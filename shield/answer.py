@@ -44,6 +44,7 @@ class Answer:
         self.margin = np.empty(n)
         read_margins(state, work, self.reason, self.margin)
         self.bound = work.bound[:n].copy()
+        self.cut_short: BoolArray = np.asarray(work.cut_short[0] & (self.reason != NOT_COVERED), dtype=np.bool_)
 
     @classmethod
     def empty(cls, n: int) -> Answer:
@@ -52,12 +53,14 @@ class Answer:
         answer.commands, answer.slack = np.zeros((n, 2)), np.zeros(n)
         answer.reason, answer.bound = np.full(n, NOT_COVERED), np.full(n, -1)
         answer.margin = np.full(n, np.inf)
+        answer.cut_short = np.zeros(n, np.bool_)
         return answer
 
     def take(self, i: int, plan: Plan, work: Work, state: Array) -> None:
         """Take boat i's row of another decider's answer."""
         self.commands[i], self.reason[i], self.slack[i] = plan.commands[i], plan.reason[i], plan.slack_m[i]
         self.margin[i], self.bound[i] = told_margin(i, state, work), work.bound[i]
+        self.cut_short[i] = work.cut_short[0]
 
 
 def to_send(

@@ -39,6 +39,7 @@ def decide_games(
     sent: Array,
     reason: IntArray,
     clearance_m: Array,
+    cut_short: BoolArray,
 ) -> None:
     """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
 
@@ -60,6 +61,7 @@ def decide_games(
         take_memory(memory, b, scene.memory)
         decide_compiled(scene, ahead, asked, margin_m, ours[b])
         put_memory(scene.memory, b, memory)
+        cut_short[b] = work.cut_short[0]
         for i in range(n):
             sent[b, i] = wanted[b, i]
             if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
@@ -126,6 +128,7 @@ class BatchedShield:
         self.reason = np.zeros((games, n), np.int64)
         self.certificate_m = np.full((games, n), np.inf)
         self.sent = np.zeros((games, n, 2))
+        self.cut_short = np.zeros(games, np.bool_)
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the escapes of the games in ``mask`` (B,), or of all."""
@@ -145,7 +148,8 @@ class BatchedShield:
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
-            array is reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why.
+            array is reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why, ``cut_short`` (B,)
+            which decisions were ended by `ShieldConfig.search_limit`.
 
         Raises:
             FleetError: an array has the wrong shape or a state is not finite.
@@ -173,6 +177,7 @@ class BatchedShield:
             self.sent,
             self.reason,
             self.certificate_m,
+            self.cut_short,
         )
         return self.sent
 

@@ -44,6 +44,10 @@ class ShieldConfig:
             gaining top speed again, at most 60 s, and for those no faster than the boat at least 30 s; never less than
             the escape takes. For a boat that lacks thrust the time until it is back comes on top. Less asks for fewer
             interventions and promises less, also near in time: hunters lead the boat by a share of it.
+        search_limit: what a decision may cost before it searches no further, in clearances of one path from one boat,
+            0.2 to 1 microsecond each; it then sends the best that it has verified and says so
+            (`Decision.cut_short`). Counted in work, so that the same inputs give the same bits on any machine; at least
+            1000, which lets six boats look at every manoeuvre; inf: no limit.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
         position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
@@ -77,6 +81,7 @@ class ShieldConfig:
     tail_s: float = 5.0
     horizon_s: float | None = None
     hunt_s: float | None = None
+    search_limit: float = 200_000.0
     hysteresis_m: float = 0.3
     speed_weight: float = 0.1
     position_error_m: float = 0.0
@@ -122,7 +127,7 @@ class ShieldConfig:
 
 _TEXTS = {"certificate", "coordination", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
-_POSITIVE = _RATES | {"give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
+_POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
     "mate_cap_m": (0.0, 50.0),
@@ -131,11 +136,12 @@ _RANGES = {
     "hunt_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
     "delay_s": (0.0, 10.0),
+    "search_limit": (1e3, math.inf),
 }
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = _RATES | {"max_track_age_s", "give_way_after_s"}
+_MAY_BE_INFINITE = _RATES | {"max_track_age_s", "give_way_after_s", "search_limit"}
 
 
 def _check_number(name: str, value: object) -> None:

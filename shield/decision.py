@@ -60,6 +60,8 @@ class Decision:
         no_table: names of the opponents that a value table should answer for and none does: they are run through as
             hunters instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
             decisions read from a black box.
+        cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
+            the best that was verified until then.
     """
 
     boat: str
@@ -75,6 +77,7 @@ class Decision:
     fallback: str | None
     solve_time_s: float
     no_table: tuple[str, ...] | None = None
+    cut_short: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ class Decisions(Sequence[Decision]):
         bound: (n,) index of the binding neighbour, -1 none, -2 fixed things.
         solve_time_s: time of the whole decision, s.
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
+        cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
     """
 
     fleet: Fleet
@@ -103,6 +107,7 @@ class Decisions(Sequence[Decision]):
     bound: IntArray
     solve_time_s: float
     no_table: BoolArray | None = None
+    cut_short: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -141,6 +146,7 @@ class Decisions(Sequence[Decision]):
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,
             no_table=self._no_table(i),
+            cut_short=self.cut_short is not None and bool(self.cut_short[i]),
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:

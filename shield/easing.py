@@ -6,6 +6,7 @@ the program, which are linear, then find no answer, and a boat that wants throug
 
 from __future__ import annotations
 
+from .certificates.effort import all_spent
 from .certificates.rating import PAIR_SAFE, worst_merit
 from .jit import Array, BoolArray, lean_kernel
 from .linearised import check
@@ -115,6 +116,8 @@ def ease(
     for i in range(ours.shape[0]):
         plan.eased[i, 2] = work.merit[i]
     for m in range(count):
+        if all_spent(tuning, work):
+            return
         i = plan.movers[m]
         plan.eased[i, 0] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
         plan.eased[i, 1] = plan.commands[i, 0]

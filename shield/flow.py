@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from .certificates.clearance import MARGIN
+from .certificates.effort import all_spent
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
@@ -112,7 +113,12 @@ def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: Bool
 
 @lean_kernel
 def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
-    """Rows about the candidate commands: how many boats take part, and how many rows, -1 when there are too many."""
+    """Rows about the candidate commands: how many boats take part, and how many rows.
+
+    -1 when there are too many, or the decision has cost its limit.
+    """
+    if all_spent(scene.tuning, scene.work):
+        return 0, -1
     count = pick_movers(ours, scene.work, scene.plan)
     return count, build(count, state, ours, scene.boats, scene.fixed, scene.tuning, scene.work, scene.plan)
 

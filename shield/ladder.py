@@ -9,6 +9,7 @@ import numpy as np
 from .certificates.assign import assign_plans, hold
 from .certificates.candidates import candidate, remembered
 from .certificates.clearance import MARGIN
+from .certificates.effort import all_spent
 from .certificates.fixed_things import clear_of_near_obstacles
 from .certificates.laying import lay_path
 from .certificates.manoeuvre import clear_of_boat, told_margin
@@ -289,7 +290,7 @@ def _take_escapes_that_keep(
     """
     for m in range(count):
         i = plan.movers[m]
-        if not plan.keeps[i] or work.merit[i] >= FIXED_LOST:
+        if not plan.keeps[i] or work.merit[i] >= FIXED_LOST or all_spent(tuning, work):
             plan.keeps[i] = False
             continue
         copy_row(plan.merit, work.merit)
@@ -341,7 +342,7 @@ def ladder(
         if not good:
             _join(ours, work, plan)
             movers = _make_room(state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        if movers == count:
+        if movers == count or all_spent(tuning, work):
             break
         count = movers
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
@@ -358,5 +359,5 @@ def ladder(
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
         plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
-    if good and eases and worst_merit(ours, work) >= PAIR_SAFE:
+    if good and eases and worst_merit(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
         ease(count, state, ours, boats, fixed, tuning, memory, work, plan)

@@ -8,6 +8,7 @@ import numpy as np
 
 from .active_set import OPTIMAL, project
 from .certificates.assign import hold, recheck
+from .certificates.effort import ROW_COST, spend
 from .certificates.rating import PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .memory import Memory
@@ -66,6 +67,7 @@ def build(
     movers = plan.movers[:count]
     for m in range(count):
         hold(movers[m], plan.held, work)
+        spend(work.cost[movers[m]], work)
     inputs_of(
         plan.commands,
         plan.kept_commands,
@@ -79,7 +81,7 @@ def build(
         plan.z_now,
         plan.z0,
     )
-    return build_rows(
+    rows = build_rows(
         movers,
         plan.place,
         state,
@@ -95,6 +97,8 @@ def build(
         plan.kind,
         plan.label,
     )
+    spend(ROW_COST * rows * count, work)
+    return rows
 
 
 @lean_kernel

@@ -122,6 +122,7 @@ class Tuning(NamedTuple):
         mate_cap_m: margins from team-mates above this may shrink freely, m.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
         give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
+        search_limit: cost at which a decision searches no further, see `certificates.effort`.
     """
 
     dt_s: float
@@ -134,6 +135,7 @@ class Tuning(NamedTuple):
     mate_cap_m: float
     fixed_decay: float
     give_way_after_s: float
+    search_limit: float
 
 
 class Scene(NamedTuple):

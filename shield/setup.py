@@ -62,6 +62,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
             fixed_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
+            search_limit=config.search_limit,
         )
     )
 

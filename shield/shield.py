@@ -173,6 +173,7 @@ class Shield:
             bound=bound,
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
+            cut_short=answer.cut_short,
         )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:

@@ -61,6 +61,9 @@ class Work(NamedTuple):
         first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
         first_refuser: (n,) the same of the opponents that tables tell of, see `certificates.laying`.
         first_manner: (n, n) how it is followed first.
+        cost: (n,) what rating a manoeuvre of the boat costs, see `certificates.effort`.
+        spent: (1,) what this decision has cost until now.
+        cut_short: (1,) whether its search was ended by its limit.
     """
 
     next_state: Array
@@ -108,6 +111,9 @@ class Work(NamedTuple):
     first_hunter: IntArray
     first_refuser: IntArray
     first_manner: IntArray
+    cost: Array
+    spent: Array
+    cut_short: BoolArray
 
 
 def new_work(boats: int, samples: int) -> Work:
@@ -159,5 +165,8 @@ def new_work(boats: int, samples: int) -> Work:
             first_hunter=np.zeros(boats, np.int64),
             first_refuser=np.zeros(boats, np.int64),
             first_manner=np.zeros((boats, boats), np.int64),
+            cost=np.zeros(boats),
+            spent=np.zeros(1),
+            cut_short=np.zeros(1, np.bool_),
         )
     )

@@ -12,6 +12,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Fixed, Tuning
 from ..work import Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
+from .effort import all_spent
 from .laying import lay_path, refused_by_tables, run_out, set_out
 from .paths import READY_SAMPLE, TURNING_SAMPLE, angle_to_go
 from .rating import PAIR_SAFE, STRAIGHT_SAFE, rate_path
@@ -74,6 +75,8 @@ def choose_plan(
 
     A hard turn that fails while the boat still turns, its thrust back by then, says the same of every longer one to
     that side: until then they are one and the same, and longer ones are worth no more.
+
+    Once the decision has cost its limit the best so far will do, see `effort`.
     """
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
@@ -101,9 +104,10 @@ def choose_plan(
         if kept_merit > best:
             best = kept_merit
             _take(i, trial, merit, work)
-        if exhaustive:
-            continue
-        if merit >= PAIR_SAFE or (done == 1 and work.sealed[trial] and kept_merit == merit):
+        sealed = done == 1 and work.sealed[trial] and kept_merit == merit
+        if not exhaustive and (merit >= PAIR_SAFE or sealed):
+            return
+        if all_spent(tuning, work):
             return
 
 
@@ -245,7 +249,7 @@ def assign_plans(
                 continue
             if not (exhaustive and sweep == 0):
                 refresh(i, state, ours, boats, fixed, tuning, work)
-                if settled(i, sweep, exhaustive, memory, work):
+                if settled(i, sweep, exhaustive, memory, work) or all_spent(tuning, work):
                     continue
             if work.searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
                 continue

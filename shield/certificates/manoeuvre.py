@@ -20,6 +20,7 @@ from ..platforms.usv import next_thrust
 from ..scene import Boats, Tuning
 from ..work import Work
 from .clearance import FAR, MARGIN, clear_of_course
+from .effort import HUNTER_COST, begin_counting
 from .hunters import closing
 from .values import find_beset, run_opponents
 
@@ -46,6 +47,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
     n = state.shape[0]
+    begin_counting(work)
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
     for i in range(n):
         work.hunted[i] = False
@@ -72,9 +74,13 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
             hit = square <= reach * reach
             work.near[i, j], work.near[j, i] = hit, hit
             if hit:
+                work.cost[i] += 1.0
+                work.cost[j] += 1.0
                 if boats.team[i] != boats.team[j]:
                     work.hunted[i] = work.hunted[i] or boats.granted_turn_dps[j] > 0.0
                     work.hunted[j] = work.hunted[j] or boats.granted_turn_dps[i] > 0.0
+                    work.cost[i] += HUNTER_COST
+                    work.cost[j] += HUNTER_COST
                 least = radius - tuning.buffer_m
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least

@@ -8,6 +8,7 @@ from ..jit import Array, BoolArray, lean_kernel
 from ..scene import Boats, Fixed, Tuning
 from ..work import Work
 from .clearance import FAR, MARGIN, SAMPLE
+from .effort import spend
 from .fixed_things import clear_of_fixed, clear_of_near_obstacles, share_before_touch
 from .hunters import worst_hunter
 from .manoeuvre import worst_clearance
@@ -111,6 +112,7 @@ def rate_path(
     spare. Of a manoeuvre that fails at the first the merit is the margin itself, m. The clearance told is from all
     boats, whatever the merit hangs on.
     """
+    spend(work.cost[i], work)
     clear = work.clear[slot]
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))

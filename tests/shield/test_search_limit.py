@@ -1,0 +1,97 @@
+"""A decision whose work is at its limit searches no further: it keeps what it has verified, and says so."""
+
+import numpy as np
+import pytest
+from shield_loops import Wander, sail, sail_games, scattered
+from shield_scenes import distances
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
+from steerclear.shield.certificates.effort import HUNTER_COST, PATH_COST
+from steerclear.shield.decision import Reason
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import fresh_state
+
+LEAST = 1000.0
+"""The lowest limit there is."""
+
+
+def on_a_circle(n, radius_m, top_mps):
+    """Boats on a circle, each heading for the opposite point."""
+    angle = 2.0 * np.pi * np.arange(n) / n
+    rows = [fresh_state(radius_m * np.sin(a), radius_m * np.cos(a), np.degrees(a) + 180.0, top_mps) for a in angle]
+    return np.array(rows)
+
+
+def fleet_of_rows(state, team, platform):
+    n = len(state)
+    return Fleet(state, np.array(team), (platform,) * n, np.array(team) == 0, tuple(f"boat_{i}" for i in range(n)))
+
+
+@pytest.mark.parametrize(("platform", "top_mps"), [("heron", 2.0), ("surveyor", 3.0)])
+def test_team_mates_that_may_hardly_search_keep_their_distance(platform, top_mps):
+    state = on_a_circle(6, 40.0, top_mps)
+    straight = np.tile([top_mps, 0.0], (6, 1))
+    run = sail(Shield(search_limit=LEAST), fleet_of_rows(state, [0] * 6, platform), lambda *_: straight, 350)
+    assert (run.reason != Reason.PASSED).any()
+    assert distances(run.position).min() >= 2.5
+
+
+def crowd(seed):
+    """Twelve boats of ours among eight others, all near each other, and commands that take them into each other."""
+    state = scattered(np.random.default_rng(seed), 1, ["heron"] * 20, 30.0)[0]
+    return fleet_of_rows(state, [0] * 12 + [1] * 8, "heron"), Commands.relative_deg(np.tile([2.0, 120.0], (20, 1)))
+
+
+def test_it_is_told_that_the_search_was_cut_short():
+    fleet, wanted = crowd(1)
+    cut = Shield(search_limit=LEAST).decide(fleet, wanted)
+    free = Shield(search_limit=np.inf).decide(fleet, wanted)
+    assert [d.cut_short for d in cut] == [True] * 12 + [False] * 8  # never of boats that are not decided for
+    assert not any(d.cut_short for d in free)
+    assert np.isfinite(cut.sent.values).all()
+
+
+def test_no_decision_costs_much_more_than_its_limit():
+    """Beyond it each boat is laid and checked a bounded number of times, however many manoeuvres there are."""
+    spent = {}
+    for limit in (LEAST, np.inf):
+        shield = Shield(search_limit=limit)
+        shield.decide(*crowd(1))
+        spent[limit] = shield._seats[0].work.spent[0]
+    once = 12 * (PATH_COST + 19.0 + 8 * HUNTER_COST)
+    assert spent[LEAST] < LEAST + 8 * once
+    assert spent[np.inf] > 3.0 * spent[LEAST]
+
+
+def test_ordinary_decisions_do_not_come_near_the_limit():
+    """The same bits with the default limit and without one, in crowded games of three against three."""
+    platforms, team = ["heron"] * 6, [0, 0, 0, 1, 1, 1]
+    state = scattered(np.random.default_rng(2), 6, platforms, 20.0)
+    runs = [
+        sail_games(ShieldConfig(**one), state.copy(), platforms, team, Wander(3, 6, platforms), 100)
+        for one in ({}, {"search_limit": np.inf})
+    ]
+    assert (runs[0].sent == runs[1].sent).all()
+    assert (runs[0].reason != Reason.PASSED).any()
+
+
+@pytest.mark.parametrize("limit", [LEAST, 2000.0])
+def test_a_batch_is_cut_short_as_single_decisions_are(limit):
+    platforms, team = ["heron"] * 6, [0, 0, 0, 1, 1, 1]
+    state = scattered(np.random.default_rng(4), 3, platforms, 16.0)
+    config = ShieldConfig(search_limit=limit)
+    run = sail_games(config, state.copy(), platforms, team, Wander(5, 3, platforms), 40)
+    for game in range(3):
+        wander = Wander(5, 3, platforms)
+        alone = sail(
+            Shield(config),
+            fleet_of_rows(state[game], team, "heron"),
+            lambda step, now, game=game, wander=wander: wander(step, np.repeat(now[None], 3, 0))[game],
+            40,
+        )
+        np.testing.assert_allclose(alone.sent, run.sent[:, game], atol=1e-6)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, 999.0, np.nan, "much", None])
+def test_a_limit_that_is_none_is_refused(limit):
+    with pytest.raises(ConfigError, match="search_limit"):
+        Shield(search_limit=limit)
