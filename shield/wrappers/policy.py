@@ -68,8 +68,9 @@ class ShieldedTeamPolicy:
         actions = dict(answer)
         fleet = self._reader.fleet(self._team, False)
         around = self._reader.surroundings(self._team, self.keep_out)
-        wanted = Commands.relative_deg(self._reader.commands(actions))
+        wanted = Commands.game_deg(self._reader.commands(actions))
         self.decisions = self.shield.decide(fleet, wanted, around)
+        actions = self._reader.playable(actions)
         for agent in self._agent_ids:
             i = self._reader.agent_ids.index(agent)
             if self.decisions.intervened[i]:
