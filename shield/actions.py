@@ -34,10 +34,11 @@ class Seat(NamedTuple):
         name: of the boat, for messages.
         top_mps: its top speed, m/s.
         to_point: the command that steers for a field point; None where there are none.
-        points: names of the field points.
+        points: names of the field points, where they are known.
         numbered: whole numbers are field points, not discrete actions.
         lowest: lowest number of a discrete action; they count from the end, as Python's indices do.
         bools: True and False are numbers.
+        longer: of more than two entries the first two count.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Seat(NamedTuple):
     numbered: bool = False
     lowest: int = -1
     bools: bool = False
+    longer: bool = False
 
 
 def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
@@ -90,6 +92,8 @@ def plain_action(seat: Seat, action: Any) -> int | str | Command:
     values = _values(seat, action)
     if values.shape in ((), (1,)):
         return _number(seat, action, float(values.reshape(())))
+    if seat.longer and values.ndim == 1:
+        values = values[:2]
     if values.shape != (2,):
         raise _unusable(seat, action)
     if not np.isfinite(values).all():
@@ -135,11 +139,14 @@ def _number(seat: Seat, action: Any, value: float) -> int | str:
 def _point(seat: Seat, name: str) -> Command:
     if seat.to_point is None:
         raise GameError(f"action {short(name)} of {seat.name} names a field point, as in single games; {_help(seat)}")
-    if name not in seat.points:
-        near = difflib.get_close_matches(name, seat.points, n=3)
-        hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(seat.points)}"
-        raise GameError(f"unknown field point {short(name)}; {hint}")
-    return seat.to_point(name)
+    try:
+        if not seat.points or name in seat.points:
+            return seat.to_point(name)
+    except KeyError:  # a game that does not tell its points knows them
+        pass
+    near = difflib.get_close_matches(name, seat.points, n=3)
+    hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(seat.points) or 'others'}"
+    raise GameError(f"unknown field point {short(name)}; {hint}")
 
 
 def _unusable(seat: Seat, action: Any) -> GameError:

@@ -96,8 +96,8 @@ def _of_objects(found: np.ndarray) -> np.ndarray:
 
 
 def _without_gradient(value: Any) -> Any:
-    """A tensor's numbers, wherever they are and whatever belongs to them; anything else as it is."""
-    if type(value) in (list, tuple) and any(hasattr(entry, "detach") for entry in value):
+    """A tensor's numbers, wherever they are and whatever belongs to them, in lists too; anything else as it is."""
+    if type(value) in (list, tuple):
         return [_without_gradient(entry) for entry in value]
     if not hasattr(value, "detach"):
         return value

@@ -192,8 +192,8 @@ class BatchedShield:
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
 
         Raises:
-            ConfigError: no boat is of that team, or the shield was built for the other team's flag. When it is called: the shield was built for
-                other games.
+            ConfigError: no boat is of that team, or the shield was built for the other team's flag. When it is called:
+                the shield was built for other games.
         """
         if isinstance(team, str) or team not in self.team:
             raise ConfigError(f"no boat is of team {team!r}; give one of {sorted(set(self.team))}")

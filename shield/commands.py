@@ -124,10 +124,14 @@ class Commands:
         values[changed] = rows
         return replace(self, values=values)
 
-    def within(self, rows: BoolArray, lowest_mps: Array, highest_mps: Array) -> Commands:
-        """These commands with the speeds of ``rows`` brought between bounds, m/s, (n,) each."""
+    def within(self, rows: BoolArray, highest_mps: Array) -> Commands:
+        """These commands with the speeds of ``rows`` brought into 0 to (n,) m/s, and relative headings into a turn."""
         values = self.values.copy()
-        values[rows, 0] = np.clip(values[rows, 0], lowest_mps[rows], highest_mps[rows])
+        values[rows, 0] = np.clip(values[rows, 0], 0.0, highest_mps[rows])
+        if self.relative:
+            far = rows & (np.abs(values[:, 1]) > 180.0)
+            half = np.copysign(180.0, values[far, 1])
+            values[far, 1] = np.fmod(values[far, 1] + half, 360.0) - half
         return replace(self, values=values)
 
 

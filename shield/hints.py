@@ -49,10 +49,10 @@ def look_at_positions(position_m: Array) -> None:
         )
 
 
-def look_at_speed(boat: str, speed_mps: float, lowest_mps: float, highest_mps: float) -> None:
+def look_at_speed(boat: str, speed_mps: float, highest_mps: float) -> None:
     """Say that a wanted speed is cut, and how rows are read."""
     say_once(
         "speed",
-        f"a speed of {speed_mps:g} m/s is wanted of boat {boat!r}, whose platform does {lowest_mps:g} to "
+        f"a speed of {speed_mps:g} m/s is wanted of boat {boat!r}, whose platform does 0 to "
         f"{highest_mps:g} m/s; it is cut to that (reason LIMITED). Rows are (speed m/s, heading), in this order",
     )

@@ -24,20 +24,19 @@ ROUNDING_MPS = 1e-6
 def within_limits(wanted: Commands, fleet: Fleet, params: Array) -> tuple[Commands, BoolArray | None]:
     """Wanted commands of own boats, with speeds their platforms do, and (n,) which are cut, if any.
 
-    Thrust boats do not go astern on command. Speeds that are no commands at all (`LARGEST_COMMAND`) are left to the
-    decision, which holds those boats.
+    No platform is sent astern: none has a speed below 0 in its model. Speeds that are no commands at all
+    (`LARGEST_COMMAND`) are left to the decision, which holds those boats.
     """
     if wanted.of_game or len(fleet) == 0:
         return wanted, None
     speed, highest = wanted.values[:, 0], params[:, L.MAX_SPEED]
-    lowest = np.where(params[:, L.KIND] == L.KIND_USV, 0.0, -highest)
-    beyond = (speed > highest + ROUNDING_MPS) | (speed < lowest - ROUNDING_MPS)
+    beyond = (speed > highest + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
     cut: BoolArray = fleet.controlled & beyond & (np.abs(speed) <= LARGEST_COMMAND)
     if not cut.any():
         return wanted, None
     first = int(np.argmax(cut))
-    look_at_speed(fleet.names[first], float(speed[first]), float(lowest[first]), float(highest[first]))
-    return wanted.within(cut, lowest, highest), cut
+    look_at_speed(fleet.names[first], float(speed[first]), float(highest[first]))
+    return wanted.within(cut, highest), cut
 
 
 def tell_of_limits(cut: BoolArray, changed: BoolArray, answer: Answer) -> BoolArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -59,12 +60,12 @@ class PyquaticusReader:
         return {agent: self._playable(agent, action) for agent, action in actions.items()}
 
     def _playable(self, agent: str, action: Any) -> Any:
-        if type(action) in (int, str) or (isinstance(action, (list, tuple, np.ndarray)) and np.shape(action) == (2,)):
+        if type(action) in (int, str) or _is_pair(action):
             return action
         return plain_action(self._seat(agent), action)
 
     def _seat(self, agent: str) -> Seat:
-        """The env looks numbers up in a list: negative ones count from its end, and True is 1."""
+        """The env looks numbers up in a list, by Python's rules, and takes the first two entries of anything longer."""
         player = self.env.players[agent]
         points = tuple(getattr(self.env, "aquaticus_field_points", None) or ())
         return Seat(
@@ -74,6 +75,7 @@ class PyquaticusReader:
             points,
             lowest=-len(DISCRETE),
             bools=True,
+            longer=True,
         )
 
     def _to_point(self, name: str, player: Any) -> Command:
@@ -91,6 +93,13 @@ class PyquaticusReader:
             radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
         return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), stops=circle)
+
+
+def _is_pair(action: Any) -> bool:
+    """Whether it is a pair of plain numbers."""
+    if isinstance(action, np.ndarray):
+        return action.shape == (2,)
+    return isinstance(action, (list, tuple)) and len(action) == 2 and all(isinstance(one, Real) for one in action)
 
 
 def _team(player: Any) -> int:
