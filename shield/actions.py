@@ -8,9 +8,10 @@ floats that are whole.
 from __future__ import annotations
 
 import difflib
+import math
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -85,6 +86,10 @@ def plain_action(seat: Seat, action: Any) -> int | str | Command:
     Raises:
         GameError: as in `read_action`; a name is not looked up.
     """
+    if type(action) is int and seat.lowest <= action <= STOP and not seat.numbered:  # what most policies send,
+        return action % len(DISCRETE)
+    if _is_plain_pair(action):  # and the scripted ones
+        return action
     if isinstance(action, np.ndarray) and action.ndim == 0 and action.dtype.kind in "OU":
         action = action.item()
     if isinstance(action, str):
@@ -101,6 +106,11 @@ def plain_action(seat: Seat, action: Any) -> int | str | Command:
             f"action {short(action)} of {seat.name} is not finite; give finite speed m/s and relative heading deg"
         )
     return float(values[0]), float(values[1])
+
+
+def _is_plain_pair(action: Any) -> TypeGuard[Command]:
+    floats = type(action) is tuple and len(action) == 2 and type(action[0]) is type(action[1]) is float
+    return floats and math.isfinite(action[0]) and math.isfinite(action[1])
 
 
 def _values(seat: Seat, action: Any) -> Array:
