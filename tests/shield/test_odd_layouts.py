@@ -28,14 +28,21 @@ def signatures():
     return found
 
 
+def exactly(array, kind):
+    """The same numbers of another type, where that holds them."""
+    with np.errstate(invalid="ignore"):
+        other = array.astype(kind)
+    return other if (other == array).all() else array
+
+
 def spread(array):
     """The same numbers with a gap after each."""
     return np.repeat(array, 2, axis=-1)[..., ::2]
 
 
 LAYOUTS = {
-    "whole": lambda array: array.astype(np.int64) if (array == np.round(array)).all() else array,
-    "small": lambda array: array.astype(np.float32).astype(np.float64),
+    "whole": lambda array: exactly(array, np.int64),
+    "small": lambda array: exactly(array, np.float32),
     "Fortran": np.asfortranarray,
     "strided": spread,
     "read-only": read_only,
@@ -59,7 +66,7 @@ def meeting(laid):
 def directly(laid):
     fleet = meeting(np.asarray)
     arrays = {name: laid(getattr(fleet, name)) for name in ("team", "age_s", "position_error_m")}
-    layout = laid if laid not in (LAYOUTS["whole"], LAYOUTS["objects"]) else spread
+    layout = spread if laid in (LAYOUTS["whole"], LAYOUTS["small"], LAYOUTS["objects"]) else laid  # the type must fit
     return replace(fleet, state=layout(fleet.state), controlled=layout(fleet.controlled), **arrays)
 
 
