@@ -24,14 +24,14 @@ ROUNDING_MPS = 1e-6
 def within_limits(wanted: Commands, fleet: Fleet, params: Array) -> tuple[Commands, BoolArray | None]:
     """Wanted commands of own boats, with speeds their platforms do, and (n,) which are cut, if any.
 
-    No platform is sent astern: none has a speed below 0 in its model. Speeds that are no commands at all
-    (`LARGEST_COMMAND`) are left to the decision, which holds those boats.
+    No platform is sent astern: none has a speed below 0 in its model. What is no command at all
+    (not finite, or beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
     """
     if wanted.of_game or len(fleet) == 0:
         return wanted, None
     speed, highest = wanted.values[:, 0], params[:, L.MAX_SPEED]
     beyond = (speed > highest + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
-    cut: BoolArray = fleet.controlled & beyond & (np.abs(speed) <= LARGEST_COMMAND)
+    cut: BoolArray = fleet.controlled & beyond & (np.abs(wanted.values) <= LARGEST_COMMAND).all(axis=1)
     if not cut.any():
         return wanted, None
     first = int(np.argmax(cut))

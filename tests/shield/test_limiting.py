@@ -61,6 +61,13 @@ def test_what_is_no_speed_is_held(speed):
     assert (first.reason, first.sent_speed_mps) == (Reason.HELD, 0.0)
 
 
+@pytest.mark.parametrize("make", [Commands.relative_deg, Commands.absolute_rad, Commands.absolute_deg])
+@pytest.mark.parametrize("heading", [math.nan, math.inf, -math.inf])
+def test_a_speed_beyond_the_limit_without_a_heading_is_held(make, heading):
+    first = decide([[9.0, heading], [1.0, 0.25]], make)[0]
+    assert (first.reason, first.sent_speed_mps) == (Reason.HELD, 0.0)
+
+
 def test_boats_not_decided_for_are_left_alone():
     decisions = decide([[9.0, 0.5], [9.0, 0.25]], Commands.absolute_rad, team=(0, 1))
     assert decisions.reason.tolist() == [Reason.LIMITED, Reason.NOT_COVERED]
