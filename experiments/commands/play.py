@@ -73,7 +73,7 @@ def play(
 ) -> None:
     """Play one game and show what happened.
 
-    Exit status: 0 done, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
     if keyboard and own not in ("medium", "keyboard"):
         raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {own}")
