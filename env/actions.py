@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete, Space
+from steerclear.shield.actions import DISCRETE, STOP, Command, Seat, check_agents, read_action
+from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
@@ -17,11 +18,6 @@ from .config import GameConfig
 
 KINDS = ("discrete", "continuous", "afp")
 """Kinds of action spaces; "afp" are the named field points."""
-
-HEADING_STEPS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
-DISCRETE = np.array([(share, heading) for share in (1.0, 0.5) for heading in HEADING_STEPS_DEG] + [(0.0, 0.0)])
-"""(17, 2) share of top speed and relative heading deg of each discrete action; the last one stops."""
-STOP = len(DISCRETE) - 1
 
 
 def action_kinds(config: GameConfig, kind: str | Sequence[str] | Mapping[str, str]) -> dict[str, str]:
@@ -68,10 +64,13 @@ def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
     Raises:
         GameError: not whole numbers, or out of range.
     """
-    numbers = np.asarray(indices)
-    if not np.issubdtype(numbers.dtype, np.integer) or numbers.min() < 0 or numbers.max() > STOP:
+    try:
+        given = numbers(indices)
+    except NoNumbersError:
+        given = np.full(1, np.nan)
+    if not ((given == np.floor(given)) & (given >= 0) & (given <= STOP)).all():
         raise GameError(f"discrete actions must be whole numbers 0..{STOP}")
-    commands = DISCRETE[numbers]
+    commands = DISCRETE[given.astype(np.int64)]
     commands[..., 0] *= max_speed_mps
     return commands
 
@@ -79,9 +78,8 @@ def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
 class ActionDecoder:
     """Turns whatever a player sends into (speed m/s, relative heading deg).
 
-    The kind of each action is told from its type, whatever the boat's declared space: a string is a field point, a
-    pair of numbers is continuous, a whole number is discrete (or a field point's number where "afp" is declared).
-    -1 stops, as in Pyquaticus, whose scripted policies send it.
+    The kind of each action is told from its type, whatever the boat's declared space, see `steerclear.shield.actions`;
+    where "afp" is declared, whole numbers are field points.
 
     Args:
         config: the game's settings.
@@ -95,7 +93,6 @@ class ActionDecoder:
         self, config: GameConfig, kinds: dict[str, str], max_speed_mps: Array, points: dict[str, Array], size: Array
     ) -> None:
         self._ids = config.agent_ids
-        self._index = {agent_id: i for i, agent_id in enumerate(config.agent_ids)}
         self._team_size = config.team_size
         self._radius_m = config.agent_radius_m
         self._kinds = kinds
@@ -114,58 +111,25 @@ class ActionDecoder:
         Raises:
             GameError: not a mapping, an unknown agent or an action that is none.
         """
-        if not isinstance(actions, Mapping):
-            raise GameError(f"actions are a {type(actions).__name__}; give a dict of agent id -> action")
+        check_agents(actions, self._ids)
         commands = np.zeros((len(self._ids), 2))
-        for agent_id, action in actions.items():
-            if agent_id not in self._index:
-                raise GameError(f"unknown agent {agent_id!r} in the actions; agents are {', '.join(self._ids)}")
-            i = self._index[agent_id]
-            if isinstance(action, str):
-                commands[i] = self._to_point(i, action, state[i])
-            elif isinstance(action, (int, np.integer)) or np.ndim(action) == 0:
-                commands[i] = self._number(agent_id, i, action, state[i])
-            else:
-                commands[i] = self._pair(agent_id, i, action, state[i])
+        for i, agent_id in enumerate(self._ids):
+            if agent_id in actions:
+                commands[i] = read_action(self._seat(agent_id, i, state[i]), actions[agent_id])
         return commands
 
-    def _number(self, agent_id: str, i: int, action: Any, state: Array) -> Array | tuple[float, float]:
-        value = action.item() if isinstance(action, (np.ndarray, np.generic)) else action
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise GameError(f"action {action!r} of {agent_id} is not usable; {self._help(agent_id)}")
-        if self._kinds[agent_id] == "afp":
-            if not 0 <= value < len(self._names):
-                raise GameError(f"action {value} of {agent_id} is no field point; {self._help(agent_id)}")
-            return self._to_point(i, self._names[value], state)
-        if value == -1:
-            value = STOP
-        if not 0 <= value <= STOP:
-            raise GameError(f"action {value} of {agent_id} is out of range; {self._help(agent_id)}")
-        return DISCRETE[value] * (self._max_speed_mps[i], 1.0)
+    def _seat(self, agent_id: str, i: int, state: Array) -> Seat:
+        return Seat(
+            agent_id,
+            float(self._max_speed_mps[i]),
+            lambda name: self._to_point(i, name, state),
+            self._names,
+            numbered=self._kinds[agent_id] == "afp",
+        )
 
-    def _pair(self, agent_id: str, i: int, action: Any, state: Array) -> Array | tuple[float, float]:
-        try:
-            pair = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError):
-            pair = np.zeros(0)
-        if pair.shape == (1,):
-            return self._number(agent_id, i, np.asarray(action)[0], state)
-        if pair.shape != (2,):
-            raise GameError(f"action {action!r} of {agent_id} is not usable; {self._help(agent_id)}")
-        if not np.isfinite(pair).all():
-            raise GameError(f"action {action!r} of {agent_id} is not finite; give finite speed m/s and heading deg")
-        return pair
-
-    def _to_point(self, i: int, name: str, state: Array) -> tuple[float, float]:
+    def _to_point(self, i: int, name: str, state: Array) -> Command:
         """Full speed towards a named point (mirrored for red), stopping within the boat's own radius of it."""
-        if name not in self._points:
-            near = difflib.get_close_matches(name, self._names, n=3)
-            raise GameError(f"unknown field point {name!r}; {f'did you mean {near}?' if near else self._names}")
         point = self._points[name] if i < self._team_size else self._size - self._points[name]
         dx, dy = point[0] - state[L.X], point[1] - state[L.Y]
         speed = 0.0 if np.hypot(dx, dy) <= self._radius_m[i] else float(self._max_speed_mps[i])
         return speed, wrap_bearing(heading_to(dx, dy) - state[L.HEADING])
-
-    def _help(self, agent_id: str) -> str:
-        numbers = f"0..{len(self._names) - 1}" if self._kinds[agent_id] == "afp" else f"0..{STOP} (or -1 to stop)"
-        return f"give a whole number {numbers}, a pair (speed m/s, relative heading deg) or a field point's name"

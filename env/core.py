@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.shared import share
@@ -239,7 +240,12 @@ class BatchedMctf:
         return view_game(self.config, self.rules, self.games, game)
 
     def _checked(self, name: str, values: Any) -> Array:
-        array = np.ascontiguousarray(values, dtype=np.float64)
+        try:
+            array = numbers(values)
+        except NoNumbersError as error:
+            raise GameError(
+                f"{name} are no numbers ({error}); give {self._commands.shape}: speed m/s, heading deg"
+            ) from None
         if array.shape != self._commands.shape:
             raise GameError(f"{name} have shape {array.shape}; give {self._commands.shape}: speed m/s, heading deg")
         return array

@@ -32,3 +32,26 @@ def _sentence(words: str, column: str, begin: str, rows: Sequence[Row]) -> str:
         "stopped for those steps, so the figures are not those of a working policy."
         + (f" First failure: {texts[0].removeprefix(begin)}" if texts else "")
     )
+
+
+def held_games(rows: Sequence[Row]) -> list[str]:
+    """Sentences about policies that did not play: as many unusable answers as a game has steps, or more.
+
+    Args:
+        rows: the games.
+
+    Returns:
+        One for each side with such games; empty when there are none.
+    """
+    return [words for side in SIDES if (words := _held(*side, rows))]
+
+
+def _held(words: str, column: str, begin: str, rows: Sequence[Row]) -> str:
+    held = [row for row in rows if row["steps"] > 0 and int(row[column]) >= row["steps"]]
+    if not held:
+        return ""
+    texts = [text for row in held if (text := row["first_failure"] or "").startswith(begin)]
+    return (
+        f"the {words} gave no usable answer throughout {len(held)} of {len(rows)} games; its boats lay still, so these "
+        f"are figures of no policy{f' ({texts[0].removeprefix(begin)})' if texts else ''}; mend it or leave it out"
+    )

@@ -123,6 +123,7 @@ RESULTS = {
     "failed[].error": "why",
     "policy_files.*": "digests of the files of policies that are no named ones",
     "warnings[]": "what a reader has to know first: policies that failed while they played",
+    "held[]": "policies that gave nothing usable throughout a game: the exit status is 2",
     "pairings[].pairing": "own policy vs opponent policy",
     "pairings[].games_off": "games without shield",
     "pairings[].games_on": "games with shield",

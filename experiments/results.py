@@ -9,7 +9,7 @@ from typing import Any
 
 from .ablation import AblationSettings, ablation_bars, most_instructive, spec_of, summaries
 from .campaign import Played
-from .failure_words import failure_warnings
+from .failure_words import failure_warnings, held_games
 from .match import play_match
 from .pool import run_all
 from .provenance import machine, versions
@@ -51,6 +51,7 @@ def results_of(
         "games_resumed": played.resumed,
         "failed": played.failed,
         "warnings": failure_warnings(played.rows),
+        "held": held_games(played.rows),
         "pairings": summaries(played.rows, settings),
         "bars": ablation_bars(played.rows, settings.separation_m),
         "breaches": all_breaches(played.rows),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from steerclear.shield.actions import short
+from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError, PolicyError
 
 from .scripted.team import game_core
@@ -52,17 +54,13 @@ class ActionReader:
         """What is wrong with an action, as (kind, explanation); None when it can be used."""
         if action is None:
             return "no answer", "compute_action returned None; return an action"
-        if isinstance(action, (np.ndarray, np.generic)) and np.iscomplexobj(action):
-            return "no action", f"{_short(action)} has complex numbers"
         numeric = _as_numbers(action)
         if numeric is not None and not np.isfinite(numeric).all():
-            return "not finite", f"{_short(action)} is not finite"
+            return "not finite", f"{short(action)} is not finite"
         try:
             row = self._decode(agent_id, action)
         except GameError as error:
-            return "no action", _short(str(error), 300)
-        except (TypeError, ValueError, OverflowError) as error:
-            return "no action", f"{_short(action)} cannot be read: {_short(str(error))}"
+            return "no action", str(error)[:300]
         return self._too_large(agent_id, row)
 
     def _decode(self, agent_id: str, action: Any) -> np.ndarray:
@@ -94,11 +92,6 @@ def _as_numbers(action: Any) -> np.ndarray | None:
     if isinstance(action, (str, bytes)):
         return None
     try:
-        return np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        return numbers(action)
+    except NoNumbersError:
         return None
-
-
-def _short(what: Any, length: int = 80) -> str:
-    text = what if isinstance(what, str) else repr(what)
-    return text if len(text) <= length else text[: length - 1] + "…"

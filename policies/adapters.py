@@ -9,6 +9,7 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
 from .guard import Answer, ForeignCode, GuardedTeam
+from .signatures import call_fault
 
 AgentFactory = Callable[[str, Any], Any]
 """``factory(agent_id, env) -> agent`` with ``compute_action(obs, info)``."""
@@ -39,6 +40,9 @@ class AgentsCode(ForeignCode):
         for agent_id, agent in self._agents.items():
             if not callable(getattr(agent, "compute_action", None)):
                 raise PolicyError(f"agent {agent_id} ({type(agent).__name__}) has no compute_action(obs, info)")
+            fault = call_fault(agent.compute_action, ("obs", "info"))
+            if fault is not None:
+                raise PolicyError(f"compute_action of agent {agent_id} ({type(agent).__name__}) {fault}")
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """Ask each boat's agent."""
@@ -56,6 +60,10 @@ class CallableCode(ForeignCode):
         parts = list(functions.values()) if isinstance(functions, Mapping) else [functions]
         if not parts or not all(callable(part) for part in parts):
             raise PolicyError("give a function f(obs) -> action, or a dict agent_id -> such functions")
+        for part in parts:
+            fault = call_fault(part, ("obs",))
+            if fault is not None:
+                raise PolicyError(f"{getattr(part, '__name__', 'the function')} {fault}; give f(obs) -> action")
         self._functions = functions
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:

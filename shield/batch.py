@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
+from .arrays import NoNumbersError, numbers, truths, whole_numbers
 from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
@@ -88,7 +90,7 @@ class BatchedShield:
         flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
 
     Raises:
-        ConfigError: a setting that a batch cannot honour.
+        ConfigError: a setting that a batch cannot honour, or that is none.
     """
 
     def __init__(
@@ -100,15 +102,20 @@ class BatchedShield:
         surroundings: Surroundings = OPEN_WATER,
         flag_of: int | None = None,
     ) -> None:
+        if not isinstance(config, ShieldConfig) or not isinstance(surroundings, Surroundings):
+            found = f"{type(config).__name__} and {type(surroundings).__name__}"
+            raise ConfigError(f"config and surroundings are {found}; give ShieldConfig.of(...) and Surroundings(...)")
         if config.coordination != "team":
             raise ConfigError("a batch decides for whole teams at once: set coordination='team'")
         if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
             raise ConfigError(f"games is {games!r}; give a whole number >= 1")
-        if len(platforms) != len(team) or not platforms:
-            raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
         self.config, self.flag_of = config, flag_of
-        self.platforms, self.team = tuple(platforms), tuple(int(one) for one in team)
-        n = len(platforms)
+        self.platforms, self.team = _kinds(platforms), _teams(team)
+        if len(self.platforms) != len(self.team) or not self.platforms:
+            raise ConfigError(
+                f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
+            )
+        n = len(self.platforms)
         boats = boats_of(config, self.platforms, self.team)
         self._memory = new_memory(games, n)
         self._scene = share(
@@ -131,8 +138,12 @@ class BatchedShield:
         self.cut_short = np.zeros(games, np.bool_)
 
     def reset(self, mask: BoolArray | None = None) -> None:
-        """Forget the escapes of the games in ``mask`` (B,), or of all."""
-        which = slice(None) if mask is None else mask
+        """Forget the escapes of the games in ``mask`` (B,) of True and False, or of all.
+
+        Raises:
+            FleetError: the mask is no such array.
+        """
+        which = slice(None) if mask is None else _mask(mask, len(self.reason))
         self._memory.kept[which] = False
         self._memory.escaping[which] = False
         self._pending[which] = np.nan
@@ -143,7 +154,7 @@ class BatchedShield:
         Args:
             state: (B, n, N_STATE) boat states; memory of the autopilot that is NaN is filled from the speed, not
                 followed as `Shield` does.
-            wanted: (B, n, 2) speed m/s and relative heading deg.
+            wanted: (B, n, 2) speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds themselves.
             ours: (B, n) boats to decide for.
 
         Returns:
@@ -152,15 +163,12 @@ class BatchedShield:
             which decisions were ended by `ShieldConfig.search_limit`.
 
         Raises:
-            FleetError: an array has the wrong shape or a state is not finite.
+            FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
         """
-        for name, array, shape in (
-            ("state", state, (*self.reason.shape, L.N_STATE)),
-            ("wanted", wanted, self.sent.shape),
-            ("ours", ours, self.reason.shape),
-        ):
-            if np.shape(array) != shape:
-                raise FleetError(f"{name} has shape {np.shape(array)}; expected {shape}")
+        games = self.reason.shape
+        state = _shaped("state", state, (*games, L.N_STATE), numbers)
+        wanted = _shaped("wanted", wanted, (*games, 2), numbers)
+        ours = _shaped("ours", ours, games, truths)
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
@@ -189,9 +197,11 @@ class BatchedShield:
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
 
         Raises:
-            ConfigError: the shield was built for the other team's flag. When it is called: the shield was built for
-                other games.
+            ConfigError: no boat is of that team, or the shield was built for the other team's flag. When it is called:
+                the shield was built for other games.
         """
+        if isinstance(team, str) or team not in self.team:
+            raise ConfigError(f"no boat is of team {team!r}; give one of {sorted(set(self.team))}")
         if self.flag_of not in (None, team):
             raise ConfigError(f"this shield keeps off the flag of team {self.flag_of}; build another for team {team}")
 
@@ -215,3 +225,41 @@ class BatchedShield:
             ConfigError: they are not.
         """
         check_same_games(core, len(self.reason), self.platforms, self.team, self.config.dt_s)
+
+
+def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:
+    """An array of that shape, as compiled code takes it.
+
+    Raises:
+        FleetError: it is not.
+    """
+    try:
+        array = brought(value)
+    except NoNumbersError as error:
+        raise FleetError(f"{name} is not usable ({error}); expected an array of shape {shape}") from None
+    if array.shape != shape:
+        raise FleetError(f"{name} has shape {array.shape}; expected {shape}")
+    return array
+
+
+def _mask(mask: Any, games: int) -> BoolArray:
+    found = np.asarray(mask)
+    if found.dtype != np.bool_ or found.shape != (games,):
+        raise FleetError(f"mask is {found.dtype} of shape {found.shape}; give bool of shape ({games},)")
+    return found
+
+
+def _kinds(platforms: Any) -> tuple[str | Platform, ...]:
+    if isinstance(platforms, (str, Platform)) or not isinstance(platforms, Iterable):
+        raise ConfigError(f"platforms is {platforms!r}; give a list of them, one for each boat")
+    return tuple(platforms)
+
+
+def _teams(team: Any) -> tuple[int, ...]:
+    try:
+        found = whole_numbers(team)
+    except NoNumbersError as error:
+        raise ConfigError(f"team holds {error}; give a whole number for each boat") from None
+    if found.ndim != 1:
+        raise ConfigError(f"team has shape {found.shape}; give a whole number for each boat")
+    return tuple(found.tolist())

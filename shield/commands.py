@@ -6,12 +6,14 @@ Commands are stored as given, so that one that is safe passes bit for bit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import NoNumbersError, numbers
 from .exceptions import FleetError
+from .hints import look_at_headings
 from .jit import Array, BoolArray
 
 LARGEST_HEADING_RAD = 1e6
@@ -22,23 +24,54 @@ LARGEST_HEADING_RAD = 1e6
 class Commands:
     """Speed and heading of n boats.
 
+    Build them with one of the class methods, which copy what they are given.
+
     Attributes:
-        values: (n, 2): speed m/s, heading in the frame.
+        values: (n, 2) float64: speed m/s, heading in the frame; other kinds of numbers become that.
         relative: heading is in deg relative to the boat's present heading (as the game's actions are); otherwise in
             rad, absolute, clockwise from north.
+        of_game: whoever obeys them limits speeds itself, as games do: the shield leaves those beyond a boat's top as
+            they are. Of others it cuts them.
+
+    Raises:
+        FleetError: the shape is wrong, the values are not numbers, or ``relative`` is neither True nor False.
     """
 
     values: Array
     relative: bool
+    of_game: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", _as_commands(self.values))
+        if not isinstance(self.relative, (bool, np.bool_)):
+            raise FleetError(
+                f"relative is {self.relative!r}; give True or False, or build commands with Commands.absolute_rad, "
+                "absolute_deg or relative_deg"
+            )
+        if not self.relative:
+            look_at_headings(
+                "Commands.absolute_rad",
+                self.values[:, 1],
+                "give Commands.absolute_deg; rows are (speed m/s, heading), in this order",
+            )
 
     @classmethod
     def relative_deg(cls, values: ArrayLike) -> Commands:
-        """Commands of the game: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise.
+        """Commands to turn: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise.
 
         Raises:
             FleetError: the shape is wrong or the values are not numbers.
         """
-        return cls(_as_commands(values), True)
+        return cls(_as_commands(values).copy(), True)
+
+    @classmethod
+    def game_deg(cls, values: ArrayLike) -> Commands:
+        """Commands of a game, which limits speeds itself: (n, 2) of speed m/s and relative heading deg, clockwise.
+
+        Raises:
+            FleetError: the shape is wrong or the values are not numbers.
+        """
+        return cls(_as_commands(values).copy(), True, True)
 
     @classmethod
     def absolute_rad(cls, values: ArrayLike) -> Commands:
@@ -47,7 +80,19 @@ class Commands:
         Raises:
             FleetError: the shape is wrong or the values are not numbers.
         """
-        return cls(_as_commands(values), False)
+        return cls(_as_commands(values).copy(), False)
+
+    @classmethod
+    def absolute_deg(cls, values: ArrayLike) -> Commands:
+        """The same from degrees: (n, 2) of speed m/s and heading deg, clockwise from north. They are kept in rad.
+
+        Raises:
+            FleetError: the shape is wrong or the values are not numbers.
+        """
+        array = _as_commands(values).copy()
+        with np.errstate(invalid="ignore"):  # infinite ones become NaN, and the shield holds the boat
+            array[:, 1] = np.radians(np.fmod(array[:, 1], 360.0))
+        return cls(array, False)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -77,14 +122,27 @@ class Commands:
         if not self.relative:
             rows = np.stack([rows[:, 0], np.radians(heading_deg[changed] + rows[:, 1])], axis=1)
         values[changed] = rows
-        return Commands(values, self.relative)
+        return replace(self, values=values)
+
+    def within(self, rows: BoolArray, highest_mps: Array) -> Commands:
+        """These commands with the speeds of ``rows`` brought into 0 to (n,) m/s, and relative headings into a turn."""
+        values = self.values.copy()
+        values[rows, 0] = np.clip(values[rows, 0], 0.0, highest_mps[rows])
+        if self.relative:
+            far = rows & (np.abs(values[:, 1]) > 180.0)
+            half = np.copysign(180.0, values[far, 1])
+            values[far, 1] = np.fmod(values[far, 1] + half, 360.0) - half
+        return replace(self, values=values)
 
 
 def _as_commands(values: ArrayLike) -> Array:
+    """Commands as compiled code takes them; such ones are not copied."""
     try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = numbers(values)
+    except NoNumbersError as error:
         raise FleetError(f"commands are not numbers ({error}); give an (n, 2) array of speed and heading") from None
+    if array.shape == (0,):
+        array = array.reshape(0, 2)
     if array.ndim != 2 or array.shape[1] != 2:
         raise FleetError(f"commands have shape {array.shape}; give (n, 2): speed m/s and heading per boat")
     return array

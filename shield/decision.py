@@ -37,6 +37,8 @@ class Reason(IntEnum):
     """The shield does not decide for this boat."""
     RIGHT_OF_WAY = plan.RIGHT_OF_WAY
     """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
+    LIMITED = plan.LIMITED
+    """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its escape."""
 
 
 FALLBACKS = {Reason.ESCAPE: "escape manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}

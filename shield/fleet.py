@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import NoNumbersError, numbers, whole_numbers
 from .exceptions import FleetError
+from .hints import look_at_headings, look_at_positions
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform, get_platform
 from .platforms import layout as L
@@ -44,8 +48,9 @@ def sound(state: Array) -> bool:
 class Fleet:
     """State of n boats, own and others.
 
-    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly. The arrays are kept, not
-    copied, and decisions are read off them: hand over a copy of what a simulator goes on changing.
+    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly. Arrays of the right type and
+    layout are kept, not copied (others are copied into it), and decisions are read off them: hand over a copy of what a
+    simulator goes on changing.
 
     Attributes:
         state: (n, N_STATE) rows as in `platforms.layout`; autopilot memory may be NaN where it is not known.
@@ -65,12 +70,23 @@ class Fleet:
     age_s: Array | None = None
     position_error_m: Array | None = field(default=None)
 
+    def __post_init__(self) -> None:
+        """Bring arrays to the type and layout of compiled code; what cannot be is refused by `check`."""
+        for name, brought in _FORMS.items():
+            value = getattr(self, name)
+            if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+                raise FleetError(f"{name} holds masked values; fill them in, or leave those boats out")
+            if isinstance(value, np.ndarray):
+                with suppress(NoNumbersError):
+                    object.__setattr__(self, name, brought(value))
+
     @classmethod
     def of(
         cls,
         *,
         position_m: ArrayLike,
-        heading_rad: ArrayLike,
+        heading_rad: ArrayLike | None = None,
+        heading_deg: ArrayLike | None = None,
         speed_mps: ArrayLike,
         team: ArrayLike,
         platforms: str | Platform | Sequence[str | Platform],
@@ -85,7 +101,8 @@ class Fleet:
 
         Args:
             position_m: (n, 2) east and north, m.
-            heading_rad: (n,) clockwise from north, rad.
+            heading_rad: (n,) clockwise from north, rad; or
+            heading_deg: (n,) the same in deg.
             speed_mps: (n,) m/s, negative astern.
             team: (n,) integers.
             platforms: one platform for all, or n of them.
@@ -106,7 +123,7 @@ class Fleet:
         n = len(position)
         state = np.zeros((n, L.N_STATE))
         state[:, L.X : L.Y + 1] = position
-        state[:, L.HEADING] = np.degrees(_shaped("heading_rad", heading_rad, (n,)))
+        state[:, L.HEADING] = _headings_deg(heading_rad, heading_deg, n)
         state[:, L.SPEED] = _shaped("speed_mps", speed_mps, (n,))
         state[:, L.THRUST] = np.nan if thrust is None else _shaped("thrust", thrust, (n,))
         state[:, L.SPEED_ERROR] = np.nan
@@ -115,17 +132,16 @@ class Fleet:
             state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
             state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
-        teams = _whole("team", _shaped("team", team, (n,)))
-        if isinstance(names, str):
-            raise FleetError(f"names is the text {names!r}; give a list of names, one for each boat")
+        look_at_positions(position)
+        teams = _whole("team", team, n)
         fleet = cls(
             state=state,
             team=teams,
             platforms=_kinds(platforms, n),
             controlled=teams == 0 if controlled is None else _yes_or_no("controlled", controlled, n),
-            names=tuple(f"boat_{i}" for i in range(n)) if names is None else tuple(names),
-            age_s=None if age_s is None else _shaped("age_s", age_s, (n,)),
-            position_error_m=None if position_error_m is None else _shaped("position_error_m", position_error_m, (n,)),
+            names=tuple(f"boat_{i}" for i in range(n)) if names is None else _names(names),
+            age_s=_copied("age_s", age_s, n),
+            position_error_m=_copied("position_error_m", position_error_m, n),
         )
         fleet.check()
         if FIELD in fleet.names:
@@ -145,23 +161,25 @@ class Fleet:
             FleetError: shapes do not fit together, a position, heading or speed is not finite or absurd, or an error
                 bound is not a length.
         """
-        n = len(self.state)
+        if not isinstance(self.state, np.ndarray):
+            raise FleetError(f"state is of {type(self.state).__name__}; give an array, or build the fleet by Fleet.of")
+        n = len(self.state) if self.state.ndim else 0
         if self.state.ndim != 2 or self.state.shape[1] != L.N_STATE or self.state.dtype != np.float64:
             raise FleetError(
                 f"state has shape {self.state.shape} of {self.state.dtype}; give (n, {L.N_STATE}) of float64, see "
                 "platforms.layout"
             )
         for name in ("team", "platforms", "controlled", "names", "age_s", "position_error_m"):
-            value = getattr(self, name)
-            if value is not None and len(value) != n:
-                raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
+            self._check_length(name, n)
         if not isinstance(self.controlled, np.ndarray) or self.controlled.dtype != np.bool_:
             kind = getattr(self.controlled, "dtype", type(self.controlled).__name__)
             raise FleetError(f"controlled is of {kind}; give an array of True or False per boat")
-        for name in ("team", "age_s", "position_error_m"):
+        for name, kind in (("team", np.int64), ("age_s", np.float64), ("position_error_m", np.float64)):
             value = getattr(self, name)
             if value is not None and not isinstance(value, np.ndarray):
                 raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
+            if value is not None and value.dtype != kind:
+                raise FleetError(f"{name} is of {value.dtype}; give {np.dtype(kind)}, or build the fleet by Fleet.of")
         if not sound(self.state):
             self._name_fault()
         error = self.position_error_m
@@ -169,6 +187,16 @@ class Fleet:
             raise FleetError(
                 "position_error_m holds a value that is negative or not finite; give a bound in m per boat"
             )
+
+    def _check_length(self, name: str, n: int) -> None:
+        value = getattr(self, name)
+        if value is None and name in ("age_s", "position_error_m"):
+            return
+        flat = value.ndim == 1 if isinstance(value, np.ndarray) else hasattr(value, "__len__")
+        if not flat or isinstance(value, (str, bytes)):
+            raise FleetError(f"{name} is {value!r}; give one per boat, or build the fleet by Fleet.of")
+        if len(value) != n:
+            raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
 
     def _name_fault(self) -> None:
         """Raise for the first boat whose values cannot be used."""
@@ -204,17 +232,62 @@ class Fleet:
         return self.state[:, L.SPEED]
 
 
+def _laid_out(value: np.ndarray) -> np.ndarray:
+    """The array in the layout of compiled code; its type stays what it is."""
+    return np.require(np.asarray(value), None, ["C", "A", "W"])
+
+
+_FORMS: dict[str, Callable[[Any], Any]] = {
+    "state": _laid_out,
+    "team": whole_numbers,
+    "controlled": _laid_out,
+    "age_s": numbers,
+    "position_error_m": numbers,
+}
+
+
 def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
-    """Value as a float array of that shape (None matches any length)."""
+    """Value as a float array of that shape (None matches any length); nothing at all fits any."""
     try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = numbers(value)
+    except NoNumbersError as error:
         raise FleetError(f"{name} is not an array of numbers ({error})") from None
+    if array.shape == (0,) and shape[0] in (None, 0):
+        array = array.reshape(0, *(entry or 0 for entry in shape[1:]))
     fits = array.ndim == len(shape) and all(w is None or w == g for w, g in zip(shape, array.shape, strict=True))
     if not fits:
         wanted = tuple("n" if entry is None else entry for entry in shape)
         raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
     return array
+
+
+def _copied(name: str, value: ArrayLike | None, n: int) -> Array | None:
+    """Values of n boats that the fleet keeps, if there are any."""
+    return None if value is None else _shaped(name, value, (n,)).copy()
+
+
+def _headings_deg(heading_rad: ArrayLike | None, heading_deg: ArrayLike | None, n: int) -> Array:
+    """Headings in deg, from whichever was given."""
+    if heading_deg is not None and heading_rad is None:
+        return _shaped("heading_deg", heading_deg, (n,))
+    if heading_rad is None or heading_deg is not None:
+        raise FleetError("give either heading_rad or heading_deg, clockwise from north")
+    found = _shaped("heading_rad", heading_rad, (n,))
+    look_at_headings("Fleet.of: heading_rad", found, "give heading_deg")
+    return np.degrees(found)
+
+
+def _names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names, each a text with something in it."""
+    if isinstance(names, (str, bytes)):
+        raise FleetError(f"names is the text {names!r}; give a list of names, one for each boat")
+    if not isinstance(names, Iterable):
+        raise FleetError(f"names is {names!r}; give a list of names, one for each boat")
+    found = tuple(names)
+    for name in found:
+        if not isinstance(name, str) or not name:
+            raise FleetError(f"names holds {name!r}; give a name, not empty, for each boat")
+    return tuple(str(name) for name in found)
 
 
 def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tuple[str | Platform, ...]:
@@ -239,8 +312,10 @@ def _yes_or_no(name: str, value: ArrayLike, n: int) -> BoolArray:
     return values == 1.0
 
 
-def _whole(name: str, values: Array) -> IntArray:
-    """Values as integers; fractions and NaN are refused."""
-    if not (np.isfinite(values).all() and (values == np.round(values)).all()):
-        raise FleetError(f"{name} holds a value that is not a whole number: {values.tolist()}")
-    return values.astype(np.int64)
+def _whole(name: str, values: ArrayLike, n: int) -> IntArray:
+    """Values of n boats as integers; fractions, NaN and what 64 bits do not hold are refused."""
+    _shaped(name, values, (n,))
+    try:
+        return whole_numbers(values).reshape(n).copy()
+    except NoNumbersError as error:
+        raise FleetError(f"{name} holds {error}") from None

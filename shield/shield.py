@@ -19,6 +19,7 @@ from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
 from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
+from .limiting import tell_of_limits, within_limits
 from .linearised import add_slack
 from .memory import Memory, new_memory
 from .plan import Plan, new_plan
@@ -117,6 +118,8 @@ class Shield:
         Raises:
             FleetError, PlatformError: boats that `decide` would refuse.
         """
+        if fleet is not None and not isinstance(fleet, Fleet):
+            raise FleetError(f"warm_up takes a Fleet, not {type(fleet).__name__}; build it with Fleet.of(...)")
         twin = Shield(self.config)
         twin.decide(*tight_spot())
         if fleet is not None:
@@ -128,7 +131,8 @@ class Shield:
 
         Args:
             fleet: all boats seen now.
-            wanted: command of each boat, n rows; rows of boats not controlled are passed through.
+            wanted: command of each boat, n rows; rows of boats not controlled are passed through. Speeds beyond what a
+                boat's platform does are cut first (not those of `Commands.game_deg`).
             surroundings: fixed things now, when they differ from the ones given at construction.
 
         Returns:
@@ -149,10 +153,11 @@ class Shield:
         if wanted.values.shape != (len(fleet), 2):
             raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
         boats = self._scene(fleet)
+        within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
         state, margin = prepare(seen, self.config, boats.params, self._pending)
         turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
-        asked = less_turn(wanted.as_relative_deg(fleet.state[:, L.HEADING]), turned)
+        asked = less_turn(within.as_relative_deg(fleet.state[:, L.HEADING]), turned)
         fixed = self._around(self.surroundings if surroundings is None else surroundings)
         if self.config.coordination == "team":
             seat = self._seats[0]
@@ -160,7 +165,9 @@ class Shield:
             answer = Answer(seat.plan, seat.work, state)
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
-        sent, changed, bound = to_send(fleet, wanted, asked, turned, answer)
+        sent, changed, bound = to_send(fleet, within, asked, turned, answer)
+        if cut is not None:
+            changed = tell_of_limits(cut, changed, answer)
         self._note_sent(seen, unknown, sent, boats)
         return Decisions(
             fleet=fleet,

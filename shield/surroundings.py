@@ -7,11 +7,13 @@ before what hunting opponents may do. Edge and keep-out circles are rules, and c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from .arrays import NoNumbersError, numbers
 from .certificates.fixed_things import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
@@ -49,9 +51,12 @@ class Surroundings:
         if self.field is not None:
             object.__setattr__(self, "field", _numbers("field", self.field, "(xmin, ymin, xmax, ymax)"))
         for name in ("circles", "keep_out", "stops"):
-            rows = tuple(_numbers(name, row, "(x, y, radius)") for row in getattr(self, name))
+            rows = tuple(_numbers(name, row, "(x, y, radius)") for row in _rows(name, getattr(self, name)))
             object.__setattr__(self, name, rows)
-        corners = tuple(tuple(_numbers("polygons", corner, "(x, y)") for corner in line) for line in self.polygons)
+        corners = tuple(
+            tuple(_numbers("polygons", corner, "(x, y)") for corner in _rows("polygons", line))
+            for line in _rows("polygons", self.polygons)
+        )
         object.__setattr__(self, "polygons", corners)
         if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out, *self.stops)):
             raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
@@ -103,12 +108,36 @@ def _off_m(config: ShieldConfig) -> float:
     return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
 
 
-def _numbers(name: str, row: Sequence[float], form: str) -> tuple[float, ...]:
+def _rows(name: str, value: object) -> tuple[Any, ...]:
+    """The rows of a list of things.
+
+    Raises:
+        ConfigError: it is no list.
+    """
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+        raise ConfigError(f"{name} holds {value!r}; give {_LISTS[name]}")
+    try:
+        return tuple(value)
+    except Exception as error:
+        raise ConfigError(f"{name} cannot be read ({error}); give {_LISTS[name]}") from None
+
+
+_CIRCLES = "a list of circles (x, y, radius) in m"
+_LISTS = {
+    "circles": _CIRCLES,
+    "keep_out": _CIRCLES,
+    "stops": _CIRCLES,
+    "polygons": "a list of polygons, each a list of corners (x, y) in m",
+}
+
+
+def _numbers(name: str, row: object, form: str) -> tuple[float, ...]:
     """A row as a tuple of finite floats, as many as ``form`` names."""
     try:
-        values = tuple(float(value) for value in row)
-    except (TypeError, ValueError):
+        array = numbers(row)
+    except NoNumbersError:
         raise ConfigError(f"{name} holds {row!r}; give {form} in m") from None
+    values = tuple(array.tolist()) if array.ndim == 1 else ()
     if len(values) != form.count(",") + 1:
         raise ConfigError(f"{name} holds {row!r}; give {form} in m")
     if not all(math.isfinite(value) for value in values):

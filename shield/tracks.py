@@ -142,8 +142,8 @@ def _check_age(fleet: Fleet, config: ShieldConfig) -> None:
     age = fleet.age_s
     if age is None or not (np.isfinite(age).all() and (age >= 0).all()):
         raise FleetError("age_s holds a value that is negative or not finite; give seconds since each track's fix")
-    worst = int(np.argmax(age))
-    if age[worst] > config.max_track_age_s:
+    worst = int(np.argmax(age)) if len(age) > 0 else -1
+    if worst >= 0 and age[worst] > config.max_track_age_s:
         raise FleetError(
             f"track of {fleet.names[worst]!r} is {age[worst]:.2f} s old, limit {config.max_track_age_s} s; "
             "refresh it, raise max_track_age_s, or leave the boat out: then nobody keeps clear of it"

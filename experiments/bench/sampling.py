@@ -37,7 +37,7 @@ class KeepingShield(Shield):
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Keep a copy of the question (the game changes its arrays in place), then answer it."""
         kept = replace(fleet, state=fleet.state.copy(), controlled=fleet.controlled.copy())
-        self.questions.append(Question(kept, Commands(wanted.values.copy(), wanted.relative), surroundings))
+        self.questions.append(Question(kept, replace(wanted, values=wanted.values.copy()), surroundings))
         return super().decide(fleet, wanted, surroundings)
 
 

@@ -48,7 +48,7 @@ def ablate(
 ) -> None:
     """Play every pairing off and on from the same seeds; write table, report and replay.
 
-    Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input, 130 interrupted.
+    Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input or a policy that never played, 130 interrupted.
     """
     settings = AblationSettings(
         preset=preset,

@@ -51,7 +51,7 @@ def evaluate(
 ) -> None:
     """Play a policy or submission against opponents and report how it did.
 
-    Exit status: 0 done, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
     wanted = o.shield_settings(separation, certificate, solver, shield_set)
     unused = [name for name in wanted if name != "separation_m"]  # at that radius breaches are counted anyhow

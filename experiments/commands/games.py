@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.console import Console
 from steerclear import policies
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
@@ -115,14 +115,17 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
 
 
 def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
-    """End with an error when games are missing.
+    """End with an error when games are missing, or a policy did not play in some.
 
     Raises:
         ConfigError: some games could not be played.
+        PolicyError: a policy gave nothing usable throughout some game.
     """
     if results["failed"]:
         missing = len(results["failed"])
         raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+    if results["held"]:
+        raise PolicyError("; ".join(results["held"]))
 
 
 def _play(campaign: Campaign, processes: int) -> Played:

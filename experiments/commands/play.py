@@ -12,9 +12,10 @@ from typing import Annotated, Any
 import typer
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..conditions import Conditions
+from ..failure_words import held_games
 from ..match import MatchResult, Watcher, play_match
 from ..provenance import machine, versions
 from ..score import DEFAULT_PENALTY, check_penalty
@@ -72,7 +73,7 @@ def play(
 ) -> None:
     """Play one game and show what happened.
 
-    Exit status: 0 done, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
     if keyboard and own not in ("medium", "keyboard"):
         raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {own}")
@@ -103,6 +104,9 @@ def play(
         out().print(f"{path}", soft_wrap=True)
     if json_file is not None:
         write_json(json_file, _content(result, files, time.perf_counter() - started))
+    held = held_games([result.row])
+    if held:
+        raise PolicyError("; ".join(held))
 
 
 def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> MatchResult:

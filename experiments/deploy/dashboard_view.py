@@ -36,6 +36,7 @@ WHY = {
     Reason.HELD: ("held", "magenta"),
     Reason.NOT_COVERED: ("-", "dim"),
     Reason.RIGHT_OF_WAY: ("way", "cyan"),
+    Reason.LIMITED: ("limit", "yellow"),
 }
 
 

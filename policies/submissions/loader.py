@@ -14,11 +14,11 @@ from steerclear.shield.exceptions import PolicyError
 
 from ..guard import Answer, ForeignCode, GuardedTeam, describe_error
 from .history import CONFIG_FILE, History, ObservationSettings
+from .interface import METHOD_NAME, check_interface
 from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
 
 CLASS_NAME = "solution"
-METHOD_NAME = "compute_action"
 
 
 class GlobalState(dict[Any, Any]):
@@ -57,7 +57,9 @@ class SubmissionCode(ForeignCode):
         self._sandbox = Sandbox(self.stage.folder)
         try:
             self._class, settings = self._load()
-            self._build()
+            instance = self._build()
+            with self._sandbox.active():
+                check_interface(instance, self.stage.source)
         except BaseException:
             self.close()
             raise

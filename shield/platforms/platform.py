@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..exceptions import PlatformError
 from . import layout as L
+from .proving import fault_of
 
 KINDS = {
     "usv": L.KIND_USV,
@@ -56,8 +57,11 @@ class Platform:
     steady speed is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``; a limit of 0 on acceleration or
     deceleration means none. Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``.
 
+    When it is built it is run in its own model, once: it must come to its top speed, turn and stop.
+
     Raises:
-        PlatformError: a value is missing, non-finite or out of range, or the kind is unknown.
+        PlatformError: a value is missing, non-finite or out of range, the kind is unknown, or the boat cannot move,
+            turn or stop.
     """
 
     name: str
@@ -79,7 +83,9 @@ class Platform:
     max_angular_acc_dps2: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
+        if not isinstance(self.name, str) or not self.name:
+            raise PlatformError(f"a platform's name is {self.name!r}; give it one")
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
             raise PlatformError(f"platform {self.name!r}: unknown kind {self.kind!r}; choose one of {sorted(KINDS)}")
         who = f"platform {self.name!r}"
         for entry in fields(self):
@@ -90,8 +96,18 @@ class Platform:
             raise PlatformError(f"{who}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
         if self.turn_loss > 1:
             raise PlatformError(f"{who}: turn_loss is {self.turn_loss}; it is the share of speed lost, 0 to 1")
-        object.__setattr__(self, "thrust_map", tuple(tuple(point) for point in self.thrust_map))
+        for name in ("speed_pid", "heading_pid"):
+            if not isinstance(getattr(self, name), Gains):
+                raise PlatformError(f"{who}: {name} is {getattr(self, name)!r}; give Gains(kp=..., ki=..., kd=...)")
+        try:
+            points = tuple(tuple(point) for point in self.thrust_map)
+        except TypeError:
+            raise PlatformError(f"{who}: thrust_map is {self.thrust_map!r}; give (thrust, speed) points") from None
+        object.__setattr__(self, "thrust_map", points)
         self._check_thrust_map()
+        fault = fault_of(self)
+        if fault is not None:
+            raise PlatformError(f"{who} is no boat that can be steered: in its own model, {fault}")
 
     def _check_thrust_map(self) -> None:
         for point in self.thrust_map:

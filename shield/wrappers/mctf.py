@@ -38,6 +38,10 @@ class MctfReader:
         decoded: Array = self.env.decode(actions)
         return decoded
 
+    def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
+        """The actions: the env takes all that there are."""
+        return dict(actions)
+
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge, obstacles and the own flag's circle."""
         return surroundings_of(self.env.core, team, keep_out)

@@ -13,7 +13,7 @@ from ..decision import Decisions
 from ..exceptions import FleetError
 from ..jit import Array
 from ..shield import Shield
-from .reading import GameReader, one_game_shield, reader_of, team_number
+from .reading import GameReader, one_game_shield, parallel_game, reader_of, team_number
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
@@ -44,7 +44,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         keep_out: bool = True,
         reader: GameReader | None = None,
     ) -> None:
-        super().__init__(env)
+        super().__init__(parallel_game(env))
         self.shield = one_game_shield(shield)
         self.team = team_number(team)
         self.shield_autopilot = shield_autopilot
@@ -69,10 +69,20 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self._tell(outcome[-1])
         return outcome
 
+    def __getattr__(self, name: str) -> Any:
+        """What the game has, with an underscore too: Pyquaticus' own policies are built with the env and read such.
+
+        Special names and those of this wrapper's own are never looked up there: copying and pickling ask for them
+        before they are set.
+        """
+        if name.startswith("__") or name in _OWN:
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+        return getattr(self.env if not name.startswith("_") else self.env.unwrapped, name)
+
     def _decide(self, commands: Array) -> Decisions:
         fleet = self._reader.fleet(self.team, self.shield_autopilot)
         around = self._reader.surroundings(self.team, self.keep_out)
-        self.decisions = self.shield.decide(fleet, Commands.relative_deg(commands), around)
+        self.decisions = self.shield.decide(fleet, Commands.game_deg(commands), around)
         return self.decisions
 
     def _after(self, earlier: Callable[[Any, Array], Array] | None) -> Callable[[Any, Array], Array]:
@@ -89,7 +99,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
     def _filtered(self, actions: dict[str, Any]) -> dict[str, Any]:
         """Actions with those of boats the shield had to correct replaced by (speed, relative heading) pairs."""
         decisions = self._decide(self._reader.commands(actions))
-        changed = dict(actions)
+        changed = self._reader.playable(actions)
         for i in np.flatnonzero(decisions.intervened):
             changed[self._reader.agent_ids[i]] = decisions.sent.values[i].copy()
         return changed
@@ -102,3 +112,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         for i, agent in enumerate(self._reader.agent_ids):
             if team[i] == self.team and agent in infos:
                 infos[agent]["shield"] = self.decisions[i]
+
+
+_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader")
+"""Attributes of the wrapper itself."""

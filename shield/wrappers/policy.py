@@ -10,7 +10,7 @@ import numpy as np
 
 from ..commands import Commands
 from ..decision import Decisions
-from ..exceptions import ConfigError, PolicyError
+from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
 from .reading import GameReader, one_game_shield, reader_of
@@ -68,8 +68,9 @@ class ShieldedTeamPolicy:
         actions = dict(answer)
         fleet = self._reader.fleet(self._team, False)
         around = self._reader.surroundings(self._team, self.keep_out)
-        wanted = Commands.relative_deg(self._reader.commands(actions))
+        wanted = Commands.game_deg(self._reader.commands(actions))
         self.decisions = self.shield.decide(fleet, wanted, around)
+        actions = self._reader.playable(actions)
         for agent in self._agent_ids:
             i = self._reader.agent_ids.index(agent)
             if self.decisions.intervened[i]:
@@ -128,6 +129,8 @@ class ShieldedCallable:
         thing that is wrong. Before the first usable answer the frame is that of `Commands.relative_deg`.
         """
         fleet = self.read(seen)
+        if not isinstance(fleet, Fleet):
+            raise FleetError(f"read answered {type(fleet).__name__}; let it return a Fleet, see Fleet.of")
         try:
             wanted = _usable(self.policy(seen), len(fleet))
             self._note("")

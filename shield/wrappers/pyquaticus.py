@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from ..exceptions import ConfigError
+from ..actions import DISCRETE, Command, Seat, check_agents, plain_action, read_action
 from ..fleet import Fleet
 from ..jit import Array
 from ..platforms import get_platform
 from ..platforms import layout as L
 from ..surroundings import Surroundings
-from .reading import DISCRETE, KEEP_OUT_MARGIN_M, no_commands, obstacles_of
+from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 
 
 class PyquaticusReader:
@@ -43,25 +44,43 @@ class PyquaticusReader:
         return Fleet(state, teams, self._platforms, (teams == team) & ~driven, self.agent_ids)
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
-        """Commands of discrete actions and (speed, relative heading) pairs; field points through the env."""
-        values = no_commands(len(self.agent_ids))
+        """Commands of actions of any kind; boats without one stop, as in the env."""
+        check_agents(actions, self.agent_ids)
+        values = np.zeros((len(self.agent_ids), 2))
         for i, agent in enumerate(self.agent_ids):
             if agent in actions:
-                values[i] = self._command(actions[agent], self.env.players[agent])
+                values[i] = read_action(self._seat(agent), actions[agent])
         return values
 
-    def _command(self, action: Any, player: Any) -> tuple[float, float]:
-        top = float(player.get_max_speed())
-        if isinstance(action, str):
-            speed, heading = self.env._afp_to_speed_relheading(action, player)
-            return float(speed), float(heading)
-        array = np.asarray(action, dtype=np.float64)
-        if array.shape == (2,):
-            return float(array[0]), float(array[1])
-        if array.ndim != 0 or array not in range(len(DISCRETE)):
-            raise ConfigError(f"action {action!r} of {player.id} is neither 0..16 nor (speed, relative heading)")
-        share, heading = DISCRETE[int(array)]
-        return top * float(share), float(heading)
+    def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
+        """The actions in a form the env takes: plain numbers, pairs and names as they are, others made plain.
+
+        It looks whole numbers up in a list, so that arrays without axes, tensors and whole floats are none to it.
+        """
+        return {agent: self._playable(agent, action) for agent, action in actions.items()}
+
+    def _playable(self, agent: str, action: Any) -> Any:
+        if type(action) in (int, str) or _is_pair(action):
+            return action
+        return plain_action(self._seat(agent), action)
+
+    def _seat(self, agent: str) -> Seat:
+        """The env looks numbers up in a list, by Python's rules, and takes the first two entries of anything longer."""
+        player = self.env.players[agent]
+        points = tuple(getattr(self.env, "aquaticus_field_points", None) or ())
+        return Seat(
+            agent,
+            float(player.get_max_speed()),
+            lambda name: self._to_point(name, player),
+            points,
+            lowest=-len(DISCRETE),
+            bools=True,
+            longer=True,
+        )
+
+    def _to_point(self, name: str, player: Any) -> Command:
+        speed, heading = self.env._afp_to_speed_relheading(name, player)
+        return float(speed), float(heading)
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge and obstacles; the own flag's circle, see `mctf.surroundings_of`."""
@@ -74,6 +93,13 @@ class PyquaticusReader:
             radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
         return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), stops=circle)
+
+
+def _is_pair(action: Any) -> bool:
+    """Whether it is a pair of plain numbers."""
+    if isinstance(action, np.ndarray):
+        return action.shape == (2,)
+    return isinstance(action, (list, tuple)) and len(action) == 2 and all(isinstance(one, Real) for one in action)
 
 
 def _team(player: Any) -> int:

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-import numpy as np
-
 from ..exceptions import ConfigError
 from ..fleet import Fleet
 from ..jit import Array
@@ -17,11 +15,6 @@ from ..surroundings import Surroundings
 
 KEEP_OUT_MARGIN_M = 0.1
 """Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""
-
-HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
-
-DISCRETE = np.array([(share, heading) for share in (1.0, 0.5) for heading in HEADINGS_DEG] + [(0.0, 0.0)])
-"""(17, 2) the game's discrete actions: share of top speed and relative heading, deg; the last one stops."""
 
 SIDES = {"blue": 0, "red": 1}
 
@@ -36,7 +29,14 @@ class GameReader(Protocol):
         """All boats now; controlled are those of ``team`` that the shield can decide for."""
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
-        """(n, 2) speed m/s and relative heading deg of the actions; NaN rows for boats without a usable one."""
+        """(n, 2) speed m/s and relative heading deg of the actions, as the game plays them; missing boats stop.
+
+        Raises:
+            GameError: an action is none, or of no boat of the game.
+        """
+
+    def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
+        """The actions in a form the environment itself takes; those it takes already are the very same objects."""
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge, obstacles and (with ``keep_out``) the own flag's circle."""
@@ -87,14 +87,25 @@ def reader_of(env: Any) -> GameReader:
     )
 
 
+def parallel_game(env: Any) -> Any:
+    """The environment itself, if all boats of it act at once.
+
+    Raises:
+        ConfigError: they act in turn (AEC), or it is a class.
+    """
+    if isinstance(env, type):
+        raise ConfigError(f"{env.__name__} is a class; give an environment: {env.__name__}(...)")
+    if callable(getattr(type(env), "last", None)) and callable(getattr(type(env), "agent_iter", None)):
+        raise ConfigError(
+            f"{type(env).__name__} is an AEC env, in which boats act in turn, and the shield decides for all at once; "
+            "wrap the parallel env: parallel_to_aec(ShieldedParallelEnv(mctf_v0.parallel_env(...), Shield()))"
+        )
+    return env
+
+
 def obstacles_of(obstacles: Mapping[str, Any] | None) -> tuple[list[Any], list[Any]]:
     """Circles (x, y, radius) and polygons from {"circle": [(radius, (x, y))], "polygon": [((x, y), ...)]}."""
     found = obstacles or {}
     circles = [(float(c[0]), float(c[1]), float(r)) for r, c in found.get("circle") or ()]
     polygons = [tuple((float(x), float(y)) for x, y in points) for points in found.get("polygon") or ()]
     return circles, polygons
-
-
-def no_commands(n: int) -> Array:
-    """Commands nobody gave yet: (n, 2) NaN."""
-    return np.full((n, 2), np.nan)

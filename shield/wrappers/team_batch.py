@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..actions import Seat, read_flat
 from ..batch import BatchedShield
-from ..exceptions import ConfigError, PolicyError
+from ..exceptions import ConfigError, GameError, PolicyError
 from ..jit import Array, BoolArray
-from .reading import DISCRETE, team_number
+from .reading import team_number
 
 ACTIONS = ("discrete", "continuous")
 
@@ -113,19 +114,14 @@ class TeamBatch:
 
     def _decode(self, actions: Any) -> Array:
         """Commands (B, boats, 2) of flat actions."""
-        shape = (self.core.n_games, len(self.boats))
+        top_mps = np.tile(self.core.max_speed_mps[self.boats], self.core.n_games)
         try:
-            given = np.asarray(actions, dtype=np.float64)
-        except (TypeError, ValueError):
-            given = np.full(0, np.nan)  # no numbers: refused below like any wrong shape
-        if self.actions == "discrete":
-            if given.shape != (self.learners,) or not np.isin(given, range(len(DISCRETE))).all():
-                raise PolicyError(f"give {self.learners} discrete actions in 0..{len(DISCRETE) - 1}")
-            commands = DISCRETE[given.astype(np.int64)].reshape(*shape, 2)
-            return commands * np.stack([self.core.max_speed_mps[self.boats], np.ones(len(self.boats))], axis=1)
-        if given.shape != (self.learners, 2) or not np.isfinite(given).all():
-            raise PolicyError(f"give finite actions of shape ({self.learners}, 2): speed m/s, relative heading deg")
-        return given.reshape(*shape, 2)
+            flat = read_flat(
+                actions, top_mps, lambda i: Seat(f"learner {i}", float(top_mps[i])), self.actions == "continuous"
+            )
+        except GameError as error:
+            raise PolicyError(str(error)) from None
+        return flat.reshape(self.core.n_games, len(self.boats), 2)
 
     def _flat(self, observations: Any) -> NDArray[np.float32]:
         flat: NDArray[np.float32] = observations[:, self.boats].reshape(self.learners, -1).copy()

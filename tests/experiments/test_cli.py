@@ -180,6 +180,43 @@ def test_evaluate_plays_with_or_without_the_shield():
     assert "shield off" not in on.stdout
 
 
+ALL_GAME = """
+class solution:
+    def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
+        raise RuntimeError("no model")
+"""
+OF_2024 = """
+class solution:
+    def compute_action(self, agent_id, observation_normalized, observation):
+        return 4
+"""
+
+
+@pytest.mark.parametrize(
+    "command", ["evaluate ./own --opponents hold", "evaluate hold --opponents ./own", "play --own ./own"]
+)
+def test_a_policy_that_held_all_game_changes_the_exit_status(command):
+    Path("own").mkdir()
+    Path("own/solution.py").write_text(ALL_GAME)
+    tiny = ["--max-time", "1"] if command.startswith("play") else [*TINY, "--out", "out", "--json", "a.json"]
+    done = run(*command.split(), *tiny)
+    assert done.exit_code == ExitCode.BAD_INPUT, done.output
+    assert "gave no usable answer throughout" in " ".join(done.stderr.split())
+    assert "no model" in done.stderr
+    if not command.startswith("play"):
+        assert len(json.loads(Path("a.json").read_text())["held"]) == 1
+        assert "WARNING" in done.stdout
+
+
+def test_a_policy_of_another_interface_is_refused_before_the_first_game():
+    Path("own").mkdir()
+    Path("own/solution.py").write_text(OF_2024)
+    done = run("evaluate", "./own", *TINY, "--out", "out")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "2024" in done.stderr
+    assert not Path("out").exists()
+
+
 def test_play_saves_what_it_is_asked_to_and_render_goes_on_from_there():
     saves = [part for name in ("a.npz", "a.html", "a.png") for part in ("--save", name)]
     done = run("play", "--max-time", "2", "--opponent", "hold", *saves, "--json", "a.json")

@@ -3,7 +3,7 @@
 import pytest
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.campaign import Played
-from steerclear.experiments.failure_words import failure_warnings
+from steerclear.experiments.failure_words import failure_warnings, held_games
 from steerclear.experiments.match import play_row
 from steerclear.experiments.page import as_text
 from steerclear.experiments.results import results_of, write_results
@@ -12,6 +12,10 @@ from steerclear.experiments.spec import MatchSpec
 
 def row(own=0, other=0, text=None):
     return {"policy_failures": own, "opponent_policy_failures": other, "first_failure": text}
+
+
+def played(steps, row):
+    return {"steps": steps, **row}
 
 
 def test_games_in_which_nothing_failed_need_no_warning():
@@ -32,6 +36,25 @@ def test_failures_are_counted_and_the_first_is_quoted(rows, words):
     assert words in text
     first = next(row["first_failure"] for row in rows if row["first_failure"])
     assert text.endswith(f"First failure: {first.partition(': ')[2]}")
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([played(10, row(10, 0, "own: raised"))], "the own policy gave no usable answer throughout 1 of 1 games"),
+        ([played(10, row(30, 0)), played(10, row(9))], "throughout 1 of 2 games"),
+        ([played(5, row(0, 15, "opponent: late"))], "the opponents' policy gave no usable answer throughout 1 of 1"),
+    ],
+)
+def test_policies_that_did_not_play_are_named(rows, words):
+    (text,) = held_games(rows)
+    assert words in text
+    quoted = (rows[0]["first_failure"] or "").partition(": ")[2]
+    assert f"({quoted})" in text or not quoted
+
+
+def test_policies_that_failed_now_and_then_did_play():
+    assert held_games([played(10, row(9, 9)), played(0, row())]) == []
 
 
 def test_nobody_is_quoted_with_the_others_words():

@@ -191,7 +191,7 @@ def _snapshot(tick: Tick) -> Tick:
         age_s=None if tick.fleet.age_s is None else tick.fleet.age_s.copy(),
         position_error_m=None if tick.fleet.position_error_m is None else tick.fleet.position_error_m.copy(),
     )
-    wanted = None if tick.wanted is None else Commands(tick.wanted.values.copy(), tick.wanted.relative)
+    wanted = None if tick.wanted is None else replace(tick.wanted, values=tick.wanted.values.copy())
     return replace(tick, fleet=fleet, wanted=wanted, decisions=_copied(tick, fleet, wanted))
 
 
@@ -204,7 +204,7 @@ def _copied(tick: Tick, fleet: Fleet, wanted: Commands | None) -> Decisions | No
         decisions,
         fleet=fleet,
         wanted=wanted,
-        sent=wanted if same else Commands(decisions.sent.values.copy(), decisions.sent.relative),
+        sent=wanted if same else replace(decisions.sent, values=decisions.sent.values.copy()),
         intervened=decisions.intervened.copy(),
         reason=decisions.reason.copy(),
         certificate_m=decisions.certificate_m.copy(),

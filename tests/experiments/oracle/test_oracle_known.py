@@ -7,13 +7,20 @@ import pytest
 from oracle_runs import DT_S, driven_track, first_breach, straight_track
 from steerclear.experiments.oracle import Boat, Outcome, judge
 from steerclear.shield.platforms import Platform, fresh_state, get_platform
+from steerclear.shield.platforms.proving import reference_models
 
 RADIUS_M = 2.5
 
 
+def model(*settings, **more):
+    """A platform with a known answer, which need not be a boat."""
+    with reference_models():
+        return Platform(*settings, **more)
+
+
 def straight_boat(top_mps, **changes):
     """A double integrator without a rudder: it can only brake."""
-    return Platform("rail", "double_integrator", top_mps, **changes)
+    return model("rail", "double_integrator", top_mps, **changes)
 
 
 def meeting(platform, start_m, speed_mps, other, steps=150):
@@ -56,7 +63,7 @@ def test_last_stop_head_on_with_a_boat_that_stops_too(closing_mps):
 @pytest.mark.parametrize("distance_m", [2.501, 2.52, 2.58])
 def test_single_integrator_stops_at_once(distance_m):
     # set to 0, it still moves with the mean of old and new speed for one step: 0.15 m here
-    platform = Platform("si", "single_integrator", 3.0, max_turn_rate_dps=0.0)
+    platform = model("si", "single_integrator", 3.0, max_turn_rate_dps=0.0)
     speed_mps, ahead_m = 3.0, distance_m + 6.0 + 0.15
     states, rows = meeting(platform, (0.0, 0.0), speed_mps, straight_track((0.0, ahead_m), (0.0, 0.0), 150))
     verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
@@ -66,7 +73,7 @@ def test_single_integrator_stops_at_once(distance_m):
 
 def test_single_integrator_against_a_faster_boat_from_behind():
     # it can speed up only to its top speed, and has no rudder: nothing helps but starting ahead
-    platform = Platform("si", "single_integrator", 2.0, max_turn_rate_dps=0.0)
+    platform = model("si", "single_integrator", 2.0, max_turn_rate_dps=0.0)
     states, rows = meeting(platform, (0.0, 0.0), 2.0, straight_track((0.0, -20.0), (0.0, 4.0), 150))
     verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
     assert verdict.outcome is Outcome.UNAVOIDABLE
@@ -77,7 +84,7 @@ def test_single_integrator_against_a_faster_boat_from_behind():
 
 def dubins(speed_mps, turn_dps):
     """A boat of constant speed whose turn rate obeys at once within its bound."""
-    return Platform(
+    return model(
         "dubins", "double_integrator", speed_mps, max_turn_rate_dps=turn_dps, max_angular_acc_dps2=1e6, max_acc=0.0
     )
 

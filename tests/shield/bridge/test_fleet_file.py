@@ -65,6 +65,11 @@ def test_a_good_file_says_what_follows():
         ("team: blue", "team: blue\nlogdir: x", "did you mean 'log_dir'"),
         ("team: blue", "team: blue\nplatforms: {mine: {max_speed: 2}}", "platforms.mine"),
         ("team: blue", "team: blue\nplatforms: {mine: {max_speed_mps: -2}}", "platforms.mine"),
+        (
+            "team: blue\n",
+            "team: blue\nplatforms: {mine: {max_speed_mps: 3.0}}\n",
+            "platforms.mine: platform 'mine' is no boat that can be steered",
+        ),
         ("agent: agent_0,", "agent: agent_0, team: red,", "leave its team out"),
         ("contact: feed", "contact: feed, feed_listen: '127.0.0.1:1'", "leave its feed_listen out"),
     ],
@@ -133,7 +138,8 @@ def test_boats_of_somebody_else_are_not_commanded():
 
 
 def test_a_platform_of_the_file_is_used():
-    more = "platforms: {mine: {max_speed_mps: 1.5, max_acc: 0.5, speed_pid: {kp: 1.0}, heading_pid: {kp: 0.9}}}"
+    boat = "thrust_map: [[0, 0], [100, 1.5]], turn_gain: 60, speed_pid: {kp: 1.0}, heading_pid: {kp: 0.9}"
+    more = f"platforms: {{mine: {{max_speed_mps: 1.5, max_acc: 0.5, {boat}}}}}"
     fleet = fleet_of(blue=1, red=0, platform="mine", more=more)
     assert isinstance(fleet.kind_of["blue_1"], Platform)
     assert fleet.platform_of["blue_1"].max_speed_mps == 1.5

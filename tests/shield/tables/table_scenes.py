@@ -2,6 +2,7 @@
 
 import numpy as np
 from steerclear.shield.platforms.platform import Platform
+from steerclear.shield.platforms.proving import reference_models
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.files import pack_values
 from steerclear.shield.tables.grid import Grid
@@ -28,10 +29,11 @@ def random_table(seed=0, **changes):
 
 def steady_car(name="car", speed_mps=2.0, turn_dps=0.0):
     """A boat of constant speed and bounded turn rate."""
-    return Platform(
-        name=name,
-        kind="usv",
-        max_speed_mps=speed_mps,
-        thrust_map=((0.0, speed_mps), (100.0, speed_mps)),
-        turn_gain=turn_dps / 2.0,
-    )
+    with reference_models():  # it cannot stop
+        return Platform(
+            name=name,
+            kind="usv",
+            max_speed_mps=speed_mps,
+            thrust_map=((0.0, speed_mps), (100.0, speed_mps)),
+            turn_gain=turn_dps / 2.0,
+        )

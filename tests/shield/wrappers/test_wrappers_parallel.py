@@ -8,7 +8,7 @@ import pytest
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Reason, Shield
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import ShieldedParallelEnv
 
@@ -134,6 +134,8 @@ class Quaticus:
         self.act_space_checked, self.act_space_match = {}, {}
         self.env_size, self.flag_keepout_radius, self.agent_radius = (160.0, 80.0), 3.0, [2.0, 2.0]
         self.metadata, self.stepped = {}, []
+        self.aquaticus_field_points = {"HOME": (20.0, 40.0)}
+        self._walls = [[1], [2]]
 
     @property
     def unwrapped(self):
@@ -191,12 +193,13 @@ def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():
     assert game.stepped[0] == {"agent_0": STRAIGHT}
 
 
-@pytest.mark.parametrize("action", [17, -1, [1, 2, 3], 2.5, math.nan])
+@pytest.mark.parametrize("action", [17, -18, [[1, 2, 3]], 2.5, math.nan])
 def test_pyquaticus_actions_that_are_none_are_refused(action):
     env = ShieldedParallelEnv(Quaticus(gap_m=30.0), Shield())
     env.reset(seed=0)
-    with pytest.raises(ConfigError, match=r"is neither 0\.\.16 nor \(speed, relative heading\)"):
+    with pytest.raises(GameError, match=r"of agent_0 is (not usable|out of range); give a whole number 0\.\.16"):
         env.step({"agent_0": action})
+    assert env.unwrapped.stepped == []
 
 
 def test_rows_of_pyquaticus_players_hold_what_is_known():

@@ -15,6 +15,7 @@ from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.bridge.wanted import Snapshot
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.proving import reference_models
 
 DT_S = 0.1
 HERON = get_platform("heron")
@@ -197,7 +198,9 @@ def test_a_compass_that_is_off_is_found():
 
 
 def test_a_boat_that_does_not_move_passes_nothing():
-    drill, _ = driven(platform=replace(HERON, name="aground", max_speed_mps=0.01))
+    with reference_models():
+        aground = replace(HERON, name="aground", max_speed_mps=0.01)
+    drill, _ = driven(platform=aground)
     for check in drill_checks(drill, dict(FLEET.platform_of), DT_S):
         assert not check.run().passed
 

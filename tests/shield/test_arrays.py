@@ -1,0 +1,130 @@
+"""Arrays of any kind become one type and one layout, exactly, or are refused."""
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from steerclear.shield.arrays import NoNumbersError, numbers, truths, whole_numbers
+
+PLAIN = np.array([[2.0, 0.25], [1.0, -3.0]])
+
+
+class Frame:
+    """Anything that knows how to be an array."""
+
+    def __array__(self, dtype=None, copy=None):
+        return np.asfortranarray(PLAIN).astype(dtype or np.float64)
+
+
+def read_only(array):
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy
+
+
+def unaligned(array):
+    raw = np.zeros(array.nbytes + 1, np.uint8)[1:].view(np.float64).reshape(array.shape)
+    raw[:] = array
+    return raw
+
+
+ODD = {
+    "list": PLAIN.tolist(),
+    "tuples": tuple(map(tuple, PLAIN.tolist())),
+    "float32": PLAIN.astype(np.float32),
+    "float16": PLAIN.astype(np.float16),
+    "longdouble": PLAIN.astype(np.longdouble),
+    "big-endian": PLAIN.astype(">f8"),
+    "Fortran": np.asfortranarray(PLAIN),
+    "strided": np.repeat(PLAIN, 2, axis=1)[:, ::2],
+    "reversed": np.flip(np.flip(PLAIN).copy()),
+    "broadcast": np.broadcast_to(PLAIN, (1, 2, 2))[0],
+    "read-only": read_only(PLAIN),
+    "unaligned": unaligned(PLAIN),
+    "objects": PLAIN.astype(object),
+    "decimals": [[Decimal("2"), Decimal("0.25")], [1, Decimal("-3")]],
+    "matrix": np.asarray(PLAIN).view(np.ndarray),
+    "unmasked": np.ma.masked_array(PLAIN),
+    "frame": Frame(),
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_numbers_of_any_kind_are_the_same_numbers(kind):
+    found = numbers(ODD[kind])
+    assert type(found) is np.ndarray
+    assert found.dtype == np.float64
+    assert found.flags.carray
+    assert found.tobytes() == PLAIN.tobytes()
+
+
+def test_what_fits_already_is_not_copied():
+    for brought, array in ((numbers, PLAIN), (truths, np.ones(2, bool)), (whole_numbers, np.arange(3))):
+        assert brought(array) is array
+
+
+def test_tensors_lose_their_gradient_and_nothing_else():
+    torch = pytest.importorskip("torch")
+    for tensor in (
+        torch.tensor(PLAIN, requires_grad=True),
+        torch.tensor(PLAIN, dtype=torch.bfloat16),
+        [torch.tensor(row, requires_grad=True) for row in PLAIN],
+        [[torch.tensor(value, requires_grad=True) for value in row] for row in PLAIN.tolist()],
+    ):
+        assert numbers(tensor).tobytes() == PLAIN.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("12", "texts"),
+        (b"12", "texts"),
+        (["1.0", "2.0"], "texts"),
+        (np.array(["1.0", 2.0], dtype=object), "texts"),
+        ([1.0 + 2.0j], "complex"),
+        ([[1.0], [2.0, 3.0]], "inhomogeneous"),
+        (np.ma.masked_array([1.0, 2.0], mask=[True, False]), "masked"),
+        (np.zeros(2, "datetime64[s]"), "datetime64"),
+        (np.zeros(2, [("x", float)]), "x"),
+        ({1.0, 2.0}, "set"),
+        ({"x": 1.0}, "dict"),
+        ([10**400], "64 bits"),
+        (object(), "float"),
+        (lambda: 1.0, "float"),
+    ],
+)
+def test_what_holds_no_numbers_is_refused(value, text):
+    for brought in (numbers, truths, whole_numbers):
+        with pytest.raises(NoNumbersError, match=text):
+            brought(value)
+
+
+def test_none_is_not_a_number_as_numpy_has_it():
+    assert np.isnan(numbers([None, 1.0])[0])
+
+
+@pytest.mark.parametrize("value", [[2**63 - 1], [np.int64(-(2**63))], np.array([2**53 + 1]), np.uint64([7]), [True]])
+def test_whole_numbers_are_exact(value):
+    assert whole_numbers(value).tolist() == [int(value[0])]
+
+
+@pytest.mark.parametrize(
+    "value", [[2**63], [2**64], [-(2**63) - 1], [0.5], [np.nan], [np.inf], [2.0**60], [1e300], np.uint64([2**63])]
+)
+def test_whole_numbers_that_are_none_or_too_large_are_refused(value):
+    with pytest.raises(NoNumbersError, match=r"a (value|number)"):
+        whole_numbers(value)
+
+
+@pytest.mark.parametrize("value", [[1, 0], [1.0, 0.0], np.array([True, False]), read_only(np.array([True, False]))])
+def test_truths_may_be_told_by_one_and_nought(value):
+    found = truths(value)
+    assert found.dtype == np.bool_
+    assert found.flags.carray
+    assert found.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("value", [[2, 0], [np.nan, 1.0], [0.5, 0.0]])
+def test_truths_are_nothing_else(value):
+    with pytest.raises(NoNumbersError, match="neither True nor False"):
+        truths(value)
