@@ -10,7 +10,7 @@ from typing import Self
 
 from steerclear.shield.bridge.blackbox import TlogWriter, log_path
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.contact import Contact, heard_from
 from steerclear.shield.bridge.feed import FeedReceiver
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.fleet_settings import BoatSettings
@@ -94,7 +94,7 @@ class Station:
         """Boats heard of by the feed and by links that are only listened to."""
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.ears.values()]
-        heard = () if self.feed is None else self.feed.read()
+        heard = () if self.feed is None else heard_from(self.feed)
         return (*heard, *(contact for contact in told if contact is not None))
 
     def close(self) -> None:

@@ -65,7 +65,15 @@ class Alarming(Protocol):
     def alarms(self) -> Sequence[Alarm]:
         """What is wrong now; never waits."""
 
+    def rivals(self) -> Sequence[Contact]:
+        """What those say who speak under the name of another; never waits."""
+
 
 def alarms_of(source: object) -> tuple[Alarm, ...]:
     """The alarms of a source, if it has any to give."""
     return tuple(source.alarms()) if isinstance(source, Alarming) else ()
+
+
+def heard_from(source: ContactSource) -> tuple[Contact, ...]:
+    """All that a source has heard, whoever is right."""
+    return (*source.read(), *(source.rivals() if isinstance(source, Alarming) else ()))

@@ -93,6 +93,7 @@ class FeedReceiver:
         self._lock = threading.Lock()
         self._told = Told()
         self._rival = ("", -math.inf)
+        self._rivals = Told()
         self._game: GameState | None = None
         self._game_s = -math.inf
         self._faults: Counter[str] = Counter()
@@ -101,6 +102,7 @@ class FeedReceiver:
         self._order = Order(None if key is None else SigningClock())
         self._budget = Budget(PACKETS_PER_S)
         self._closing = threading.Event()
+        self._closed = False
         self._socket = hearing_socket(listen)
         host, port = self._socket.getsockname()[:2]
         self.address = f"{host}:{port}"
@@ -114,14 +116,23 @@ class FeedReceiver:
         with self._lock:
             return self._told.contacts(now_s)
 
+    def rivals(self) -> Sequence[Contact]:
+        """The same of programs that send under the name of one that speaks: they are not it, but may be right."""
+        now_s = self._clock.now_s()
+        with self._lock:
+            return self._rivals.contacts(now_s)
+
     def alarms(self) -> Sequence[Alarm]:
         """Two programs under one name, or more senders of a boat than can be weighed against each other."""
         now_s = self._clock.now_s()
         with self._lock:
             text, at_s = self._rival
             rivals = [Alarm(f"feed: {text}")] if now_s - at_s < GONE_S else []
-            crowded = self._told.crowded(now_s)
-        return (*rivals, *(Alarm(f"more than {MAX_SOURCES} senders tell of it", boat, lost=True) for boat in crowded))
+            crowded = {*self._told.crowded(now_s), *self._rivals.crowded(now_s)}
+        return (
+            *rivals,
+            *(Alarm(f"more than {MAX_SOURCES} senders tell of it", boat, lost=True) for boat in sorted(crowded)),
+        )
 
     def game(self) -> GameState | None:
         """The latest state of the game; None: none yet."""
@@ -162,8 +173,7 @@ class FeedReceiver:
         if problem is not None:
             self._refuse(*problem)
             if problem[0] in RIVALS:
-                with self._lock:
-                    self._rival = (problem[1], now_s)
+                self._note_rival(packet, problem[1], now_s)
             return
         if packet.sender == TELEMETRY:
             self._refuse("sender", f"{host}: {TELEMETRY} is no name for a sender; take another")
@@ -173,15 +183,25 @@ class FeedReceiver:
         if packet.game is not None:
             self._take_game(packet.game, packet.sender, now_s)
         for fix in packet.fixes:
-            self._take_fix(fix, packet.sender, now_s)
+            self._take_fix(self._told, fix, packet.sender, now_s)
+
+    def _note_rival(self, packet: Packet, text: str, now_s: float) -> None:
+        with self._lock:
+            self._rival = (text, now_s)
+        for fix in packet.fixes:
+            self._take_fix(self._rivals, fix, f"{packet.sender} (run {packet.run})", now_s)
 
     def close(self) -> None:
         """Give the socket back; may be called again."""
+        closed = self._closed
         self._closing.set()
         with contextlib.suppress(OSError):  # a datagram of its own wakes the thread; else its wait ends soon by itself
             self._socket.sendto(b"", self._socket.getsockname())
         self._thread.join(timeout=2.0)
         self._socket.close()
+        faults, self._closed = self.faults(), True
+        if faults and not closed:
+            logger.warning("feed: refused in all: %s", ", ".join(f"{count} {kind}" for kind, count in faults.items()))
 
     def __enter__(self) -> Self:
         return self
@@ -236,8 +256,8 @@ class FeedReceiver:
         with self._lock:
             self._game, self._game_s = game, now_s
 
-    def _take_fix(self, fix: Fix, sender: str, now_s: float) -> None:
-        is_known = self._told.has_room(fix.boat) if self._boats is None else fix.boat in self._boats
+    def _take_fix(self, told: Told, fix: Fix, sender: str, now_s: float) -> None:
+        is_known = told.has_room(fix.boat) if self._boats is None else fix.boat in self._boats
         if not is_known:
             self._refuse("unknown boat", f"{sender}: boat {fix.boat} is not of this fleet")
             return
@@ -255,7 +275,7 @@ class FeedReceiver:
             source=sender,
         )
         with self._lock:
-            self._told.take(contact, now_s)
+            told.take(contact, now_s)
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:
         with self._lock:

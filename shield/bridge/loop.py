@@ -10,7 +10,7 @@ from ..commands import Commands
 from ..shield import Shield
 from .assemble import seen_now
 from .clock import Clock
-from .contact import Contact, alarms_of
+from .contact import Contact, alarms_of, heard_from
 from .fleet_file import FleetFile
 from .freshness import RIVAL_S, Seen, Verdict, judge
 from .handover import at_rest, nearing
@@ -215,7 +215,7 @@ class Loop:
         )
 
     def _contacts(self) -> tuple[Contact, ...]:
-        heard = [contact for source in self.parts.contacts for contact in source.read()]
+        heard = [contact for source in self.parts.contacts for contact in heard_from(source)]
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.parts.ears.values()]
         return (*heard, *(contact for contact in told if contact is not None))

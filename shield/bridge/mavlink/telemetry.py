@@ -112,11 +112,11 @@ class Telemetry:
             A text for the operator, mostly empty.
         """
         name = message.get_type()
+        self._fix.hear(message, received_s)
         if name == "GLOBAL_POSITION_INT":
             return self._timed(message, received_s, self._hear_position)
         if name == "ATTITUDE":
             return self._timed(message, received_s, self._hear_attitude)
-        self._fix.hear(message, received_s)
         if name == "SYSTEM_TIME" and message.time_unix_usec * 1e-6 > _UNIX_2020_S:
             self.wall_ahead_s = time.time() - message.time_unix_usec * 1e-6
         return ""
