@@ -6,6 +6,9 @@ import os
 import pytest
 from fed_world import FRAME, KEY, PER_TURN, fed_world
 from feed_attack import CLOCK, OVER
+from steerclear.experiments.deploy.replaying import prove
+from steerclear.experiments.deploy.replaying_tracks import TrackBuilder
+from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet
 from steerclear.shield.bridge.feed import Packet
 from steerclear.shield.bridge.feed_packets import Fix
 from steerclear.shield.bridge.feed_seal import Seal
@@ -52,12 +55,12 @@ def sent(world):
 
 
 def test_with_signing_on_the_attack_changes_no_bit_of_what_is_sent():
-    alone = driven(9.0, key=KEY)
-    attacked = driven(9.0, key=KEY, attack=lies("evil", "gps_hub"))
+    alone = driven(7.0, key=KEY)
+    attacked = driven(7.0, key=KEY, attack=lies("evil", "gps_hub"))
     assert sent(attacked) == sent(alone)
     assert attacked.hits == alone.hits == {}
     faults = attacked.contacts.receiver.faults()
-    assert faults == {"unsigned": 900, "bad_signature": 900}
+    assert faults == {"unsigned": 700, "bad_signature": 700}
     assert attacked.last.fleet.names == tuple(attacked.fleet.names), "no ghost"
     assert attacked.contacts.receiver.game() is None
 
@@ -81,6 +84,30 @@ def test_without_signing_it_is_told_at_once_and_makes_no_hit(senders, answer):
         ]
         if answer == "slow":
             assert min(near) < 0.5, "the true place is kept clear of, whatever else is"
+
+
+def brief(attack, turns=(5, 9)):
+    """An attack that comes and goes."""
+    count = itertools.count()
+    return lambda places: attack(places) if turns[0] <= next(count) < turns[1] else []
+
+
+def test_a_log_of_ghosts_that_come_and_go_is_decided_again_the_same_bit_for_bit(tmp_path):
+    world = driven(6.5, attack=brief(unsealed(lies("evil", "other"))))
+    ticks = world.sink.ticks
+    assert [len(ticks[k].fleet) for k in (0, 10, -1)] == [6, 9, 6]
+    header = header_of_fleet(world.fleet, "", policy="x", commanded=world.links, clock_s=ticks[0].began_s)
+    writer = McapWriter(tmp_path / "log.mcap", header, capacity=len(ticks) + 10)
+    for tick in ticks:
+        writer.take(tick)
+    writer.close()
+    with LogReader(tmp_path / "log.mcap") as reader:
+        header, kept = reader.header, list(reader.ticks())
+    proof, tracks = prove(header, kept), TrackBuilder(header)
+    for tick in kept:
+        tracks.add(tick)
+    assert (proof.decisions, proof.same) == (len(ticks), len(ticks))
+    assert set(tracks.finish().names) == set(world.fleet.names), "ghosts are no boats"
 
 
 @pytest.mark.study

@@ -1,9 +1,11 @@
 """With a key nobody without it speaks on the feed: packets unsealed, forged, changed or played again count nowhere."""
 
+import hmac
 import json
 import socket
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from feed_attack import GAME, flood, forged, sealed
@@ -49,6 +51,16 @@ def test_what_is_not_sealed_with_the_key_is_dropped_and_counted_by_kind(receiver
     assert receiver.faults() == {"unsigned": 5, "bad_signature": 4}
     assert (receiver.read(), receiver.game()) == ((), None)
     assert receiver.alarms() == (), "nobody without the key can make an alarm"
+
+
+def test_a_sender_of_your_own_as_documented_is_heard(receiver):
+    text = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    (block,) = (part.split("```")[0] for part in text.split("```python\n")[1:] if "feed_key" in part)
+    packet = json.loads(Packet("mine", 1, 1, fixes=(TRUE,)).encode())
+    names = {"json": json, "hmac": hmac, "time": time, "packet": packet, "key": KEY}
+    exec(block, names)
+    receiver.take(names["datagram"], LOCAL)
+    assert [found.source for found in receiver.read()] == ["mine"]
 
 
 def test_every_changed_bit_is_found():
