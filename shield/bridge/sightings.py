@@ -1,6 +1,6 @@
 """`Sightings`: where others say one boat is, by source, and what must be believed of all they say.
 
-Sources that agree tell one story: its newest fix counts, with an error that covers what the others say. Sources that
+Sources that agree tell one story: its surest fix counts, with an error that covers what the others say. Sources that
 contradict each other tell several, and each may be the true one, the newest no more than another: the boat is kept
 clear of wherever one of them has it.
 """
@@ -18,9 +18,11 @@ from .plausible import BELIEVED_AFTER_S, JUMP_M, Fix, Gate
 EARLY_S = 0.1
 """Contacts fixed later than now by more than this are faults of a clock."""
 
-MOST_SOURCES = 16
+MOST_SOURCES = 32
 MOST_STORIES = 3
 """Places kept clear of for one boat; when more are told nobody knows where it is."""
+VAGUE_M = 10.0
+"""A place known no better than this cannot be kept clear of: it widens no surer one; as a rival it is one too many."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,9 @@ class Sightings:
         stories = self._stories(now_s)
         if not stories:
             return None
-        told = [self._told(story) for story in stories]
-        contact, rivals = told[0], tuple(told[1:MOST_STORIES])
-        crowded = len(stories) > MOST_STORIES
-        return View(contact, rivals, _words(contact, rivals, crowded), crowded)
+        contact, *others = (self._told(story, now_s) for story in stories)
+        rivals = tuple(other for other in others if other.error_m <= VAGUE_M)[: MOST_STORIES - 1]
+        return View(contact, rivals, _words(contact, others), crowded=len(rivals) < len(others))
 
     def _make_room(self) -> None:
         """Forget the source whose last word is oldest."""
@@ -115,17 +116,17 @@ class Sightings:
         room_m = JUMP_M + one.error_m + other.error_m
         return apart_m <= room_m + self._fastest_mps * min(between_s, BELIEVED_AFTER_S)
 
-    def _told(self, story: Sequence[Contact]) -> Contact:
-        """The newest contact of a story; where another's bound and its own exclude each other it covers both."""
-        newest = max(story, key=lambda contact: contact.fixed_s)
-        error_m = newest.error_m
+    def _told(self, story: Sequence[Contact], now_s: float) -> Contact:
+        """The surest contact of a story; where another's bound and its own exclude each other it covers both."""
+        surest = min(story, key=lambda contact: contact.error_m + self._fastest_mps * (now_s - contact.fixed_s))
+        error_m = surest.error_m
         for other in story:
-            apart_m, between_s = _apart(newest, other)
-            if between_s <= self._limit.max_age_s:
+            apart_m, between_s = _apart(surest, other)
+            if between_s <= self._limit.max_age_s and other.error_m <= VAGUE_M:
                 apart_m -= self._fastest_mps * between_s
-                if apart_m > newest.error_m + other.error_m:
+                if apart_m > surest.error_m + other.error_m:
                     error_m = max(error_m, apart_m + other.error_m)
-        return replace(newest, error_m=error_m)
+        return replace(surest, error_m=error_m)
 
 
 def _fix(contact: Contact) -> Fix:
@@ -143,12 +144,13 @@ def _apart(one: Contact, other: Contact) -> tuple[float, float]:
     return math.hypot(newer.x_m - x_m, newer.y_m - y_m), newer.fixed_s - older.fixed_s
 
 
-def _words(contact: Contact, rivals: Sequence[Contact], crowded: bool) -> str:
-    if not rivals:
+def _words(contact: Contact, others: Sequence[Contact]) -> str:
+    if not others:
         return ""
-    others = ", ".join(f"{_short(rival.source)} {_apart(contact, rival)[0]:.0f} m from there" for rival in rivals)
-    more = ", and others elsewhere" if crowded else ""
-    return f"{_short(contact.source)} has it at one place, {others}{more}: find out who is wrong and end it"
+    told = [f"{_short(other.source)} {_apart(contact, other)[0]:.0f} m from there" for other in others]
+    more = ", and others elsewhere" if len(told) >= MOST_STORIES else ""
+    named = ", ".join(told[: MOST_STORIES - 1])
+    return f"{_short(contact.source)} has it at one place, {named}{more}: find out who is wrong and end it"
 
 
 def _short(source: str) -> str:

@@ -60,6 +60,19 @@ def test_bounds_that_agree_cost_nothing():
     assert view.contact.error_m in (0.3, 0.5)
 
 
+@pytest.mark.parametrize("off_m", [0.0, 5.0, 40.0, 900.0])
+def test_a_vague_word_moves_and_widens_no_sure_one(off_m):
+    view = seen(contact("evil", 10.0 + off_m, error_m=off_m + 1.0), contact("hub", fixed_s=99.9)).view(100.0)
+    assert view.contact == contact("hub", fixed_s=99.9)
+    assert view.text == ""
+
+
+def test_who_contradicts_with_a_vague_word_cannot_be_kept_clear_of():
+    view = seen(contact("hub"), contact("evil", 200.0, error_m=100.0)).view(100.0)
+    assert (view.contact, view.rivals, view.crowded) == (contact("hub"), (), True)
+    assert "evil 190 m from there" in view.text
+
+
 def test_who_falls_silent_is_kept_clear_of_until_it_would_be_lost():
     sightings = seen(contact("hub"), contact("evil", 40.0))
     for now_s in (101.0, 104.9):
