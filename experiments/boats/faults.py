@@ -162,6 +162,19 @@ class Faults:
 
         return Fault(change=moved)
 
+    def _gps_lost(self, now_s: float) -> Fault:
+        """From now on it reckons: the last velocity, from the last place."""
+        kept = self._autopilot.snapshot
+
+        def reckoned(truth: Snapshot, time_s: float) -> Snapshot:
+            (vx, vy), past_s = kept.velocity_mps, time_s - kept.time_s
+            x, y = kept.x_m + vx * past_s, kept.y_m + vy * past_s
+            latitude, longitude = self._frame.to_geodetic_deg(x, y)
+            place = {"x_m": x, "y_m": y, "latitude_deg": latitude, "longitude_deg": longitude}
+            return dataclasses.replace(truth, **place, velocity_mps=(vx, vy), speed_mps=kept.speed_mps, has_fix=False)
+
+        return Fault(change=reckoned, hidden=True)
+
     def _compass(self, now_s: float, offset_deg: float = 30.0) -> Fault:
         offset = math.radians(offset_deg)
 
@@ -214,6 +227,7 @@ KINDS: dict[str, Callable[..., Fault | None]] = {
     "link_loss": Faults._link_loss,
     "freeze": Faults._freeze,
     "jump": Faults._jump,
+    "gps_lost": Faults._gps_lost,
     "compass": Faults._compass,
     "late": Faults._late,
     "out_of_order": Faults._out_of_order,

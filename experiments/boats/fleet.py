@@ -52,7 +52,7 @@ class SimFleet:
         radio: loss and delay.
         noise: of the sensors: 0 none, 1 as measured.
         seed: of everything random.
-        key: 32 bytes of MAVLink 2 signing; None: unsigned.
+        key: 32 bytes of MAVLink 2 signing, of the feed's seal too; None: neither.
         preset: rules of the game that the boats play when there are as many red ones as blue ones.
         rules: settings of the game that differ from the preset's.
         feed_to: HOST:PORT of each listener of the position feed.
@@ -100,7 +100,8 @@ class SimFleet:
         config = game_of(boats, preset, rules or {})
         try:
             self.boats = build_boats(boats, config, setting, self._ports, seed, random_start)
-            self._hub = PositionHub([near(to, allow_remote) for to in feed_to], self.frame, noise) if feed_to else None
+            listeners = [near(to, allow_remote) for to in feed_to]
+            self._hub = PositionHub(listeners, self.frame, noise, key) if feed_to else None
             self._world = build_world(self.boats, config, (water or Water(), setting), self._hub, seed, waits)
         except BaseException:
             self.close()

@@ -26,13 +26,14 @@ class PositionHub:
         to: HOST:PORT of each listener.
         frame: where the field is.
         noise: of the sensors, for the declared error.
+        key: the signing key, so that packets are sealed; None: they are not.
 
     Raises:
         ConfigError: an address of another form.
     """
 
-    def __init__(self, to: Iterable[str], frame: FieldFrame, noise: float) -> None:
-        self._sender = FeedSender(SENDER, to)
+    def __init__(self, to: Iterable[str], frame: FieldFrame, noise: float, key: bytes | None = None) -> None:
+        self._sender = FeedSender(SENDER, to, key)
         self._frame = frame
         self._error_m = _ERROR_M + _ERROR_PER_NOISE_M * noise
         self._past: dict[str, deque[Snapshot]] = {}

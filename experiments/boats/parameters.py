@@ -15,12 +15,16 @@ _DEFAULTS: dict[str, tuple[float, int]] = {
     "ARMING_CHECK": (1.0, _INT32),
     "CRUISE_SPEED": (2.0, _REAL32),
     "FRAME_CLASS": (2.0, _INT8),
+    "AVOID_ENABLE": (3.0, _INT8),
+    "FENCE_ACTION": (2.0, _INT8),
+    "FENCE_ENABLE": (0.0, _INT8),
     "FS_ACTION": (2.0, _INT8),
     "FS_GCS_ENABLE": (0.0, _INT8),
     "FS_GCS_TIMEOUT": (5.0, _REAL32),
     "FS_TIMEOUT": (1.5, _REAL32),
     "INITIAL_MODE": (0.0, _INT8),
     "LOIT_RADIUS": (2.0, _REAL32),
+    "OA_TYPE": (0.0, _INT8),
     "WP_SPEED": (2.0, _REAL32),
 }
 

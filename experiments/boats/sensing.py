@@ -29,6 +29,7 @@ class Snapshot:
         heading_rad: of the bow, clockwise from the field's y axis.
         speed_mps: along the bow over ground, negative astern, m/s.
         turn_rate_rads: clockwise.
+        has_fix: whether the place is GPS's; else it is dead reckoning.
     """
 
     time_s: float
@@ -40,6 +41,7 @@ class Snapshot:
     heading_rad: float
     speed_mps: float
     turn_rate_rads: float
+    has_fix: bool = True
 
 
 class Sensors:

@@ -111,7 +111,7 @@ class Telemetry:
         )
 
     def _gps_raw(self, snapshot: Snapshot, now_s: float) -> Any:
-        fix = 6 if self.vehicle.has_position(now_s) else 1
+        fix = 6 if self.vehicle.has_position(now_s) and snapshot.has_fix else 1
         north, east = self._earth(snapshot)
         course = round(math.degrees(math.atan2(east, north)) * 100.0) % 36000
         return mavlink.MAVLink_gps_raw_int_message(

@@ -110,7 +110,8 @@ class Drawing:
 
 def places_of(tick: Tick) -> dict[str, tuple[float, float, float, float]]:
     """Where boats are: x m, y m, heading rad, speed m/s by name; as the shield was given it, else as heard."""
-    places = {contact.boat: (*contact.position_m, contact.heading_rad, contact.speed_mps) for contact in tick.contacts}
+    heard = reversed(tick.contacts)  # of several contacts of a boat the first counts
+    places = {contact.boat: (*contact.position_m, contact.heading_rad, contact.speed_mps) for contact in heard}
     for name, reading in tick.readings.items():
         places[name] = (*reading.position_m, reading.heading_rad, reading.speed_mps)
     if tick.fleet is not None:

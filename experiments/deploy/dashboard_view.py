@@ -135,7 +135,7 @@ class View:
         tick = moment.tick
         if tick is None:
             return table
-        contacts = {contact.boat: contact for contact in tick.contacts}
+        contacts = {contact.boat: contact for contact in reversed(tick.contacts)}  # of several the first counts
         decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
         near = {} if tick.fleet is None else approaches(tick.fleet)
         for boat in self._fleet.boats:

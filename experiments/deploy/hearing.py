@@ -15,8 +15,9 @@ from steerclear.shield.bridge.fleet_settings import LinkSettings
 from steerclear.shield.bridge.loop import contact_of
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
-from steerclear.shield.bridge.mavlink.signing import Signing, read_key
 from steerclear.shield.exceptions import FleetFileError
+
+from .signing import key_of, signing_of
 
 CONNECT_S = 15.0
 
@@ -33,6 +34,7 @@ class Hearing:
     Raises:
         FleetFileError: neither the file nor ``listen`` says where to hear positions.
         BridgeError: an address cannot be heard at, or a boat does not answer.
+        ConfigError: the signing key cannot be read, or others can read it.
     """
 
     def __init__(self, fleet: FleetFile, clock: Clock, listen: str | None = None, links: bool = False) -> None:
@@ -43,12 +45,14 @@ class Hearing:
             )
         self.feed: FeedReceiver | None = None
         self._error_m = fleet.shield_config.position_error_m
+        self._clock, self._max_age_s = clock, fleet.limits.contact.max_age_s
         self._links: list[tuple[MavlinkLink, Endpoint, int]] = []
         self._open = contextlib.ExitStack()
         try:
             if address is not None:
                 allow = ("127.0.0.1",) if fleet.feed is None else fleet.feed.allow
-                self.feed = self._open.enter_context(FeedReceiver(address, fleet.frame, clock, allow, fleet.names))
+                feed = FeedReceiver(address, fleet.frame, clock, allow, fleet.names, key_of(fleet))
+                self.feed = self._open.enter_context(feed)
             if links:
                 self._connect(fleet, clock)
         except BaseException:
@@ -56,13 +60,14 @@ class Hearing:
             raise
 
     def contacts(self) -> Sequence[Contact]:
-        """The latest contact of each boat heard of; of two the fresher one."""
-        heard = list(() if self.feed is None else self.feed.read())
+        """The latest contact of each boat heard of: of its own link, else of who was heard first and still speaks."""
         told = [contact_of(link.read(), self._error_m) for link, _, _ in self._links]
+        heard = () if self.feed is None else self.feed.read()
+        oldest_s = self._clock.now_s() - self._max_age_s
         found: dict[str, Contact] = {}
-        for contact in (*heard, *(entry for entry in told if entry is not None)):
+        for contact in (*(entry for entry in told if entry is not None), *heard):
             known = found.get(contact.boat)
-            if known is None or known.fixed_s < contact.fixed_s:
+            if known is None or known.fixed_s < min(oldest_s, contact.fixed_s):
                 found[contact.boat] = contact
         return tuple(found.values())
 
@@ -82,9 +87,7 @@ class Hearing:
         self.close()
 
     def _connect(self, fleet: FleetFile, clock: Clock) -> None:
-        signing = None
-        if fleet.signing is not None:
-            signing = Signing(read_key(fleet.signing.key_file), fleet.signing.link_id)
+        signing = signing_of(fleet)
         endpoints: dict[str, Endpoint] = {}
         for boat in fleet.boats:
             if boat.link is not None:

@@ -14,6 +14,7 @@ from steerclear.shield.exceptions import FleetFileError
 
 from .hearing import Hearing
 from .rules import Umpire, game_config, player_names
+from .signing import key_of
 
 logger = logging.getLogger(__name__)
 
@@ -38,7 +39,7 @@ class Referee:
     Raises:
         FleetFileError: the file has no game, or does not say where to hear positions or whom to tell.
         BridgeError: an address cannot be heard at, or a boat does not answer.
-        ConfigError: an address is none.
+        ConfigError: an address is none, or the signing key cannot be read or others can read it.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class Referee:
         self.clock = clock
         self.hearing = Hearing(fleet, clock, listen, links)
         try:
-            self._sender = FeedSender("referee", to)
+            self._sender = FeedSender("referee", to, key_of(fleet))
         except BaseException:
             self.hearing.close()
             raise

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from steerclear.shield.bridge.assemble import GHOST
 from steerclear.shield.bridge.blackbox import LogHeader
 from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.decision import Reason
@@ -108,6 +109,8 @@ class TrackBuilder:
         if fleet is None:
             return
         for i, name in enumerate(fleet.names):
+            if GHOST in name:
+                continue  # a place the boat was kept from, not a boat
             age_s = 0.0 if fleet.age_s is None else float(fleet.age_s[i])
             fixes = self._fixes.setdefault(name, [])
             self._team.setdefault(name, int(fleet.team[i]))

@@ -21,6 +21,7 @@ from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_f
 from .policy_process import PolicyProcess
 from .preflight_file import DRILLED
 from .quiet import ended_by_signals, undisturbed, warm_up
+from .signing import key_of
 from .station import Station
 from .tally import Tally
 
@@ -107,5 +108,5 @@ def _run(
 def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:
     if fleet.feed is None or not fleet.feed.publish:
         return []
-    sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish)
+    sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish, key_of(fleet))
     return [PositionPublisher(sender, fleet.frame, fleet.shield_config.position_error_m)]

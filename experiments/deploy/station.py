@@ -10,14 +10,15 @@ from typing import Self
 
 from steerclear.shield.bridge.blackbox import TlogWriter, log_path
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.contact import Contact, heard_from
 from steerclear.shield.bridge.feed import FeedReceiver
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.fleet_settings import BoatSettings
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
-from steerclear.shield.bridge.mavlink.signing import Signing, read_key
 from steerclear.shield.bridge.parts import contact_of
+
+from .signing import signing_of
 
 LOG = logging.getLogger(__name__)
 
@@ -48,9 +49,7 @@ class Station:
     def __init__(self, fleet: FleetFile, boat: str | None, clock: Clock, *, tlog: bool = True) -> None:
         self.fleet, self.clock = fleet, clock
         commanded = fleet.commanded(boat)
-        signing = None
-        if fleet.signing is not None:
-            signing = Signing(read_key(fleet.signing.key_file), fleet.signing.link_id)
+        signing = signing_of(fleet)
         self._endpoints: dict[str, Endpoint] = {}
         self._signing = signing
         self._tlog: TlogWriter | None = None
@@ -65,7 +64,9 @@ class Station:
             self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
             listen = fleet.feed_listen(boat)
             if fleet.feed is not None and listen is not None:
-                self.feed = FeedReceiver(listen, fleet.frame, clock, fleet.feed.allow, fleet.names)
+                self.feed = FeedReceiver(
+                    listen, fleet.frame, clock, fleet.feed.allow, fleet.names, None if signing is None else signing.key
+                )
             for endpoint in self._endpoints.values():
                 endpoint.open()
         except BaseException:
@@ -93,7 +94,7 @@ class Station:
         """Boats heard of by the feed and by links that are only listened to."""
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.ears.values()]
-        heard = () if self.feed is None else self.feed.read()
+        heard = () if self.feed is None else heard_from(self.feed)
         return (*heard, *(contact for contact in told if contact is not None))
 
     def close(self) -> None:

@@ -12,6 +12,9 @@ from ..platforms import layout as L
 from .fleet_file import FleetFile
 from .roster import Roster, Track
 
+GHOST = "~"
+"""Names of ghosts are the boat's name, this and a number; no boat of a fleet file has it in its name."""
+
 SEEN_COLUMNS = [L.X, L.Y, L.HEADING, L.SPEED]
 
 
@@ -37,21 +40,23 @@ def assemble(roster: Roster, controlled: Collection[str], without: Collection[st
     known = {name: track for name, track in tracks.items() if track is not None}
     if not known:
         return None
-    fleet = _fleet(roster.fleet, known, controlled)
+    ghosts = {f"{name}{GHOST}{k}": track for name in known for k, track in enumerate(roster.ghosts(name), start=2)}
+    fleet = _fleet(roster.fleet, known | ghosts, controlled)
     fleet.check()
     return fleet
 
 
 def _fleet(file: FleetFile, known: Mapping[str, Track], controlled: Collection[str]) -> Fleet:
     names = tuple(known)
+    boats = [name.partition(GHOST)[0] for name in names]
     longest = file.limits.contact.lost_after_s
     growth = file.shield_config.track_error_mps
     tracks = known.values()
     errors = [track.error_m + growth * (min(track.age_s, longest) - min(track.ahead_s, longest)) for track in tracks]
     return Fleet(
         state=np.array([track.row for track in tracks]),
-        team=np.array([file.team_of[name] for name in names], dtype=np.int64),
-        platforms=tuple(file.kind_of[name] for name in names),
+        team=np.array([file.team_of[boat] for boat in boats], dtype=np.int64),
+        platforms=tuple(file.kind_of[boat] for boat in boats),
         controlled=np.array([name in controlled for name in names], dtype=np.bool_),
         names=names,
         age_s=np.array([min(track.ahead_s, longest) for track in tracks]),

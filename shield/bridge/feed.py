@@ -1,6 +1,6 @@
 """`FeedReceiver` hears positions and the state of the game over UDP; `FeedSender` sends them.
 
-What is in a packet: `feed_packets`; which packets count: `feed_order`.
+What is in a packet: `feed_packets`; who may send: `feed_seal`; which packets count: `feed_order`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,15 @@ from typing import Self
 
 from ..exceptions import FeedError
 from .clock import Clock
-from .contact import Contact
-from .feed_order import Budget, Order
+from .contact import TELEMETRY, Alarm, Contact
+from .feed_contacts import MAX_SOURCES, Told
+from .feed_order import GONE_S, RIVALS, Budget, Order
 from .feed_packets import MAX_BYTES, BoatStatus, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
+from .feed_seal import Seal, body_of, is_sealed
 from .feed_sender import FeedSender
 from .feed_sockets import hearing_socket, is_among, network_of, socket_address
 from .frame import FieldFrame
+from .mavlink.signing import SigningClock
 
 __all__ = [
     "BoatStatus",
@@ -43,16 +46,23 @@ PACKETS_PER_S = 1000.0
 """Packets read a second; when more come the rest is thrown away, so that a flood takes no time from the loop."""
 FAR_M = 20_000.0
 """A boat further from the field than this is an error of the sender."""
+_SEAL_TEXTS = {
+    "unsigned": "packet without a seal; the file has signing, so give its sender the key",
+    "bad_signature": "packet sealed with another key, or changed on its way",
+    "signed": "sealed packet, and the file has no signing; give it the key, or send without",
+}
+FORGED_COST = 0.1
+"""What reading a packet costs that is not sealed as it should be: it is not looked into."""
 _PAUSE_S = 0.02
-MAX_CONTACTS = 256
 
 
 class FeedReceiver:
     """Hears the feed on a socket of its own, in a thread of its own. A `ContactSource`; a context manager.
 
     The age of a fix is counted on our clock from its receipt, plus the age its sender declared: senders' clocks are
-    never trusted. Packets that are malformed, old, repeated, too long, from hosts not allowed, or more than can be read
-    are dropped and counted in `faults`.
+    never trusted. Packets that are malformed, old, repeated, too long, from hosts not allowed, not sealed as they
+    should be, or more than can be read are dropped and counted in `faults`. Senders that contradict each other about a
+    boat are all given, each as a contact of its own: who takes them in must be right whichever of them is.
 
     Args:
         listen: HOST:PORT to hear at; port 0 takes a free one, see ``address``.
@@ -60,10 +70,11 @@ class FeedReceiver:
         clock: clock of all times here.
         allow: hosts (addresses or networks) packets are taken from.
         boats: names that fixes are taken of; None takes all.
+        key: the 32-byte signing key: packets must be sealed with it; None: they must not be sealed.
 
     Raises:
         BridgeError: the address cannot be heard at.
-        ConfigError: ``listen`` or ``allow`` is no address.
+        ConfigError: ``listen`` or ``allow`` is no address, or the key has another length.
     """
 
     def __init__(
@@ -73,20 +84,25 @@ class FeedReceiver:
         clock: Clock,
         allow: Iterable[str] = ("127.0.0.1",),
         boats: Collection[str] | None = None,
+        key: bytes | None = None,
     ) -> None:
         self._frame = frame
         self._clock = clock
         self._boats = None if boats is None else frozenset(boats)
         self._allowed = tuple(network_of(host) for host in allow)
         self._lock = threading.Lock()
-        self._contacts: dict[str, Contact] = {}
+        self._told = Told()
+        self._rival = ("", -math.inf)
+        self._rivals = Told()
         self._game: GameState | None = None
         self._game_s = -math.inf
         self._faults: Counter[str] = Counter()
         self._texts: dict[str, str] = {}
-        self._order = Order()
+        self._seal = None if key is None else Seal(key)
+        self._order = Order(None if key is None else SigningClock())
         self._budget = Budget(PACKETS_PER_S)
         self._closing = threading.Event()
+        self._closed = False
         self._socket = hearing_socket(listen)
         host, port = self._socket.getsockname()[:2]
         self.address = f"{host}:{port}"
@@ -95,9 +111,28 @@ class FeedReceiver:
         self._thread.start()
 
     def read(self) -> Sequence[Contact]:
-        """The latest contact of each boat ever heard of."""
+        """The latest contact of each boat by each sender; of one boat who speaks and was heard first comes first."""
+        now_s = self._clock.now_s()
         with self._lock:
-            return tuple(self._contacts.values())
+            return self._told.contacts(now_s)
+
+    def rivals(self) -> Sequence[Contact]:
+        """The same of programs that send under the name of one that speaks: they are not it, but may be right."""
+        now_s = self._clock.now_s()
+        with self._lock:
+            return self._rivals.contacts(now_s)
+
+    def alarms(self) -> Sequence[Alarm]:
+        """Two programs under one name, or more senders of a boat than can be weighed against each other."""
+        now_s = self._clock.now_s()
+        with self._lock:
+            text, at_s = self._rival
+            rivals = [Alarm(f"feed: {text}")] if now_s - at_s < GONE_S else []
+            crowded = {*self._told.crowded(now_s), *self._rivals.crowded(now_s)}
+        return (
+            *rivals,
+            *(Alarm(f"more than {MAX_SOURCES} senders tell of it", boat, lost=True) for boat in sorted(crowded)),
+        )
 
     def game(self) -> GameState | None:
         """The latest state of the game; None: none yet."""
@@ -125,29 +160,48 @@ class FeedReceiver:
         if not is_among(host, self._allowed):
             self._refuse("foreign", f"packet from {host}, which feed.allow does not name")
             return
+        kind = self._seal_fault(data)
+        if kind:
+            self._refuse(kind, f"{host}: {_SEAL_TEXTS[kind]}")
+            return
         try:
-            packet = parse_packet(data)
+            packet = parse_packet(data if self._seal is None else body_of(data))
         except FeedError as error:
             self._refuse("malformed", f"{host}: {error}")
             return
         problem = self._order.problem(packet, now_s)
         if problem is not None:
             self._refuse(*problem)
+            if problem[0] in RIVALS:
+                self._note_rival(packet, problem[1], now_s)
+            return
+        if packet.sender == TELEMETRY:
+            self._refuse("sender", f"{host}: {TELEMETRY} is no name for a sender; take another")
             return
         for text in packet.refused:
             self._refuse("fix", f"{packet.sender}: {text}")
         if packet.game is not None:
             self._take_game(packet.game, packet.sender, now_s)
         for fix in packet.fixes:
-            self._take_fix(fix, packet.sender, now_s)
+            self._take_fix(self._told, fix, packet.sender, now_s)
+
+    def _note_rival(self, packet: Packet, text: str, now_s: float) -> None:
+        with self._lock:
+            self._rival = (text, now_s)
+        for fix in packet.fixes:
+            self._take_fix(self._rivals, fix, f"{packet.sender} (run {packet.run})", now_s)
 
     def close(self) -> None:
         """Give the socket back; may be called again."""
+        closed = self._closed
         self._closing.set()
         with contextlib.suppress(OSError):  # a datagram of its own wakes the thread; else its wait ends soon by itself
             self._socket.sendto(b"", self._socket.getsockname())
         self._thread.join(timeout=2.0)
         self._socket.close()
+        faults, self._closed = self.faults(), True
+        if faults and not closed:
+            logger.warning("feed: refused in all: %s", ", ".join(f"{count} {kind}" for kind, count in faults.items()))
 
     def __enter__(self) -> Self:
         return self
@@ -169,10 +223,15 @@ class FeedReceiver:
                 continue
             if self._closing.is_set():
                 return
-            if self._budget.take(time.monotonic()):
+            if self._budget.take(time.monotonic(), FORGED_COST if self._seal_fault(data) else 1.0):
                 self.take(data, str(source[0]))
             else:
                 self._drop_flood()
+
+    def _seal_fault(self, data: bytes) -> str:
+        if self._seal is None:
+            return "signed" if is_sealed(data) else ""
+        return self._seal.fault(data)
 
     def _drop_flood(self) -> None:
         """Rest, then throw away what has come meanwhile: read later it would seem younger than it is."""
@@ -197,9 +256,9 @@ class FeedReceiver:
         with self._lock:
             self._game, self._game_s = game, now_s
 
-    def _take_fix(self, fix: Fix, sender: str, now_s: float) -> None:
-        known_names = self._boats if self._boats is not None or len(self._contacts) < MAX_CONTACTS else self._contacts
-        if known_names is not None and fix.boat not in known_names:
+    def _take_fix(self, told: Told, fix: Fix, sender: str, now_s: float) -> None:
+        is_known = told.has_room(fix.boat) if self._boats is None else fix.boat in self._boats
+        if not is_known:
             self._refuse("unknown boat", f"{sender}: boat {fix.boat} is not of this fleet")
             return
         x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
@@ -216,10 +275,7 @@ class FeedReceiver:
             source=sender,
         )
         with self._lock:
-            known = self._contacts.get(fix.boat)
-            if known is not None and known.source != sender and known.fixed_s > contact.fixed_s:
-                return  # of two senders the fresher one counts
-            self._contacts[fix.boat] = contact
+            told.take(contact, now_s)
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:
         with self._lock:

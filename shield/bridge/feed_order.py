@@ -1,29 +1,47 @@
-"""Which packets of the feed count: each sender's newest only, one referee at a time, and no more than can be taken."""
+"""Which packets of the feed count: each sender's newest only, one start of it and one referee at a time.
+
+Who is heard keeps its place as long as it speaks, and no longer: nothing that anybody sends can move a sender's place
+ahead of itself for good, and what was refused leaves no trace.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from .feed_packets import Packet
+from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
 
 MAX_SENDERS = 64
-OLD_RUNS = 64
-"""Earlier starts of a sender that are remembered, so that a late packet of one is not taken for a new start."""
+GONE_S = 2.0
+"""A sender silent for so long may begin anew: another start of it, or a lower count, is taken then."""
 REFEREE_GONE_S = 5.0
 """A second referee is listened to once the first has been silent this long."""
+MOST_AHEAD = 1000
+"""A count this much further than the last is not of the sender that speaks."""
+REORDERED = 100
+"""Packets this far behind may have been overtaken on the way; older ones show that two programs count."""
+RIVALS = ("second run", "second referee")
+"""Kinds that show two programs under one name, or in one office: whoever is right, both cannot be."""
 
 
 @dataclass
 class _Sender:
     run: int
     seq: int
-    old_runs: list[int] = field(default_factory=list)
+    stamp: int
+    first_s: float
+    heard_s: float
 
 
 class Order:
-    """Remembers the last packet of each sender."""
+    """Remembers the last packet of each sender.
 
-    def __init__(self) -> None:
+    Args:
+        clock: of time stamps, for sealed packets; None: packets have none.
+    """
+
+    def __init__(self, clock: SigningClock | None = None) -> None:
+        self._clock = clock
         self._senders: dict[str, _Sender] = {}
         self._referee = ""
         self._referee_s = 0.0
@@ -35,32 +53,66 @@ class Order:
             packet: the packet.
             now_s: time it was received, s.
         """
+        found = self._stamp_problem(packet)
+        if found is not None:
+            return found
         other = packet.game is not None and self._referee not in ("", packet.sender)
         if other and now_s - self._referee_s < REFEREE_GONE_S:
             return "second referee", f"{packet.sender} speaks while {self._referee} does; end one of them"
-        found = self._step(packet)
+        found = self._step(packet, now_s)
         if found is None and packet.game is not None:
             self._referee, self._referee_s = packet.sender, now_s
         return found
 
-    def _step(self, packet: Packet) -> tuple[str, str] | None:
-        sender = self._senders.get(packet.sender)
-        if sender is None:
-            if len(self._senders) >= MAX_SENDERS:
-                return "sender", f"{packet.sender} is one sender too many, {MAX_SENDERS} at most"
-            self._senders[packet.sender] = _Sender(packet.run, packet.seq)
+    def _stamp_problem(self, packet: Packet) -> tuple[str, str] | None:
+        """A sealed packet must be later than all before of its sender, and of our time."""
+        if self._clock is None:
             return None
-        if packet.run != sender.run:
-            if packet.run in sender.old_runs:
-                return "old", f"packet of an earlier start of {packet.sender}"
-            sender.old_runs = [*sender.old_runs[-OLD_RUNS:], sender.run]
-            sender.run, sender.seq = packet.run, packet.seq
-            return None
-        if packet.seq <= sender.seq:
-            kind = "repeated" if packet.seq == sender.seq else "old"
-            return kind, f"{packet.sender} sends seq {packet.seq} after {sender.seq}; give each start its own 'run'"
-        sender.seq = packet.seq
+        if packet.stamp is None:
+            return "malformed", f"{packet.sender}: a sealed packet needs a stamp, in 10 us since 1 January 2015"
+        known = self._senders.get(packet.sender)
+        if known is not None and packet.stamp <= known.stamp:
+            return "replayed", f"a packet of {packet.sender} that is not later than its last"
+        ahead_s = (packet.stamp - self._clock.now()) / TICKS_PER_S
+        if abs(ahead_s) > NEW_STREAM_S:
+            return "old_signature", f"{packet.sender} is {ahead_s:+.0f} s from this machine's clock; set both clocks"
         return None
+
+    def _step(self, packet: Packet, now_s: float) -> tuple[str, str] | None:
+        known = self._senders.get(packet.sender)
+        if known is None:
+            self._make_room(now_s)
+            self._senders[packet.sender] = _Sender(packet.run, packet.seq, packet.stamp or 0, now_s, now_s)
+            return None
+        if now_s - known.heard_s < GONE_S:
+            found = _not_next(packet, known)
+            if found is not None:
+                return found
+        known.run, known.seq, known.stamp, known.heard_s = packet.run, packet.seq, packet.stamp or 0, now_s
+        return None
+
+    def _make_room(self, now_s: float) -> None:
+        """Forget whoever is silent longest; where all speak, whoever came last, so that nobody who was there goes."""
+        if len(self._senders) < MAX_SENDERS:
+            return
+        silent = min(self._senders, key=lambda name: self._senders[name].heard_s)
+        if now_s - self._senders[silent].heard_s >= GONE_S:
+            del self._senders[silent]
+        else:
+            del self._senders[max(reversed(self._senders), key=lambda name: self._senders[name].first_s)]
+
+
+def _not_next(packet: Packet, known: _Sender) -> tuple[str, str] | None:
+    """Why a packet does not follow the last one of a sender that speaks."""
+    name = packet.sender
+    if packet.run != known.run:
+        return "second run", f"two programs send as {name}; end one of them: the first is listened to"
+    if packet.seq > known.seq + MOST_AHEAD or packet.seq < known.seq - REORDERED:
+        return "second run", f"two programs send as {name}: seq {packet.seq} after {known.seq}; end one of them"
+    if packet.seq <= known.seq:
+        kind = "repeated" if packet.seq == known.seq else "old"
+        return kind, f"{name} sends seq {packet.seq} after {known.seq}; give each start its own 'run'"
+    return None
 
 
 class Budget:
@@ -75,12 +127,17 @@ class Budget:
         self._left = per_s
         self._at_s = float("-inf")
 
-    def take(self, now_s: float) -> bool:
-        """Whether one more event fits now."""
+    def take(self, now_s: float, cost: float = 1.0) -> bool:
+        """Whether one more event fits now.
+
+        Args:
+            now_s: s.
+            cost: of this event, in events.
+        """
         if now_s > self._at_s:
             self._left = min(self._per_s, self._left + (now_s - self._at_s) * self._per_s)
             self._at_s = now_s
-        if self._left < 1.0:
+        if self._left < cost:
             return False
-        self._left -= 1.0
+        self._left -= cost
         return True

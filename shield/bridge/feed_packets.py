@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from ..exceptions import FeedError
+from .feed_seal import SEAL_BYTES
 
 MAX_BYTES = 32768
 """Largest datagram taken."""
@@ -21,6 +22,18 @@ MAX_AGE_S = 3600.0
 MAX_ERROR_M = 1000.0
 LARGEST = 1e9
 
+_FAR_OUT = frozenset({655.35, 6553.5, 65535.0})
+"""16 bits of ones, in the units boats and receivers use: not available."""
+NOT_AVAILABLE: Mapping[str, frozenset[float]] = {
+    "heading_deg": _FAR_OUT | {360.0, 511.0, 3600.0, 36000.0},
+    "speed_mps": _FAR_OUT | {102.3, 1023.0},
+    "latitude_deg": frozenset({91.0}),
+    "longitude_deg": frozenset({181.0}),
+    "age_s": _FAR_OUT,
+    "error_m": _FAR_OUT,
+}
+"""What AIS, GPS receivers and autopilots say for a value they do not know, of each field."""
+
 
 @dataclass(frozen=True)
 class Fix:
@@ -29,7 +42,7 @@ class Fix:
     Attributes:
         boat: its name.
         latitude_deg, longitude_deg: WGS 84, deg.
-        heading_deg: true course, deg clockwise from north.
+        heading_deg: true course, deg clockwise from north; more than -360, less than 360.
         speed_mps: along the heading, m/s.
         age_s: how old the fix was when it was sent, s.
         error_m: bound of the position's error, m.
@@ -111,6 +124,7 @@ class Packet:
         seq: counts the sender's packets.
         fixes: positions of a packet of kind "positions".
         game: of a packet of kind "game".
+        stamp: when it was sent, in 10 us since 1 January 2015, of packets that are sealed; None: it has none.
         refused: why single fixes of the packet were left out, a line each.
     """
 
@@ -120,6 +134,7 @@ class Packet:
     fixes: tuple[Fix, ...] = ()
     game: GameState | None = None
     refused: tuple[str, ...] = ()
+    stamp: int | None = None
 
     def encode(self) -> bytes:
         """The datagram.
@@ -128,16 +143,18 @@ class Packet:
             FeedError: it holds a value that is not finite, or is too long.
         """
         head = {"steerclear": 1, "sender": self.sender, "run": self.run, "seq": self.seq}
+        head |= {} if self.stamp is None else {"stamp": self.stamp}
         if self.game is not None:
             body: dict[str, Any] = {"kind": "game", **self.game.as_dict()}
         else:
-            body = {"kind": "positions", "contacts": [dict(vars(fix)) for fix in self.fixes]}
+            body = {"kind": "positions", "contacts": [_plain(fix) for fix in self.fixes]}
         try:
             data = json.dumps(head | body, allow_nan=False, separators=(",", ":")).encode()
         except ValueError as error:
             raise FeedError(f"the packet holds a value that cannot be sent ({error}); give finite numbers") from None
-        if len(data) > MAX_BYTES:
-            raise FeedError(f"the packet has {len(data)} bytes; send fewer boats at once, {MAX_BYTES} bytes at most")
+        most = MAX_BYTES - SEAL_BYTES
+        if len(data) > most:
+            raise FeedError(f"the packet has {len(data)} bytes; send fewer boats at once, {most} bytes at most")
         return data
 
 
@@ -157,11 +174,12 @@ def parse_packet(data: bytes) -> Packet:
         raise FeedError('packet is not of this feed; begin it with {"steerclear": 1, ...')
     sender, kind = _name(content, "sender"), content.get("kind")
     run, seq = _count(content, "run", 0), _count(content, "seq")
+    stamp = _count(content, "stamp") if "stamp" in content else None
     if kind == "positions":
         fixes, refused = _fixes(content)
-        return Packet(sender, run, seq, fixes=fixes, refused=refused)
+        return Packet(sender, run, seq, fixes=fixes, refused=refused, stamp=stamp)
     if kind == "game":
-        return Packet(sender, run, seq, game=game_state(content))
+        return Packet(sender, run, seq, game=game_state(content), stamp=stamp)
     raise FeedError(f"packet of kind {_short(kind)}; kinds are positions and game")
 
 
@@ -230,13 +248,18 @@ def _fix(entry: Mapping[str, Any]) -> Fix:
             boat=boat,
             latitude_deg=_number(entry, "latitude_deg", -89.0, 89.0),
             longitude_deg=_number(entry, "longitude_deg", -180.0, 180.0),
-            heading_deg=_number(entry, "heading_deg", -720.0, 720.0),
+            heading_deg=_number(entry, "heading_deg", -360.0, 360.0),
             speed_mps=_number(entry, "speed_mps", -MAX_SPEED_MPS, MAX_SPEED_MPS),
             age_s=_number(entry, "age_s", 0.0, MAX_AGE_S),
             error_m=_number(entry, "error_m", 0.0, MAX_ERROR_M),
         )
     except FeedError as error:
         raise FeedError(f"boat {boat}: {error}") from None
+
+
+def _plain(fix: Fix) -> dict[str, Any]:
+    """As it is sent: a heading that came out as a full turn is north, and 360 is what "not available" looks like."""
+    return {**vars(fix), "heading_deg": fix.heading_deg % 360.0 % 360.0}
 
 
 def _mapping(entry: Any, what: str) -> Mapping[str, Any]:
@@ -248,6 +271,8 @@ def _mapping(entry: Any, what: str) -> Mapping[str, Any]:
 def _number(entry: Mapping[str, Any], key: str, low: float, high: float) -> float:
     value = entry.get(key)
     usable = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if usable and value in NOT_AVAILABLE.get(key, ()):
+        raise FeedError(f'{key} is {_short(value)}, which means "not available"; leave the boat out until it is known')
     if not usable or not low <= value <= high:  # type: ignore[operator] # a number when usable
         raise FeedError(f"{key} is {_short(value)}; give a number from {low:g} to {high:g}")
     return float(value)  # type: ignore[arg-type] # checked above

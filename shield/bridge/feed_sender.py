@@ -9,7 +9,9 @@ from types import TracebackType
 from typing import Self
 
 from .feed_packets import Fix, GameState, Packet
+from .feed_seal import Seal
 from .feed_sockets import ip_version, numeric_host, sending_socket, socket_address
+from .mavlink.signing import SigningClock
 
 logger = logging.getLogger(__name__)
 
@@ -20,13 +22,16 @@ class FeedSender:
     Args:
         sender: its name.
         to: HOST:PORT of each listener.
+        key: the 32-byte signing key, so that packets are sealed; None: they are not.
 
     Raises:
-        ConfigError: an address is not of that form, or its host unknown.
+        ConfigError: an address is not of that form, or its host unknown, or the key has another length.
     """
 
-    def __init__(self, sender: str, to: Iterable[str]) -> None:
+    def __init__(self, sender: str, to: Iterable[str], key: bytes | None = None) -> None:
         self.sender = sender
+        self._seal = None if key is None else Seal(key)
+        self._clock = SigningClock()
         self.run = random.SystemRandom().randrange(1, 2**31)
         addresses = [socket_address(address) for address in to]
         self._to = tuple((numeric_host(host), port) for host, port in addresses)
@@ -39,7 +44,7 @@ class FeedSender:
         Raises:
             FeedError: a value is not finite, or there are too many boats for one packet.
         """
-        self._send(Packet(self.sender, self.run, self._seq, fixes=tuple(fixes)).encode())
+        self._send(Packet(self.sender, self.run, self._seq, fixes=tuple(fixes), stamp=self._stamp()))
 
     def send_game(self, game: GameState) -> None:
         """Send how the game stands.
@@ -47,7 +52,7 @@ class FeedSender:
         Raises:
             FeedError: a value is not finite, or the packet is too long.
         """
-        self._send(Packet(self.sender, self.run, self._seq, game=game).encode())
+        self._send(Packet(self.sender, self.run, self._seq, game=game, stamp=self._stamp()))
 
     def close(self) -> None:
         """Give the sockets back; may be called again."""
@@ -62,7 +67,13 @@ class FeedSender:
     ) -> None:
         self.close()
 
-    def _send(self, data: bytes) -> None:
+    def _stamp(self) -> int | None:
+        return None if self._seal is None else self._clock.take()
+
+    def _send(self, packet: Packet) -> None:
+        data = packet.encode()
+        if self._seal is not None:
+            data = self._seal.close(data)
         self._seq += 1
         for host, port in self._to:
             try:

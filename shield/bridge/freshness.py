@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
+from .contact import Alarm
 from .fleet_file import FleetFile
 from .link import BoatReading
 from .operator import Override
@@ -35,6 +36,7 @@ class Seen:
         game_over: whether the game has ended.
         log_fault: why ticks can no longer be recorded; empty: they are.
         overrides: in force.
+        alarms: what is wrong with those who tell where boats are.
     """
 
     readings: Mapping[str, BoatReading]
@@ -47,6 +49,7 @@ class Seen:
     game_over: bool = False
     log_fault: str = ""
     overrides: tuple[Override, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
 
     def overridden(self, condition: str, subject: str) -> bool:
         """Whether the operator switched this response off."""
@@ -93,6 +96,8 @@ def judge(fleet: FleetFile, roster: Roster, seen: Seen) -> Verdict:
     for boat in fleet.names:
         if boat not in roster.commanded:
             _judge_contact(fleet, roster, seen, boat, verdict)
+    for alarm in seen.alarms:
+        _judge_alarm(fleet, roster, seen, alarm, verdict)
     _judge_game(fleet, roster, seen, verdict)
     log = fleet.limits.log.then
     if seen.log_fault and not seen.overridden("log", ""):
@@ -157,6 +162,20 @@ def _judge_contact(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verd
     why = f" ({roster.faults[boat]})" if boat in roster.faults else ""
     text = f"contact {boat} {'lost' if lost else 'old'}: {words(age)}{why}"
     verdict.due(Action(boat, "contact", limit.lost_then if lost else limit.then, text), roster.commanded)
+
+
+def _judge_alarm(fleet: FleetFile, roster: Roster, seen: Seen, alarm: Alarm, verdict: Verdict) -> None:
+    """Sources that contradict each other: all stories are kept clear of, or boats stop where there are too many.
+
+    Of an own boat its own link tells: there it is only said.
+    """
+    limit, subject = fleet.limits.contact, alarm.boat or "feed"
+    if alarm.boat in roster.commanded or seen.overridden("contact", alarm.boat):
+        verdict.actions.append(Action(subject, "contact", "none", f"{subject}: {alarm.text}"))
+        return
+    what = ", so nobody knows where it is" if alarm.lost else ""
+    text = f"contact {subject} in doubt{what}: {alarm.text}"
+    verdict.due(Action(subject, "contact", limit.lost_then if alarm.lost else limit.then, text), roster.commanded)
 
 
 def _judge_game(fleet: FleetFile, roster: Roster, seen: Seen, verdict: Verdict) -> None:

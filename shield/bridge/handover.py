@@ -37,7 +37,8 @@ def nearing(fleet: FleetFile, roster: Roster, readings: Mapping[str, BoatReading
         for name in roster.commanded
         for other in fleet.names
         if other != name and other not in obeys
-        for text in _told(fleet, (name, tracks[name]), (other, tracks[other]))
+        for track in (tracks[other], *roster.ghosts(other))
+        for text in _told(fleet, (name, tracks[name]), (other, track))
     ]
 
 

@@ -10,7 +10,7 @@ from ..commands import Commands
 from ..shield import Shield
 from .assemble import seen_now
 from .clock import Clock
-from .contact import Contact
+from .contact import Contact, alarms_of, heard_from
 from .fleet_file import FleetFile
 from .freshness import RIVAL_S, Seen, Verdict, judge
 from .handover import at_rest, nearing
@@ -190,7 +190,8 @@ class Loop:
         if self.operator.hard:
             return Steered(sent=self._helm.stop_all(tuple(self.parts.links)))
         limit = self.fleet.limits.contact.max_age_s
-        mates = {name for name in self._mates if self.roster.contact_age_s(name) <= limit}
+        sure = [name for name in self._mates if not self.roster.contradicted(name)]
+        mates = {name for name in sure if self.roster.contact_age_s(name) <= limit}
         return self._helm.steer(self.roster, answer, verdict, mates, game, game_age_s)
 
     def _seen(
@@ -210,10 +211,11 @@ class Loop:
             game_over=game is not None and game.over,
             log_fault=self._recorder.fault,
             overrides=self.operator.active(now_s),
+            alarms=(*self.roster.alarms(), *(alarm for each in self.parts.contacts for alarm in alarms_of(each))),
         )
 
     def _contacts(self) -> tuple[Contact, ...]:
-        heard = [contact for source in self.parts.contacts for contact in source.read()]
+        heard = [contact for source in self.parts.contacts for contact in heard_from(source)]
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.parts.ears.values()]
         return (*heard, *(contact for contact in told if contact is not None))

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..surroundings import OPEN_WATER, Surroundings
-from .contact import Contact, ContactSource
+from .contact import TELEMETRY, Contact, ContactSource
 from .link import BoatReading, Link
 from .tick import TickSink
 from .wanted import WantedSource
@@ -83,5 +83,5 @@ def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
         speed_mps=reading.speed_mps,
         fixed_s=reading.read_s - reading.age_s,
         error_m=error_m,
-        source="telemetry",
+        source=TELEMETRY,
     )

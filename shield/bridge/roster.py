@@ -5,21 +5,19 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..jit import Array
 from ..platforms import fresh_state
 from ..platforms import layout as L
-from .contact import Contact
+from .contact import Alarm, Contact
 from .estimator import Estimator
 from .fleet_file import FleetFile
 from .link import NEVER_S, BoatReading, Sent
 from .plausible import Fix, Gate
+from .sightings import Sightings, View
 
 LOG = logging.getLogger(__name__)
-
-EARLY_S = 0.1
-"""Contacts fixed later than now by more than this are faults of a clock."""
 
 TALK_EVERY_S = 5.0
 """The same fault of the same boat is logged again after this long."""
@@ -61,8 +59,10 @@ class Roster:
             name: Estimator(fleet.platform_of[name], config.dt_s, config.delay_s) for name in self.commanded
         }
         self._own_gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in self.commanded}
-        self._gates = {name: Gate(fleet.platform_of[name].max_speed_mps) for name in fleet.names}
-        self._contacts: dict[str, Contact] = {}
+        self._sightings = {
+            name: Sightings(fleet.platform_of[name].max_speed_mps, fleet.limits.contact) for name in fleet.names
+        }
+        self._views: dict[str, View] = {}
         self._telemetry_s: dict[str, float] = {}
         self._fed_m: dict[str, float] = {}
         self._faults: dict[str, str] = {}
@@ -84,6 +84,7 @@ class Roster:
                 self._take_reading(name, readings[name], estimator)
         for contact in contacts:
             self._take_contact(contact)
+        self._look()
         for name, estimator in self._estimators.items():
             if self.navigation_age_s(name) > self.fleet.limits.navigation.max_age_s:
                 self._take_feed(name, estimator)
@@ -117,6 +118,23 @@ class Roster:
         seen = self._contact_track(name)
         return NEVER_S if seen is None else seen.age_s
 
+    def contradicted(self, name: str) -> str:
+        """Who contradicts whom about where a boat is, in words; empty: nobody."""
+        view = self._views.get(name)
+        return "" if view is None else view.text
+
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Boats whose sources contradict each other."""
+        views = ((name, self._views.get(name)) for name in self.fleet.names)
+        return tuple(Alarm(view.text, name, view.crowded) for name, view in views if view is not None and view.text)
+
+    def ghosts(self, name: str) -> tuple[Track, ...]:
+        """Where else a boat may be, by those who contradict the source of its track; none while its own link tells."""
+        own, view = self._own_track(name), self._views.get(name)
+        if view is None or (own is not None and own.age_s <= self.fleet.limits.navigation.lost_after_s):
+            return ()
+        return tuple(self._track_of(contact) for contact in view.rivals)
+
     def _own_track(self, name: str) -> Track | None:
         estimator = self._estimators.get(name)
         estimate = None if estimator is None else estimator.estimate(self._now_s)
@@ -127,9 +145,10 @@ class Roster:
         return Track(estimate.row, 0.0, estimate.age_s, error + estimate.spread_m * stale)
 
     def _contact_track(self, name: str) -> Track | None:
-        contact = self._contacts.get(name)
-        if contact is None:
-            return None
+        view = self._views.get(name)
+        return None if view is None else self._track_of(view.contact)
+
+    def _track_of(self, contact: Contact) -> Track:
         row = fresh_state(*contact.position_m, math.degrees(contact.heading_rad), contact.speed_mps)
         row[L.HEADING] = (row[L.HEADING] + 180.0) % 360.0 - 180.0
         row[L.THRUST] = math.nan
@@ -149,15 +168,15 @@ class Roster:
             self._fed_m.pop(name, None)
 
     def _witness(self, name: str) -> Fix | None:
-        """Where the feed lately saw an own boat."""
-        seen = self._contacts.get(name)
+        """Where the feed lately saw an own boat, if all who tell of it agree."""
+        seen = self._agreed(name)
         if seen is None or self._now_s - seen.fixed_s > self.fleet.limits.contact.max_age_s:
             return None
         return Fix(*seen.position_m, seen.heading_rad, seen.speed_mps, seen.fixed_s, seen.error_m)
 
     def _take_feed(self, name: str, estimator: Estimator) -> None:
         """Let the feed say where an own boat is when its own telemetry does not: what is left is used."""
-        contact = self._contacts.get(name)
+        contact = self._agreed(name)
         if contact is None or self._now_s - contact.fixed_s > self.fleet.limits.contact.max_age_s:
             return
         estimator.correct(_reading_of(contact, self._now_s))
@@ -165,34 +184,37 @@ class Roster:
 
     def _take_contact(self, contact: Contact) -> None:
         name = contact.boat
-        if name not in self._gates:
+        if name not in self._sightings:
             self._note(name, "is not in the fleet file: add it, so that boats keep clear of it")
             return
-        known = self._contacts.get(name)
-        if known is not None and contact.fixed_s <= known.fixed_s:
-            return  # the same fix, or one that came late
-        if not 0.0 <= contact.error_m < math.inf:
-            self._note(name, f"error {contact.error_m} m is no bound")
-            return
-        if contact.fixed_s > self._now_s + EARLY_S:
-            self._note(name, f"fixed {contact.fixed_s - self._now_s:.1f} s in the future")
-            return
-        text = self._gates[name].refuse(
-            Fix(*contact.position_m, contact.heading_rad, contact.speed_mps, contact.fixed_s)
-        )
+        text = self._sightings[name].take(contact, self._now_s)
         if text:
             self._note(name, text)
-        else:
-            self._contacts[name] = replace(contact, fixed_s=min(contact.fixed_s, self._now_s))
+
+    def _look(self) -> None:
+        """What must be believed of every boat now, whoever told of it."""
+        for name, sightings in self._sightings.items():
+            view = sightings.view(self._now_s)
+            if view is not None:
+                self._views[name] = view
+                if view.text:
+                    self._tell(name, "contradicted", f"contradicted: {view.text}")
+
+    def _agreed(self, name: str) -> Contact | None:
+        view = self._views.get(name)
+        return None if view is None or view.text else view.contact
 
     def _note(self, name: str, text: str) -> None:
         self._faults[name] = text
-        kind = (name, text.split()[0])
+        self._tell(name, text.split()[0], f"fix refused: {text}")
+
+    def _tell(self, name: str, what: str, text: str) -> None:
+        kind = (name, what)
         if len(self._told_s) > MOST_TOLD:
             self._told_s.clear()
         if self._now_s - self._told_s.get(kind, -math.inf) >= TALK_EVERY_S:
             self._told_s[kind] = self._now_s
-            LOG.warning("%s: fix refused: %s", name, text)
+            LOG.warning("%s: %s", name, text)
 
 
 def _reading_of(contact: Contact, now_s: float) -> BoatReading:

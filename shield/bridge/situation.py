@@ -46,6 +46,9 @@ def check_known(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
             why = f" ({roster.faults[name]})" if name in roster.faults else ""
             missing.append(f"{name} {words(age)}{why}")
     oldest = max(ages)
+    contradicted = [f"{name}: {roster.contradicted(name)}" for name in fleet.names if roster.contradicted(name)]
+    if contradicted:
+        return CheckResult("known", False, f"sources contradict each other, {'; '.join(contradicted)}")
     if missing:
         text = f"where {', '.join(missing)}; check telemetry and feed, or take boats that are not there out of the file"
         return CheckResult("known", False, text, {"oldest_s": oldest})

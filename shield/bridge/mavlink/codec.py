@@ -7,6 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .own_frames import Source
 from .signing import SignatureCheck, Signing, SigningClock
 
 
@@ -17,10 +18,13 @@ class Codec:
         system: our system id; ArduPilot counts heartbeats of 255 for its ground station failsafe.
         component: our component id.
         signing: sign what goes out and refuse what comes in unsigned, wrongly signed or again.
+
+    Attributes:
+        source: our ids; knows what was encoded lately.
     """
 
     def __init__(self, system: int, component: int, signing: Signing | None) -> None:
-        self.source = (system, component)
+        self.source = Source(system, component)
         self._writer = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         self._reader = mavlink.MAVLink(None)
         self._lock = threading.Lock()
@@ -43,6 +47,7 @@ class Codec:
                 self._writer.signing.timestamp = self._clock.take()
             frame = bytes(message.pack(self._writer))
             self._writer.seq = (self._writer.seq + 1) % 256
+        self.source.note(frame)
         return frame
 
     def decode(self, frame: bytes) -> tuple[Any, str]:

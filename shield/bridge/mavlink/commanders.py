@@ -6,6 +6,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .own_frames import Source
+
 _STEERS = {
     "SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_MODE",
     "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "MISSION_SET_CURRENT", "MISSION_ITEM", "MISSION_ITEM_INT", "PARAM_SET",
@@ -29,7 +31,7 @@ class Commanders:
     Args:
         boat: its name.
         system_id: the boat's.
-        ours: our own system and component.
+        ours: our own system and component; as a `Source` it also knows our own frames when they come back.
 
     Attributes:
         heard_s: when somebody else was last seen commanding, s; -inf: never.
@@ -39,7 +41,8 @@ class Commanders:
     def __init__(self, boat: str, system_id: int, ours: tuple[int, int]) -> None:
         self.heard_s = -float("inf")
         self.stations: set[tuple[int, int]] = set()
-        self._boat, self._system_id, self._ours = boat, system_id, ours
+        self._boat, self._system_id = boat, system_id
+        self._ours = ours if isinstance(ours, Source) else Source(*ours)
         self._said_s: dict[tuple[str, int, int], float] = {}
 
     def hear_foreign(self, message: Any, now_s: float) -> tuple[str, str]:
@@ -50,6 +53,8 @@ class Commanders:
         """
         source = (message.get_srcSystem(), message.get_srcComponent())
         name = message.get_type()
+        if source == self._ours and self._is_echo(message):
+            return self._hear_echo(message, now_s)
         if name == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
             return "", self._hear_station(source, now_s)
         if getattr(message, "target_system", -1) != self._system_id:
@@ -71,6 +76,16 @@ class Commanders:
         if asked[0] == 0 or ours or message.command not in _ORDERS:
             return "", ""
         return self._fault(asked, now_s, f"gave it command {message.command}")
+
+    def _is_echo(self, message: Any) -> bool:
+        frame = message.get_msgbuf()
+        return frame is not None and self._ours.sent_lately(bytes(frame))
+
+    def _hear_echo(self, message: Any, now_s: float) -> tuple[str, str]:
+        if getattr(message, "target_system", self._system_id) != self._system_id:
+            return "", ""
+        text = "our own packets come back: a radio or router on this link reflects them; stop that, it costs bandwidth"
+        return "echo", self._say("echo", self._ours, now_s, text)
 
     def _hear_station(self, source: tuple[int, int], now_s: float) -> str:
         """Another station; one with our own ids is a process of ours for another boat until it commands this."""

@@ -18,6 +18,8 @@ from .texts import Texts
 
 ASK_AGAIN_S = 0.7
 LEARN_AGAIN_S = 0.4
+_ROUND_S = 0.15
+"""Rounds of questions are at least this far apart, so that one gap in the radio does not cost all tries."""
 _TRIES = 3
 """A parameter asked for so often and never answered is one this firmware lacks."""
 SAID_S = 15.0
@@ -75,6 +77,7 @@ class Dialogue:
         self._said: deque[tuple[float, str]] = deque(maxlen=50)
         self._results: dict[int, int] = {}
         self._tries: Counter[str] = Counter()
+        self._answers: Counter[str] = Counter()
         self._asked_s: dict[int, float] = {}
         self._unread: deque[str] = deque(maxlen=100)
 
@@ -148,28 +151,40 @@ class Dialogue:
         return self._results.get(command, mavlink.MAV_RESULT_IN_PROGRESS) != mavlink.MAV_RESULT_IN_PROGRESS
 
     def learn(self, needed: str, others: tuple[str, ...], patience: Patience) -> None:
-        """Ask for parameters and for what the autopilot can do; waits for the needed one, others get a few tries."""
+        """Ask for parameters and for what the autopilot can do; waits for the needed one, others get a few tries.
+
+        The needed one is asked for last in each round: once that is answered, what firmware lacks is waited for no
+        longer.
+        """
         while not patience.is_over:
             with self.changed:
-                unknown = [name for name in (needed, *others) if self._is_worth_asking(name, needed)]
-                if not unknown and self.version is not None:
+                unknown = [name for name in others if self._is_worth_asking(name)]
+                if not unknown and needed in self.parameters and self.version is not None:
                     return
-            for name in unknown:
-                self.ask_parameter(name)
-            if self.version is None:
-                self._send(self._version_request())
-            self.wait(lambda: self._knows((needed, *others)), patience.part(LEARN_AGAIN_S))
+            self._ask_once((*unknown, needed), patience)
+            self.wait(lambda: self._knows((needed, *others)), patience.part(_ROUND_S))
 
-    def _is_worth_asking(self, name: str, needed: str) -> bool:
-        return name not in self.parameters and (name == needed or self._tries[name] < _TRIES)
+    def _ask_once(self, names: tuple[str, ...], patience: Patience) -> None:
+        """One round of questions; it is over when the last is answered, and the version known."""
+        last = names[-1]
+        with self.changed:
+            answers = self._answers[last]
+        if self.version is None:
+            self._send(self._version_request())
+        for name in names:
+            self.ask_parameter(name)
+        self.wait(lambda: self.version is not None and self._answers[last] > answers, patience.part(LEARN_AGAIN_S))
+
+    def _is_worth_asking(self, name: str) -> bool:
+        return name not in self.parameters and self._tries[name] < _TRIES
+
+    def _knows(self, names: tuple[str, ...]) -> bool:
+        return self.version is not None and all(name in self.parameters for name in names)
 
     def ask_parameter(self, name: str) -> None:
         """Ask for one parameter."""
         self._tries[name] += 1
         self._send(mavlink.MAVLink_param_request_read_message(*self._target, name.encode(), -1))
-
-    def _knows(self, names: tuple[str, ...]) -> bool:
-        return self.version is not None and all(name in self.parameters for name in names)
 
     def _version_request(self) -> Any:
         return mavlink.MAVLink_command_long_message(
@@ -181,6 +196,7 @@ class Dialogue:
         name = name.rstrip("\x00")
         if not self._tries[name]:
             return  # nobody asked: others' parameters must not fill memory
+        self._answers[name] += 1
         if math.isfinite(value):
             self.parameters[name] = float(value)
         elif name in self.parameters:

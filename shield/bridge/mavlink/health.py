@@ -29,13 +29,14 @@ class LinkHealth:
         clock_offset_s: our clock less the boat's, s.
         clock_starts: how often the boat's clock began anew.
         wall_ahead_s: this machine's wall clock less the boat's GPS time, s; NaN: not heard.
-        fix_type: GPS_FIX_TYPE; -1: not heard.
+        fix_type: GPS_FIX_TYPE of the best receiver; -1: not heard.
         version: of the firmware; None: not heard.
         parameters: read so far.
         signs: whether signing is on.
         stations: other ground stations heard, as (system, component).
         other_commander_s: when somebody else was last seen commanding the boat, s; -inf: never.
         faults: of the whole wire since it was opened, by kind.
+        fix_fault: why its positions are not believed for want of a fix, in words; empty: they may be.
     """
 
     boat: str
@@ -54,6 +55,7 @@ class LinkHealth:
     stations: frozenset[tuple[int, int]]
     other_commander_s: float
     faults: Mapping[str, int]
+    fix_fault: str = ""
 
 
 def health_of(boat: Autopilot) -> LinkHealth:
@@ -78,6 +80,7 @@ def health_of(boat: Autopilot) -> LinkHealth:
             stations=frozenset(boat.commanders.stations),
             other_commander_s=boat.commanders.heard_s,
             faults=dict(boat.endpoint.faults),
+            fix_fault=boat.telemetry.fix_fault(now_s),
         )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...exceptions import LinkError, LinkRefused
+from ..preflight.parameters import ASKED
 from .dialogue import Patience
 from .modes import GUIDED, HOLD, arm_request, mode_request
 from .routes import choose_route
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .autopilot import Autopilot
 
 TOP_SPEED = "WP_SPEED"
-OTHERS = ("FS_GCS_ENABLE", "GUID_TIMEOUT", "SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK")
+OTHERS = ASKED
 """Parameters that preflight checks look at; some firmware lacks some of them."""
 
 STILL_MPS = 0.3

@@ -12,6 +12,8 @@ POSITION = int(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 ATTITUDE = int(mavlink.MAVLINK_MSG_ID_ATTITUDE)
 HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 GPS = int(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
+SECOND_GPS = int(mavlink.MAVLINK_MSG_ID_GPS2_RAW)
+ESTIMATE = int(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT)
 TIME = int(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
 
 WINDOW_S = 1.0
@@ -21,6 +23,8 @@ ENOUGH = 0.8
 """Share of the rate asked for that must arrive."""
 _ASK_AGAIN_S = 2.0
 _EXTRA_TRIES = 3
+_GONE_S = 3.0
+"""An extra that came and then did not for so long is asked for again, however often it was."""
 _KEPT = 256
 
 
@@ -33,7 +37,10 @@ class Streams:
 
     def __init__(self, rate_hz: float) -> None:
         self.needed: Mapping[int, float] = {POSITION: rate_hz, ATTITUDE: rate_hz}
-        self._extra: Mapping[int, float] = {HEARTBEAT: min(4.0, rate_hz), GPS: 2.0, TIME: 1.0}
+        self._extra: Mapping[int, float] = {
+            HEARTBEAT: min(4.0, rate_hz),
+            **{GPS: 2.0, SECOND_GPS: 2.0, ESTIMATE: 2.0, TIME: 1.0},
+        }
         self._wanted_hz = {**self.needed, **self._extra}
         self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in self._wanted_hz}
         self._asked_s: dict[int, float] = {}
@@ -66,7 +73,7 @@ class Streams:
         """Messages to ask for now and their intervals, us: those that do not arrive as they should."""
         wanted = [(key, hz) for key, hz in self.needed.items() if self._is_due(key, hz, now_s)]
         for key, hz in self._extra.items():
-            if self._tries[key] < _EXTRA_TRIES and self._is_due(key, hz, now_s):
+            if (self._tries[key] < _EXTRA_TRIES or self._is_gone(key, now_s)) and self._is_due(key, hz, now_s):
                 self._tries[key] += 1
                 wanted.append((key, hz))
         self._asked_s.update({key: now_s for key, _ in wanted})
@@ -76,6 +83,10 @@ class Streams:
         """The autopilot restarted: it has forgotten what was asked."""
         self._asked_s.clear()
         self._tries = dict.fromkeys(self._extra, 0)
+
+    def _is_gone(self, key: int, now_s: float) -> bool:
+        arrivals = self._arrivals[key]
+        return bool(arrivals) and now_s - arrivals[-1] > _GONE_S
 
     def _is_due(self, key: int, hz: float, now_s: float) -> bool:
         asked = self._asked_s.get(key)

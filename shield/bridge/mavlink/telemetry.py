@@ -9,6 +9,7 @@ from typing import Any
 
 from ..frame import TWO_PI, FieldFrame
 from .boat_clock import BoatClock
+from .fix import FixWatch
 from .position_guard import PositionGuard
 
 FASTEST_MPS = 30.0
@@ -24,6 +25,7 @@ STILL_S = 1.5
 """All of position, velocity and heading the same to the last digit for so long, while the boat is told to move."""
 COURSE_MPS = 0.1
 _HEADING_LAG_S = 0.2
+_FIX_BACK = "its fix is back; its position is believed again"
 _UNIX_2020_S = 1_577_836_800
 
 
@@ -36,17 +38,16 @@ class Telemetry:
     Attributes:
         clock: of the boat.
         faults: what was refused, by kind; the owner empties it.
-        fix_type: GPS_FIX_TYPE, -1 when not heard.
         wall_ahead_s: this machine's wall clock less the boat's GPS time, s; NaN when not heard.
     """
 
     def __init__(self, frame: FieldFrame) -> None:
         self.clock = BoatClock()
         self.faults: Counter[str] = Counter()
-        self.fix_type = -1
         self.wall_ahead_s = math.nan
         self._frame = frame
         self._starts = 0
+        self._heard_s = -math.inf
         self.forget()
 
     def forget(self) -> None:
@@ -66,6 +67,17 @@ class Telemetry:
         self._same_since_s = math.inf
         self._told_since_s = math.inf
         self._still = False
+        self._fix = FixWatch()
+        self._fix_lost = False
+
+    @property
+    def fix_type(self) -> int:
+        """GPS_FIX_TYPE of the best receiver; -1: not heard."""
+        return self._fix.fix_type
+
+    def fix_fault(self, now_s: float) -> str:
+        """Why positions are not believed for want of a fix, in words; empty when they may be."""
+        return self._fix.fault(now_s)[1]
 
     def told_speed(self, speed_mps: float, now_s: float) -> None:
         """The boat is told to go that fast and obeys: one that then stays still to the last digit is frozen."""
@@ -100,18 +112,18 @@ class Telemetry:
             A text for the operator, mostly empty.
         """
         name = message.get_type()
+        self._fix.hear(message, received_s)
         if name == "GLOBAL_POSITION_INT":
             return self._timed(message, received_s, self._hear_position)
         if name == "ATTITUDE":
             return self._timed(message, received_s, self._hear_attitude)
-        if name == "GPS_RAW_INT":
-            self.fix_type = message.fix_type
-        elif name == "SYSTEM_TIME" and message.time_unix_usec * 1e-6 > _UNIX_2020_S:
+        if name == "SYSTEM_TIME" and message.time_unix_usec * 1e-6 > _UNIX_2020_S:
             self.wall_ahead_s = time.time() - message.time_unix_usec * 1e-6
         return ""
 
     def _timed(self, message: Any, received_s: float, take: Any) -> str:
         boot_s = message.time_boot_ms * 1e-3
+        self._heard_s = received_s
         true_s = self.clock.hear(boot_s, received_s)
         if true_s is None:
             self.faults["clock"] += 1
@@ -148,6 +160,21 @@ class Telemetry:
         if position is None:
             self.faults["impossible_position"] += 1
             return ""
+        kind, words = self._fix.fault(self._heard_s)
+        if kind:
+            self.faults[kind] += 1
+            return self._lose_fix(words)
+        back, self._fix_lost = self._fix_lost, False
+        return self._take_position(message, position, velocity, true_s) or (_FIX_BACK if back else "")
+
+    def _lose_fix(self, words: str) -> str:
+        """Position and velocity are dead reckoning from now on: they grow old, and it is said once."""
+        first, self._fix_lost = not self._fix_lost, True
+        return f"{words}; what it tells of its place is dead reckoning and not believed" if first else ""
+
+    def _take_position(
+        self, message: Any, position: tuple[float, float], velocity: tuple[float, float], true_s: float
+    ) -> str:
         east_north = self._frame.turn_to_field(velocity[1], velocity[0])
         refused = self._guard.refuse(position, east_north, true_s)
         self._note_same((message.lat, message.lon, message.vx, message.vy, message.hdg, self._attitude_rad), true_s)

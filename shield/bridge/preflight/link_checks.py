@@ -11,7 +11,9 @@ import numpy as np
 from ...platforms import Platform
 from ..clock import Clock
 from ..link import BoatReading
+from ..mavlink.fix import ENOUGH_FIX
 from ..mavlink.health import LinkHealth
+from .parameters import STANDARD_TIMEOUT_S, parameter_faults
 from .result import Check, CheckResult
 from .watch import WATCH_S, Watch, Watched
 
@@ -23,9 +25,10 @@ WALL_S = 30.0
 REST_MPS = 0.3
 SPREAD_M = 1.5
 RMS_M = 0.5
-STANDARD_TIMEOUT_S = 3.0
-TOP_SPEED_TOLERANCE = 1.02
-_REFUSED = ("bad_checksum", "clock", "jump", "frozen", "impossible_position", "impossible_speed", "impossible_attitude")
+_REFUSED = (
+    "bad_checksum", "clock", "jump", "frozen", "impossible_position", "impossible_speed", "impossible_attitude",
+    "no_fix", "fix_silent", "poor_fix", "no_estimate",
+)  # fmt: skip
 
 
 def link_checks(
@@ -153,29 +156,23 @@ def check_spread(boat: str, readings: list[BoatReading]) -> CheckResult:
 
 
 def check_autopilot(boat: str, health: LinkHealth, platform: Platform) -> CheckResult:
-    """Firmware and parameters fit: top speed as the platform file's, own time-out, our heartbeats counted."""
+    """Firmware and parameters fit, nothing in it changes commands after the shield, and its position is a fix."""
     known = health.parameters
     top = known.get("WP_SPEED", math.nan)
     timeout = known.get("GUID_TIMEOUT", STANDARD_TIMEOUT_S)
-    figures = {"wp_speed_mps": top, "timeout_s": timeout}
-    faults = []
-    if not top > 0.0:
-        faults.append("WP_SPEED is not known or 0: set it to the boat's top speed")
-    elif top * TOP_SPEED_TOLERANCE < platform.max_speed_mps:
-        faults.append(
-            f"WP_SPEED {top:g} m/s is below the platform's {platform.max_speed_mps:g} m/s, so the boat is slower than "
-            f"the shield thinks: set it to {platform.max_speed_mps:g}"
-        )
-    if not 0.0 < timeout <= STANDARD_TIMEOUT_S:
-        faults.append(f"GUID_TIMEOUT is {timeout:g} s: set it to {STANDARD_TIMEOUT_S:g} or less")
-    if known.get("ARMING_CHECK", 1.0) == 0.0:
-        faults.append("ARMING_CHECK is 0, all checks off: set it to 1")
-    ground = known.get("SYSID_MYGCS", 255.0)
-    if ground != 255.0 and (known.get("SYSID_ENFORCE", 0.0) or known.get("FS_GCS_ENABLE", 0.0)):
-        faults.append(f"SYSID_MYGCS is {ground:g} and ours is 255: set it to 255")
+    figures = {"wp_speed_mps": top, "timeout_s": timeout, "fix_type": float(health.fix_type)}
+    faults = [*parameter_faults(known, platform), *_fix_faults(health)]
     version = "unknown" if health.version is None else ".".join(map(str, health.version))
     text = "; ".join(faults) or f"firmware {version}, WP_SPEED {top:g} m/s, own time-out {timeout:g} s"
     return CheckResult(f"autopilot:{boat}", not faults, text, figures)
+
+
+def _fix_faults(health: LinkHealth) -> list[str]:
+    if health.fix_fault:
+        return [f"{health.fix_fault}: wait for a good GPS fix"]
+    if health.fix_type < 0:
+        return ["it does not say whether GPS has a fix (no GPS_RAW_INT): let it send that message"]
+    return [] if health.fix_type >= ENOUGH_FIX else [f"GPS has no fix (fix type {health.fix_type}): wait for one"]
 
 
 def check_commanders(boat: str, health: LinkHealth, now_s: float) -> CheckResult:

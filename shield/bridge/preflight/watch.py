@@ -55,6 +55,7 @@ class Watch:
             return
         for link in self._links.values():
             link.learn(LOOK_EVERY_S * 60.0)
+            link.read()  # what was refused before, while the boat came up, is not of this watch
         readings: dict[str, list[BoatReading]] = {name: [] for name in self._links}
         due = self._clock.now_s()
         for _ in range(round(self._seconds / LOOK_EVERY_S)):

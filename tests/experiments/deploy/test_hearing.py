@@ -6,9 +6,10 @@ import time
 import pytest
 from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.deploy.hearing import Hearing
+from steerclear.experiments.deploy.referee import Referee
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.feed import FeedSender, Fix
+from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import FleetFileError
 
@@ -78,3 +79,27 @@ def test_it_must_be_told_where_to_hear():
         Hearing(fleet, MonotonicClock())
     with Hearing(fleet, MonotonicClock(), listen="127.0.0.1:0") as hearing:
         assert hearing.contacts() == ()
+
+
+def test_with_signing_boats_and_referee_seal_what_they_say_and_nobody_else_is_heard(tmp_path):
+    key_file = tmp_path / "feed.key"
+    key_file.write_text("12" * 32)
+    key_file.chmod(0o600)
+    fleet, key = fleet_of(FEED + f"\nsigning: {{{{key_file: {key_file}}}}}"), bytes.fromhex("12" * 32)
+    clock = MonotonicClock()
+    strange = Fix("r1", 42.0001, -71.0, 0.0, 0.0, 0.0, 0.0)
+    with (
+        FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names, key=key) as runner,
+        Referee(fleet, clock) as referee,
+        FeedSender("gps_hub", [fleet.feed.listen, fleet.feed.referee]) as liar,
+        SimFleet.from_file(fleet, autopilot=AutopilotSettings(boot_s=0.0)) as boats,
+    ):
+        wait_for(lambda: liar.send_positions([strange]) or len(referee.hearing.contacts()) == 2)
+        wait_for(lambda: referee.turn() and runner.game() is not None and len(runner.read()) == 2)
+        x_m, y_m = boats.states()["r1"][:2]
+        for told in (runner.read(), referee.hearing.contacts()):
+            found = {contact.boat: contact for contact in told}
+            assert found["r1"].position_m == pytest.approx((x_m, y_m), abs=0.5)
+        wait_for(lambda: liar.send_positions([strange]) or runner.faults().get("unsigned", 0) > 3)
+        assert set(runner.faults()) == {"unsigned"}
+        assert runner.alarms() == ()

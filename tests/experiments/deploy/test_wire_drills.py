@@ -192,6 +192,7 @@ def send(lake, frames):
 DRILLS = {
     "packets up to 0.3 s out of order": (boats_fault("out_of_order"), "out_of_order"),
     "packets twice": (boats_fault("duplicate"), "out_of_order"),
+    "GPS fix lost, dead reckoning told": (boats_fault("gps_lost"), "no_fix"),
     "packets with bits turned": (boats_fault("corrupt"), "bad_checksum"),
     "a stranger's unsigned positions": (unsigned, "unsigned"),
     "a stranger's wrongly signed positions": (wrongly_signed, "bad_signature"),

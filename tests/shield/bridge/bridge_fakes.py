@@ -237,7 +237,9 @@ class FakeSink:
 class World:
     """Own boats and others, one loop, one clock."""
 
-    def __init__(self, fleet, starts, rule, others=(), shield=None, game=None, grounds=OPEN_WATER):
+    def __init__(
+        self, fleet, starts, rule, others=(), shield=None, game=None, grounds=OPEN_WATER, contacts=FakeContacts
+    ):
         self.fleet = fleet
         self.clock = ManualClock(1000.0)
         names = [boat.name for boat in fleet.ours]
@@ -245,7 +247,7 @@ class World:
         self.links = {
             name: FakeLink(name, self.clock, platforms[name], *start) for name, start in zip(names, starts, strict=True)
         }
-        self.contacts = FakeContacts(self.clock)
+        self.contacts = contacts(self.clock)
         for name, *start in others:
             self.contacts.add(name, *start)
         self.policy = FakePolicy(self.clock, rule)

@@ -4,6 +4,8 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.bridge.mavlink import own_frames
+from steerclear.shield.bridge.mavlink.codec import Codec
 from steerclear.shield.bridge.mavlink.commanders import SAY_AGAIN_S, Commanders
 
 OURS = (255, 191)
@@ -96,3 +98,59 @@ def test_a_crowd_of_stations_does_not_fill_memory():
     for i in range(5000):
         watch.hear_foreign(of(beat, i % 255, i // 255), float(i))
     assert len(watch._said_s) <= 300
+
+
+def own_and_watch(key=None):
+    ours = Codec(*OURS, key)
+    return ours, Commanders("blue_1", 1, ours.source)
+
+
+def heard(frame):
+    return Codec(*OURS, None).decode(frame)[0]
+
+
+@pytest.mark.parametrize("message", STEERING, ids=lambda m: m.get_type())
+def test_our_own_frames_coming_back_are_an_echo_and_no_second_commander(message):
+    ours, watch = own_and_watch()
+    frame = ours.encode(message)
+    for now_s in (5.0, 5.1):
+        fault, text = watch.hear_foreign(heard(frame), now_s)
+        assert fault == "echo"
+    assert text == "", "said once in a while"
+    assert "reflects them" in watch.hear_foreign(heard(frame), 5.0 + SAY_AGAIN_S)[1]
+    assert watch.heard_s == -math.inf
+
+
+@pytest.mark.parametrize("message", STEERING, ids=lambda m: m.get_type())
+def test_another_program_with_our_ids_is_found_by_frames_we_never_sent(message):
+    ours, watch = own_and_watch()
+    ours.encode(message)
+    stranger = Codec(*OURS, None)
+    for _ in range(3):  # the same command, numbered by somebody else
+        frame = stranger.encode(message)
+    assert watch.hear_foreign(heard(frame), 5.0)[0] == "second_commander"
+    assert watch.heard_s == 5.0
+
+
+def test_our_own_commands_played_again_later_are_somebody_elses(monkeypatch):
+    ours, watch = own_and_watch()
+    frame = ours.encode(STEERING[0])
+    later = own_frames.time.monotonic() + own_frames.ECHO_S + 0.01
+    monkeypatch.setattr(own_frames.time, "monotonic", lambda: later)
+    assert watch.hear_foreign(heard(frame), 9.0)[0] == "second_commander"
+
+
+def test_an_echo_for_another_boat_and_our_own_heartbeat_are_no_fault_of_this_boat():
+    ours, watch = own_and_watch()
+    assert watch.hear_foreign(heard(ours.encode(command(mavlink.MAV_CMD_DO_SET_MODE, target=2))), 1.0) == ("", "")
+    beat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+    assert watch.hear_foreign(heard(ours.encode(beat)), 1.0)[0] == "echo"
+    assert not watch.stations
+
+
+def test_what_we_sent_does_not_fill_memory():
+    ours, _ = own_and_watch()
+    for _ in range(6000):
+        ours.encode(STEERING[1])
+    assert len(ours.source._sent) <= 4096
+    assert ours.source == OURS

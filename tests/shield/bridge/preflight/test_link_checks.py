@@ -8,6 +8,7 @@ import pytest
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.link import BoatReading
 from steerclear.shield.bridge.mavlink.health import LinkHealth
+from steerclear.shield.bridge.mavlink.preparation import OTHERS
 from steerclear.shield.bridge.preflight.link_checks import (
     check_autopilot,
     check_clock,
@@ -172,12 +173,82 @@ def test_spread():
         ({"ARMING_CHECK": 0.0}, "all checks off: set it to 1"),
         ({"SYSID_MYGCS": 250.0, "SYSID_ENFORCE": 1.0}, "SYSID_MYGCS is 250 and ours is 255"),
         ({"SYSID_MYGCS": 250.0, "FS_GCS_ENABLE": 1.0}, "SYSID_MYGCS is 250"),
+        ({"MAV_GCS_SYSID": 252.0, "MAV_OPTIONS": 1.0}, "MAV_GCS_SYSID is 252 and ours is 255: set it to 255"),
+        ({"MAV_GCS_SYSID": 252.0, "MAV_OPTIONS": 3.0}, "MAV_GCS_SYSID is 252"),
+        ({"MAV_GCS_SYSID": 252.0, "FS_GCS_ENABLE": 1.0}, "MAV_GCS_SYSID is 252"),
+        ({"MAV_GCS_SYSID": 1.0, "MAV_GCS_SYSID_HI": 254.0, "MAV_OPTIONS": 1.0}, "MAV_GCS_SYSID is 1"),
+        ({"ARMING_SKIPCHK": -1.0}, "all checks skipped: set it to 0"),
+        ({"ARMING_SKIPCHK": 8.0}, "ARMING_SKIPCHK 8 leaves GPS unchecked: set it to 0"),
+        ({"ARMING_SKIPCHK": 1048574.0}, "leaves compass, GPS, INS unchecked"),
+        ({"ARMING_CHECK": 64.0}, "ARMING_CHECK 64 leaves compass, GPS, INS unchecked: set it to 1"),
+        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 7.0, "FENCE_ACTION": 0.0}, "slows and turns the boat at its own fence"),
+        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 1.0, "FENCE_ACTION": 0.0}, "set FENCE_ENABLE to 0"),
+        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0, "FENCE_ACTION": 1.0}, "FENCE_ACTION is 1, so the autopilot takes"),
+        ({"FENCE_ENABLE": 1.0}, "AVOID_ENABLE has bit 0"),
+        ({"AVOID_ENABLE": 2.0, "PRX1_TYPE": 2.0}, "AVOID_ENABLE has bit 1 and PRX1_TYPE is on"),
+        ({"AVOID_ENABLE": 3.0, "PRX_TYPE": 2.0}, "AVOID_ENABLE has bit 1 and PRX_TYPE is on"),
+        ({"AVOID_ENABLE": 7.0, "BCN_TYPE": 1.0}, "AVOID_ENABLE has bit 2 and BCN_TYPE is on"),
+        ({"OA_TYPE": 1.0}, "OA_TYPE is 1, so the autopilot changes commands after the shield: set OA_TYPE to 0"),
+        ({"SAIL_ENABLE": 1.0}, "set SAIL_ENABLE to 0"),
     ],
 )
 def test_autopilot(parameters, words):
     result = check_autopilot("blue_1", replace(GOOD, parameters={**GOOD.parameters, **parameters}), HERON)
     assert not result.passed
     assert words in result.text
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"MAV_GCS_SYSID": 252.0},
+        {"MAV_GCS_SYSID": 252.0, "MAV_OPTIONS": 2.0},
+        {"MAV_GCS_SYSID": 250.0, "MAV_GCS_SYSID_HI": 255.0, "MAV_OPTIONS": 1.0},
+        {"MAV_GCS_SYSID": 255.0, "MAV_GCS_SYSID_HI": 0.0, "MAV_OPTIONS": 1.0},
+        {"ARMING_SKIPCHK": 0.0},
+        {"ARMING_SKIPCHK": 1024.0},
+        {"ARMING_CHECK": 1.0},
+        {"ARMING_CHECK": 28.0},
+        {"FENCE_ENABLE": 0.0, "AVOID_ENABLE": 7.0, "FENCE_ACTION": 2.0},
+        {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0, "FENCE_ACTION": 0.0},
+        {"AVOID_ENABLE": 3.0, "PRX1_TYPE": 0.0},
+        {"OA_TYPE": 0.0},
+    ],
+)
+def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
+    result = check_autopilot("blue_1", replace(GOOD, parameters={**GOOD.parameters, **parameters}), HERON)
+    assert result.passed, result.text
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"fix_type": 1}, "GPS has no fix (fix type 1): wait for one"),
+        ({"fix_type": 2}, "fix type 2"),
+        ({"fix_type": -1}, "does not say whether GPS has a fix"),
+        ({"fix_fault": "GPS fix is poor (HDOP 9.9)"}, "GPS fix is poor (HDOP 9.9): wait for a good GPS fix"),
+    ],
+)
+def test_a_boat_without_a_fix_does_not_pass(changes, words):
+    result = check_autopilot("blue_1", replace(GOOD, **changes), HERON)
+    assert not result.passed
+    assert words in result.text
+
+
+@pytest.mark.parametrize("kind", ["no_fix", "fix_silent", "poor_fix", "no_estimate"])
+def test_a_fix_lost_while_watched_does_not_pass(kind):
+    assert f"5 {kind}" in check_rates("blue_1", readings(faults={kind: 5}), GOOD).text
+
+
+def test_what_was_refused_before_the_watch_is_not_of_it():
+    said = [BoatReading("blue_1", 0.0, faults={"no_fix": 9}), *readings(1000)]
+    (rates, *_) = run_checks(link_checks({"blue_1": FakeLink(said=said)}, {"blue_1": HERON}, ManualClock(10.0), 2.0))
+    assert rates.passed, rates.text
+
+
+def test_every_parameter_that_is_looked_at_is_asked_for():
+    assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*OTHERS}
+    assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "FENCE_ACTION", "GUID_TIMEOUT"} <= {*OTHERS}
 
 
 def test_an_autopilot_that_told_nothing_does_not_pass():

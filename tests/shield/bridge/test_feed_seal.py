@@ -1,0 +1,152 @@
+"""With a key nobody without it speaks on the feed: packets unsealed, forged, changed or played again count nowhere."""
+
+import hmac
+import json
+import socket
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from feed_attack import GAME, flood, forged, sealed
+from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
+from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, Packet
+from steerclear.shield.bridge.feed_packets import MAX_BYTES
+from steerclear.shield.bridge.feed_seal import SEAL_BYTES, Seal, body_of, is_sealed
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.mavlink.signing import SigningClock
+from steerclear.shield.exceptions import ConfigError, FeedError
+
+FRAME = FieldFrame(42.0, -71.0)
+KEY, OTHER = bytes(range(32)), bytes(32)
+LOCAL = "127.0.0.1"
+TRUE = Fix("red_1", 42.0001, -71.0001, 90.0, 1.0, 0.0, 0.1)
+
+
+@pytest.fixture
+def receiver():
+    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(100.0), boats=("red_1",), key=KEY) as opened:
+        yield opened
+
+
+def test_a_sealed_packet_is_taken_once(receiver):
+    data = sealed(KEY, 1, fixes=(TRUE,))
+    for _ in range(3):
+        receiver.take(data, LOCAL)
+    assert [found.boat for found in receiver.read()] == ["red_1"]
+    assert receiver.faults() == {"replayed": 2}
+
+
+@pytest.mark.parametrize("game", [None, GAME], ids=["positions", "game"])
+def test_what_is_not_sealed_with_the_key_is_dropped_and_counted_by_kind(receiver, game):
+    fixes = () if game else (TRUE,)
+    good = sealed(KEY, 1, fixes=fixes, game=game)
+    bare = body_of(good)
+    assert json.loads(bare)["stamp"] > 0
+    changed = bare.replace(b'"seq":1', b'"seq":9') + good[-SEAL_BYTES:]
+    for data in (bare, bare + b"\n", bare + b"\nhmac-sha256:" + b"0" * 63, b"", b"\nhmac-sha256:"):
+        receiver.take(data, LOCAL)
+    for data in (sealed(OTHER, 1, fixes=fixes, game=game), changed, bare + b"\nhmac-sha256:" + b"0" * 64, good[1:]):
+        receiver.take(data, LOCAL)
+    assert receiver.faults() == {"unsigned": 5, "bad_signature": 4}
+    assert (receiver.read(), receiver.game()) == ((), None)
+    assert receiver.alarms() == (), "nobody without the key can make an alarm"
+
+
+def test_a_sender_of_your_own_as_documented_is_heard(receiver):
+    text = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    (block,) = (part.split("```")[0] for part in text.split("```python\n")[1:] if "feed_key" in part)
+    packet = json.loads(Packet("mine", 1, 1, fixes=(TRUE,)).encode())
+    names = {"json": json, "hmac": hmac, "time": time, "packet": packet, "key": KEY}
+    exec(block, names)
+    receiver.take(names["datagram"], LOCAL)
+    assert [found.source for found in receiver.read()] == ["mine"]
+
+
+def test_every_changed_bit_is_found():
+    seal, data = Seal(KEY), sealed(KEY, 1, fixes=(TRUE,))
+    assert seal.fault(data) == ""
+    for at in range(len(data)):
+        for bit in range(8):
+            changed = bytearray(data)
+            changed[at] ^= 1 << bit
+            assert seal.fault(bytes(changed)), (at, bit)
+
+
+def test_forged_times_of_the_future_and_of_the_past_change_nothing(receiver):
+    now = SigningClock().now()
+    for stamp in (now + 10**9, 2**62, 0, now - 10**8):
+        receiver.take(Seal(KEY).close(Packet("hub", 1, 1, fixes=(TRUE,), stamp=stamp).encode()), LOCAL)
+    receiver.take(Seal(KEY).close(Packet("hub", 1, 1, fixes=(TRUE,)).encode()), LOCAL)
+    assert receiver.faults() == {"old_signature": 4, "malformed": 1}
+    receiver.take(sealed(KEY, 2, fixes=(TRUE,)), LOCAL)
+    assert len(receiver.read()) == 1
+
+
+def test_a_recorded_run_played_to_a_runner_that_was_started_again_locks_nobody_out():
+    recorded = [sealed(KEY, k, run=5, fixes=(TRUE,)) for k in range(50)]
+    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(100.0), boats=("red_1",), key=KEY) as receiver:
+        receiver.take(sealed(KEY, 60, run=5, fixes=(TRUE,)), LOCAL)
+        for data in recorded:
+            receiver.take(data, LOCAL)
+        assert receiver.faults() == {"replayed": 50}
+
+
+def test_without_a_key_a_sealed_packet_is_refused_by_name():
+    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(100.0)) as receiver:
+        receiver.take(sealed(KEY, 1, fixes=(TRUE,)), LOCAL)
+        assert receiver.faults() == {"signed": 1}
+        assert "the file has no signing; give it the key" in receiver.fault_texts()["signed"]
+
+
+def test_keys_of_another_length_and_packets_that_leave_no_room_for_the_seal_are_refused():
+    with pytest.raises(ConfigError, match="32"):
+        FeedSender("hub", ["127.0.0.1:9"], b"short")
+    with pytest.raises(ConfigError, match="32"):
+        FeedReceiver("127.0.0.1:0", FRAME, ManualClock(), key=b"short")
+    text = Packet("hub", 1, 1, fixes=(TRUE,)).encode()
+    assert not is_sealed(text)
+    with pytest.raises(FeedError, match="fewer boats"):
+        Packet("hub", 1, 1, fixes=(Fix("b" * 60, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),) * 200).encode()
+    assert len(Seal(KEY).close(b"x" * (MAX_BYTES - SEAL_BYTES))) == MAX_BYTES
+
+
+def test_on_loopback_an_attacker_at_200_hz_is_not_heard_and_costs_no_true_packet():
+    with FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",), key=KEY) as receiver:
+        ending = threading.Event()
+        attacker = threading.Thread(target=flood, args=(receiver.address, ending, forged("red_1"), 200.0))
+        attacker.start()
+        try:
+            with FeedSender("gps_hub", [receiver.address], KEY) as hub:
+                heard = 0
+                for _ in range(30):
+                    hub.send_positions([TRUE])
+                    hub.send_game(GAME)
+                    time.sleep(0.05)
+                    told = receiver.read()
+                    heard += len(told) == 1 and told[0].source == "gps_hub"
+        finally:
+            ending.set()
+            attacker.join()
+        assert heard >= 29
+        assert receiver.game() == GAME
+        faults = receiver.faults()
+        assert faults["unsigned"] > 100
+        assert set(faults) <= {"unsigned", "bad_signature", "socket"}
+
+
+def test_forged_packets_cost_a_tenth_so_that_more_of_them_leave_the_true_ones_room():
+    with FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",), key=KEY) as receiver:
+        host, port = receiver.address.rsplit(":", 1)
+        data = next(forged("red_1"))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            for _ in range(3000):
+                out.sendto(data, (host, int(port)))
+                time.sleep(0.0001)
+        with FeedSender("gps_hub", [receiver.address], KEY) as hub:
+            end = time.monotonic() + 10.0
+            while not receiver.read():
+                hub.send_positions([TRUE])
+                time.sleep(0.02)
+                assert time.monotonic() < end
+        assert "flood" not in receiver.faults()
