@@ -59,7 +59,6 @@ class Station:
         """What each boat was left doing, once closed."""
         try:
             if tlog:
-                fleet.log_dir.mkdir(parents=True, exist_ok=True)
                 self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog"))
             self.links = {entry.name: self._link(entry) for entry in commanded}
             self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
