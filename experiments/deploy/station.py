@@ -71,6 +71,11 @@ class Station:
             self.close()
             raise
 
+    @property
+    def key(self) -> bytes | None:
+        """The signing key, 32 bytes; None: nothing is signed."""
+        return None if self._signing is None else self._signing.key
+
     def connect(self, timeout_s: float = CONNECT_S) -> None:
         """Hear every boat and get its streams, all at once.
 
