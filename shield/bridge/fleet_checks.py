@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import re
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 
 _HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
 _ADDRESS = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
+_NUMERIC = re.compile(r"(^|\.)(0[xX][0-9A-Fa-f]*|[0-9]+)\.?$|[\[\]]")
 _DEVICE = re.compile(r"[^:]+(:[0-9]{1,7})?")
 
 
@@ -97,9 +99,20 @@ def address_of(text: str, key: str) -> tuple[str, int]:
         FleetFileError: it is not of that form.
     """
     found = _ADDRESS.fullmatch(text)
-    if found is None or not 0 < int(found["port"]) < 65536:
+    if found is None or not 0 < int(found["port"]) < 65536 or not _is_host(found["host"]):
         raise FleetFileError(f'{key} is {text!r}; give "HOST:PORT", such as "127.0.0.1:14700"')
     return found["host"], int(found["port"])
+
+
+def _is_host(host: str) -> bool:
+    """Whether a host means one thing: what ends in a number is a plain address, not one in octal (010.0.0.1) or cut."""
+    if not _NUMERIC.search(host):
+        return True
+    try:
+        ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return False
+    return True
 
 
 def _check_names(fleet: FleetSettings) -> None:

@@ -134,6 +134,12 @@ def test_what_is_no_fleet_file_is_refused_at_once_in_little_memory(name):
         ('"127.0.0.1:14700"', '"127.0.0.1:²"', "feed.listen"),
         ('"127.0.0.1:14700"', '"127.0.0.1:٣٣"', "feed.listen"),
         ('"127.0.0.1:14700"', '"a b:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"127.0.0.010:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"010:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"0x7f000001:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"127.1:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"[::1:14700"', "feed.listen"),
+        ('"127.0.0.1:14700"', '"[::zz]:14700"', "feed.listen"),
         ('"127.0.0.1:14700"', f'"{"a" * 70}:14700"', "feed.listen"),
         ('"udpin:127.0.0.1:14550"', '"udpin:127.0.0.1:²"', "blue_1"),
         ('"udpin:127.0.0.1:14550"', '"serial:/dev/ttyUSB0:²"', "serial:DEVICE:BAUD"),
@@ -152,6 +158,11 @@ def test_nothing_is_taken_for_something_else(old, new, place):
 def test_the_shield_may_be_given_endless_times():
     fleet = parse_fleet(GOOD + "\nshield: {give_way_after_s: .inf}")
     assert fleet.shield_config.give_way_after_s == math.inf
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "[::1]", "[fe80::1%eth0]", "localhost", "boat-1.local", "a1.b2", "1a"])
+def test_hosts_that_mean_one_thing_are_taken(host):
+    assert parse_fleet(GOOD.replace("127.0.0.1:14700", f"{host}:14700")).feed.listen == f"{host}:14700"
 
 
 def test_the_file_that_comes_with_the_package_is_read_alike():
