@@ -80,19 +80,23 @@ def _show_proof(console: Console, replay: Replay) -> None:
         )
     if proof.missing:
         lost = sum(after - before - 1 for before, after in proof.missing if after > before)
-        console.print(f"{lost} turns are missing: what was decided in them is not proved.", style="yellow")
+        back = sum(after <= before for before, after in proof.missing)
+        text = f"{lost} turns are missing" + (f", {back} times they go back" if back else "")
+        console.print(f"{text}: what was decided then is not proved.", style="yellow")
     if proof.first is not None:
         _show_first(console, "First difference", proof.first, "recorded", "now")
     if proof.strayed or proof.unfounded:
         text = f"{proof.strayed} commands are not what was decided, {proof.unfounded} were sent without a decision."
         console.print(text, style="red" if proof.strayed else "yellow")
+    for (boat, limit_mps), count in proof.cut.items():
+        console.print(f"{boat}: its autopilot's limit of {limit_mps:g} m/s cut {count} commands.", markup=False)
     if proof.first_sent is not None:
         _show_first(console, "First of them", proof.first_sent, "decided", "sent")
     if replay.proof.holds and not replay.proved:
         console.print("NOT PROVED.", style="yellow")
     total = sum(replay.reasons.values())
     shares = ", ".join(f"{name} {count / total:.1%}" for name, count in replay.reasons.most_common())
-    console.print(f"Reasons: {shares}" if total else "No boat was covered.")
+    console.print(f"Reasons: {shares}" if total else "No boat was covered: nothing is proved.")
 
 
 def _show_first(console: Console, title: str, first: Difference, one: str, other: str) -> None:

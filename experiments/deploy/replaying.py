@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -44,6 +45,7 @@ class Proof:
     Attributes:
         ticks: in the log.
         decisions: decided again.
+        covered: of those, with a boat of ours in it.
         same: of those, the same bit for bit.
         unproven: of those, not the same, but after ticks that are missing, so that the shield's memory is not known.
         different: of those, not the same though everything before is known.
@@ -52,10 +54,12 @@ class Proof:
         strayed: commands that left for a boat and are not what was decided for it, or that did not leave.
         unfounded: commands that left for a boat, no stops, without any decision.
         first_sent: the first of these.
+        cut: commands an autopilot's limit cut, by boat and limit, m/s.
     """
 
     ticks: int = 0
     decisions: int = 0
+    covered: int = 0
     same: int = 0
     unproven: int = 0
     different: int = 0
@@ -64,6 +68,7 @@ class Proof:
     strayed: int = 0
     unfounded: int = 0
     first_sent: Difference | None = None
+    cut: Counter[tuple[str, float]] = field(default_factory=Counter)
 
     @property
     def holds(self) -> bool:
@@ -72,9 +77,9 @@ class Proof:
 
     @property
     def proved(self) -> bool:
-        """Whether every turn is proved: there are decisions, all the same, none missing, and all that was sent."""
+        """Whether every turn is proved: boats were decided for, all the same, none missing, and all that was sent."""
         unproven = self.unproven or self.missing or self.unfounded
-        return self.holds and self.decisions > 0 and not unproven
+        return self.holds and self.covered > 0 and not unproven
 
 
 class Prover:
@@ -92,6 +97,7 @@ class Prover:
         self._header = header
         self._shield = Shield(header.config, header.surroundings)
         self._sent = SentCheck(header)
+        self.proof.cut = self._sent.cut
         self._known = False
         self._last: int | None = None
         self._boats: Any = None
@@ -110,6 +116,7 @@ class Prover:
             self._shield.reset()
         difference = self._compare(tick, tick.decisions)
         self.proof.decisions += 1
+        self.proof.covered += bool(tick.decisions.fleet.controlled.any())
         if difference is None:
             self.proof.same += 1
         elif self._known:

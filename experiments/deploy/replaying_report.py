@@ -238,6 +238,7 @@ def as_content(replay: Replay) -> dict[str, Any]:
         "first_difference": None if proof.first is None else asdict(proof.first),
         "strayed": proof.strayed,
         "unfounded": proof.unfounded,
+        "cut": [{"boat": boat, "limit_mps": limit, "commands": count} for (boat, limit), count in proof.cut.items()],
         "first_sent": None if proof.first_sent is None else asdict(proof.first_sent),
         "reasons": dict(replay.reasons),
         "actions": [

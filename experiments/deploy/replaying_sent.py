@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 from steerclear.shield.bridge.blackbox import LogHeader
@@ -38,25 +39,31 @@ class Strayed:
 
 
 class SentCheck:
-    """Compares tick by tick, for the boats this process commanded.
+    """Compares tick by tick, for the boats this process commanded or sent something.
 
     Different, and right: rounding of messages, the autopilot's limit, a link that cannot go astern and creeps instead,
     a link's own stop where the tick declares it or nothing was decided for the boat, and nothing sent to a boat that
     a person steers.
+
+    Attributes:
+        cut: how many commands an autopilot's limit cut, by boat and limit, m/s.
 
     Args:
         header: of the log.
     """
 
     def __init__(self, header: LogHeader) -> None:
+        self.cut: Counter[tuple[str, float]] = Counter()
         self._ours = [boat.name for boat in header.boats if boat.ours]
+        self._is_team = header.config.coordination == "team"  # then nobody else steers a boat the shield decides for
         self._tells_limits = header.version > 1
         self._limits: dict[str, float] = {}
 
     def strayed(self, tick: Tick) -> list[Strayed]:
         """What does not fit in a tick."""
         decided = _decided(tick)
-        found = [self._one(name, tick, decided.get(name)) for name in self._ours]
+        names = dict.fromkeys((*self._ours, *tick.sent, *(decided if self._is_team else ())))
+        found = [self._one(name, tick, decided.get(name)) for name in names]
         return [entry for entry in found if entry is not None]
 
     def _one(self, name: str, tick: Tick, decided: tuple[float, float] | None) -> Strayed | None:
@@ -79,6 +86,8 @@ class SentCheck:
             decided_mps = max(CREEP_MPS, decided_mps)
         limit_mps = sent.limit_mps if self._tells_limits else self._limit_seen(sent, decided_mps)
         allowed_mps = min(limit_mps, max(-limit_mps, decided_mps))
+        if abs(allowed_mps - decided_mps) > ROUNDED_MPS:
+            self.cut[sent.boat, limit_mps] += 1
         return abs(sent.speed_mps - allowed_mps) <= ROUNDED_MPS
 
     def _limit_seen(self, sent: Sent, decided_mps: float) -> float:

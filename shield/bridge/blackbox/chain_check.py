@@ -38,6 +38,7 @@ class ChainCheck:
         self._chain: Chain | None = None
         self._last = ""
         self._early = 0
+        self._is_bare = self._is_denied = False
 
     @property
     def holds(self) -> bool:
@@ -52,6 +53,7 @@ class ChainCheck:
             is_first: whether it is the log's first file.
         """
         if head is None:
+            self._is_bare = True
             return
         if self._early:
             self._tell(f"{self._early} records stand before the header")
@@ -77,6 +79,8 @@ class ChainCheck:
         """A link was met."""
         chain = self._chain
         if chain is None:
+            if self._is_bare:
+                self.deny()
             self._early += 1
             return
         try:
@@ -103,6 +107,12 @@ class ChainCheck:
                 self.codes_checked += 1
             else:
                 self._tell(f"the code of the link after record {found.count} is not of this key")
+
+    def deny(self) -> None:
+        """The log says that it has no chain, and was written by a program that writes one."""
+        if not self._is_denied:
+            self._tell("its chain was taken out")
+        self._is_denied = True
 
     def mend(self) -> None:
         """The mark of a mended file was met."""

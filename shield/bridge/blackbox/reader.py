@@ -18,6 +18,7 @@ from .chain_check import ChainCheck
 from .decode import tick_from_json
 from .header import LogHeader
 from .mcap_file import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
+from .origin import source_digest
 from .parts import follows, later_parts, number_of
 from .records import MENDED_TOPIC, read_records
 
@@ -84,7 +85,10 @@ class LogReader:
         """
         for topic, message in self._messages:
             if topic == TICK_TOPIC:
-                yield tick_from_json(_object(message), self.header.platforms)
+                content = _object(message)
+                if "odd" in content and self.header.chain is None:
+                    self.chain.deny()  # only logs with a chain have it
+                yield tick_from_json(content, self.header.platforms)
             elif topic == LOG_TOPIC:
                 row = _object(message)
                 yield LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
@@ -166,7 +170,10 @@ class LogReader:
     def _begin_chain(self, message: Message) -> None:
         """Follow the chain of the file whose header was met."""
         is_first = len(self.files) == 1 and number_of(self.path)[1] == 1
-        self.chain.begin(LogHeader.from_message(_object(message)).chain, is_first)
+        header = LogHeader.from_message(_object(message))
+        self.chain.begin(header.chain, is_first)
+        if header.chain is None and header.sources == source_digest():
+            self.chain.deny()
 
     def _is_record(self, topic: str, message: Message) -> bool:
         """Whether a message is one of the log's records; all are added to the chain, links are checked."""

@@ -5,6 +5,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from forged_logs import read_records, write_records
 from logged_runs import Encounter, header_of
@@ -116,6 +117,39 @@ def test_decisions_left_out_in_between_are_not_proved(tmp_path, ticks):
     code, said = run(write(tmp_path / "x.mcap", holed))
     assert code in (1, 3)
     assert "4 were sent without a decision" in said
+
+
+def test_a_turn_that_stands_twice_is_not_proved(tmp_path, ticks):
+    code, said = run(write(tmp_path / "x.mcap", [*ticks[:20], ticks[19], *ticks[20:]]))
+    assert code == 3
+    assert "1 times they go back" in said
+
+
+def test_a_log_in_which_no_boat_was_decided_for_proves_nothing(tmp_path):
+    class Nobody(Encounter):
+        def fleet(self, number):
+            seen = super().fleet(number)
+            return dataclasses.replace(seen, controlled=np.zeros(4, dtype=bool))
+
+    def stopped(tick):
+        return sent_at(tick, 0.0)
+
+    code, said = run(write(tmp_path / "x.mcap", list(Nobody(header_of(ShieldConfig()), 20, edit=stopped))))
+    assert code == 3
+    assert "No boat was covered: nothing is proved" in said
+
+
+def test_commands_an_autopilot_cut_are_told(tmp_path, ticks):
+    def cut(tick):
+        sent = {
+            name: dataclasses.replace(one, speed_mps=min(one.speed_mps, 0.5), limit_mps=0.5)
+            for name, one in tick.sent.items()
+        }
+        return dataclasses.replace(tick, sent=sent)
+
+    code, said = run(write(tmp_path / "x.mcap", [cut(tick) for tick in ticks]))
+    assert code == 0
+    assert "blue_1: its autopilot's limit of 0.5 m/s cut" in said
 
 
 def test_an_altered_certificate_shows_in_the_chain_and_the_decision(tmp_path, log):

@@ -153,7 +153,23 @@ def test_a_links_own_stop_needs_its_declaration(ticks):
 def test_a_team_mate_of_another_process_is_not_ours_to_send_to(ticks):
     boats = tuple(dataclasses.replace(boat, ours=boat.name == "blue_1") for boat in HEADER.boats)
     tick = dataclasses.replace(ticks[5], sent={"blue_1": ticks[5].sent["blue_1"]})
-    assert strayed(tick, dataclasses.replace(HEADER, boats=boats)) == []
+    alone = dataclasses.replace(HEADER.config, coordination="per_boat")
+    assert strayed(tick, dataclasses.replace(HEADER, boats=boats, config=alone)) == []
+    assert strayed(tick, dataclasses.replace(HEADER, boats=boats)) == [("blue_2", "command")]
+
+
+def test_a_header_that_disowns_boats_hides_nothing(ticks):
+    header = dataclasses.replace(HEADER, boats=tuple(dataclasses.replace(b, ours=False) for b in HEADER.boats))
+    tick = with_sent(ticks[5], speed_mps=0.7)
+    assert strayed(tick, header) == [("blue_1", "speed")]
+    assert strayed(dataclasses.replace(tick, sent={}), header) == [("blue_1", "command"), ("blue_2", "command")]
+
+
+def test_commands_that_a_limit_cut_are_counted(ticks):
+    cut = [with_sent(with_decided(tick, 2.0), speed_mps=0.5, heading_rad=1.0, limit_mps=0.5) for tick in ticks]
+    check = SentCheck(HEADER)
+    assert [check.strayed(tick) for tick in cut] == [[]] * len(ticks)
+    assert check.cut == {("blue_1", 0.5): len(ticks)}
 
 
 def test_the_proof_counts_and_names_what_strayed(ticks):

@@ -382,6 +382,29 @@ def test_a_header_without_a_sound_head_is_damaged(log, tmp_path, chain):
         LogReader(path)
 
 
+def without_chain(records, tick_parts=(), **header_parts):
+    """Records of a log that says it is of the first version, as far as that was thought of."""
+    header = {name: value for name, value in records[0].content.items() if name != "chain"}
+    header |= {"version": 1, **header_parts}
+    found = [dataclasses.replace(records[0], data=json.dumps(header).encode())]
+    for record in records[1:]:
+        kept = {name: value for name, value in record.content.items() if name not in tick_parts}
+        if record.topic != "/link":
+            found.append(dataclasses.replace(record, data=json.dumps(kept).encode()))
+    return found
+
+
+@pytest.mark.parametrize("forge", [
+    lambda records: without_chain(records[:1]),
+    lambda records: without_chain(records, sources="of another program"),
+    lambda records: [without_chain(records, ("odd",), sources="other")[0], *records[1:]],
+], ids=["by this program", "with what only later ones have", "with links"])  # fmt: skip
+def test_a_chain_that_was_taken_out_shows(log, tmp_path, forge):
+    chain, _ = check(write_records(tmp_path / "x.mcap", forge(read_records(log))))
+    assert "its chain was taken out" in chain.breaks
+    assert not chain.holds
+
+
 def test_a_log_of_the_first_version_is_read_and_has_no_chain():
     chain, numbers = check(OLD)
     assert numbers == list(range(12))
