@@ -27,6 +27,7 @@ class ExitCode(IntEnum):
     OK = 0
     BAR_FAILED = 1
     BAD_INPUT = 2
+    NOT_PROVED = 3
     INTERRUPTED = 130
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from steerclear.env.record import save
 from steerclear.shield.bridge.blackbox import LogReader, mend
+from steerclear.shield.bridge.mavlink.signing import read_key
 
 from ..deploy.replay_text import show
 from ..deploy.replaying_report import Replay, as_content, compare, draw, replay_log
@@ -16,7 +17,7 @@ from ..provenance import machine, versions
 from ..replay_html import write_replay
 from ..store import write_json
 from . import options as o
-from .console import command, finish, out
+from .console import ExitCode, command, finish, out
 from .files import check_ending
 
 Log = Annotated[Path, typer.Argument(help="Black-box log (.mcap) that deploy wrote.")]
@@ -30,6 +31,8 @@ Mend = Annotated[
     Path | None, typer.Option("--mend", help="Write what can be read of a cut-off log as a whole one (.mcap).")
 ]
 
+Key = Annotated[Path | None, typer.Option(help="Key file of the boats: check the codes of a log written with signing.")]
+
 
 @command
 def replay(
@@ -39,17 +42,19 @@ def replay(
     html: Html = None,
     record: RecordFile = None,
     mended: Mend = None,
+    key: Key = None,
     json_file: o.JsonFile = None,
 ) -> None:
     """Run the shield again on a recorded log and prove that it decides the same, bit for bit.
 
-    Exit status: 0 the same, 1 a decision differs, 2 bad input, 130 interrupted.
+    Exit status: 0 all decisions are proved the same, 1 a decision differs or something else was sent, 2 bad input, 3
+    not all is proved: turns are missing, no decisions, or the log is not as it was written, 130 interrupted.
     """
     started = time.perf_counter()
     check_ending(html, "--html", (".html", ".htm"))
     check_ending(record, "--record", (".npz",))
     check_ending(mended, "--mend", (".mcap",))
-    with LogReader(log) as reader:
+    with LogReader(log, None if key is None else read_key(key)) as reader:
         found = replay_log(reader, keep_tracks=without_shield or html is not None or record is not None)
     draw(found)
     if without_shield:
@@ -64,6 +69,8 @@ def replay(
         wall_s = time.perf_counter() - started
         write_json(json_file, {**content, "wall_s": wall_s, "log": str(log), **as_content(found), "files": files})
     finish(found.proof.holds)
+    if not found.proved:
+        raise typer.Exit(int(ExitCode.NOT_PROVED))
 
 
 def _write(found: Replay, log: Path, html: Path | None, record: Path | None, mended: Path | None) -> list[Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.fleet_file import FleetFile, load_with_text
 from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
@@ -112,7 +112,7 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
         FleetFileError: it cannot be used, or there is nothing to command.
         ConfigError: its signing key cannot be read, or others can read it.
     """
-    fleet = load_fleet(orders.fleet_file)
+    fleet, text = load_with_text(orders.fleet_file)
     if fleet.agent_ids:
         game_config(fleet)
     if not fleet.commanded(orders.boat):
@@ -122,26 +122,33 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
     if "delay_s" not in fleet.shield:
         measured = measured_delay_s(fleet, orders.boat)
         fleet = fleet.with_shield(delay_s=fleet.dt_s if measured is None else measured)
-    return fleet, orders.fleet_file.read_text(encoding="utf-8")
+    return fleet, text
 
 
-def may_start(
-    checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome, elsewhere: Sequence[str] = ()
-) -> bool:
+def check_accepted(checks: Sequence[Check], accept: Sequence[str], elsewhere: Sequence[str] = ()) -> None:
+    """See that every name to accept is a check's, before any is run.
+
+    Args:
+        checks: that will be run.
+        accept: names that may fail.
+        elsewhere: kinds of checks that are made in the drill and may be accepted too.
+
+    Raises:
+        ConfigError: a name is no check's.
+    """
+    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in elsewhere)]
+    validate_accepted([name for name in accept if name.split(":")[0] not in elsewhere], known)
+
+
+def may_start(checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome) -> bool:
     """Run checks; whether they allow to go on.
 
     Args:
         checks: to run.
-        accept: names that may fail.
+        accept: names that may fail, see `check_accepted`.
         surface: where results are shown.
         outcome: gets results and refusals.
-        elsewhere: kinds of checks that are made in the drill and may be accepted too.
-
-    Raises:
-        ConfigError: a name to accept is no check's.
     """
-    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in elsewhere)]
-    validate_accepted([name for name in accept if name.split(":")[0] not in elsewhere], known)
     outcome.checks = run_checks(checks, surface.shown)
     outcome.refused = not_passed(outcome.checks, accept)
     for result in outcome.checks:

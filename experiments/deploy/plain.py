@@ -10,7 +10,9 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.exceptions import BridgeError
 
 from .tally import closest_m
 
@@ -72,11 +74,13 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
     """Write the log to a file, and to standard error when ``shown``, from a thread of its own.
 
     Whatever a disk or a terminal does, logging costs the loop no time.
+
+    Raises:
+        BridgeError: the file cannot be made.
     """
     handlers: list[logging.Handler] = []
     if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handlers.append(logging.FileHandler(path, encoding="utf-8"))
+        handlers.append(_file(path))
     if shown:
         handlers.append(logging.StreamHandler())
     for handler in handlers:
@@ -95,6 +99,14 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
         listener.stop()
         for handler in handlers:
             handler.close()
+
+
+def _file(path: Path) -> logging.Handler:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return logging.FileHandler(path, encoding="utf-8")
+    except OSError as error:
+        raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from None
 
 
 class _Dropping(logging.handlers.QueueHandler):

@@ -102,13 +102,31 @@ def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(found, dict) and isinstance(found["checks"], list) and isinstance(found["refused"], list):
-            return found
+        if _is_sound(found):
+            return dict(found)
+        raise ValueError("it is of another form")
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         LOG.warning("%s cannot be read (%s); it counts as missing", path, error)
     return None
+
+
+def _is_sound(found: Any) -> bool:
+    """Whether a file's content is what `keep` writes, as far as it is read."""
+    if not isinstance(found, dict) or not isinstance(found.get("unix_s"), int | float):
+        return False
+    lists = found.get("checks"), found.get("refused")
+    if not all(isinstance(entries, list) for entries in lists):
+        return False
+    return all(isinstance(name, str) for name in lists[1]) and all(
+        isinstance(check, dict)
+        and isinstance(check.get("name"), str)
+        and isinstance(check.get("text"), str)
+        and isinstance(check.get("figures"), dict)
+        and all(isinstance(value, int | float) for value in check["figures"].values())
+        for check in lists[0]
+    )
 
 
 def _plain(figures: Any) -> dict[str, float]:

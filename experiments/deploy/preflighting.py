@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import not_passed, run_checks
 
 from .boxes import open_box
 from .checks import checks_of, drive_drill
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
+from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet
 from .preflight_file import DRILLED, keep
 from .quiet import ended_by_signals, undisturbed, warm_up
+from .rehearsal import refuse_early
 from .station import Station
 
 
@@ -31,15 +34,16 @@ def preflight(
     """
     surface, operator = surface or Surface(), operator or Operator()
     fleet, text = read_fleet(orders)
+    refuse_early(fleet)
     warm_up(fleet)
     outcome = Outcome()
     station = Station(fleet, orders.boat, MonotonicClock(orders.speed), tlog=orders.tlog)
     try:
         with station, ended_by_signals(operator):
-            station.connect(orders.connect_s)
             checks = checks_of(station, LONGEST_MINUTES)
-            if may_start(checks, orders.accept, surface, outcome, (*DRILLED, "drill")) and drill and not operator.ended:
-                station.prepare()
+            check_accepted(checks, orders.accept, (*DRILLED, "drill"))
+            station.connect(orders.connect_s)
+            if may_start(checks, orders.accept, surface, outcome) and drill and not operator.ended:
                 _drill(station, text, orders, surface, operator, outcome)
     finally:
         outcome.left = station.left
@@ -49,13 +53,13 @@ def preflight(
 
 
 def _drill(station: Station, text: str, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome) -> None:
-    box = open_box(station, text, "drill", outcome.checks)
-    sinks = [box, *surface.sinks(station.fleet, operator, station.clock)]
-    try:
+    with contextlib.ExitStack() as stack:
+        box = stack.enter_context(contextlib.closing(open_box(station, text, "drill", outcome.checks)))
+        station.prepare()
+        sinks = [box, *surface.sinks(station.fleet, operator, station.clock)]
+        for sink in sinks[1:]:
+            stack.callback(sink.close)
         with undisturbed():
             checks = drive_drill(station, operator, sinks)
-    finally:
-        for sink in sinks:
-            sink.close()
     outcome.checks += run_checks(checks, surface.shown)
     outcome.refused = not_passed(outcome.checks, orders.accept)

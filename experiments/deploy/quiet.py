@@ -19,6 +19,8 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import fresh_state, step_boat
 
+from .rehearsal import boats_of
+
 NICENESS = -10
 """Of the runner's threads while boats are steered, where the system allows that and no more."""
 
@@ -31,8 +33,12 @@ SWITCH_S = 0.0001
 
 
 def warm_up(fleet: FleetFile) -> None:
-    """Compile all that the loop runs, so that its first turn is as quick as any."""
-    Shield(fleet.shield_config).warm_up()
+    """Compile all that the loop runs and read its value tables, so that its first turn is as quick as any.
+
+    Raises:
+        TableError: a value table cannot be read.
+    """
+    Shield(fleet.shield_config).warm_up(boats_of(fleet))
     for platform in set(fleet.platform_of.values()):
         step_boat(platform.pack(), fresh_state(0.0, 0.0, 0.0), 1.0, 0.0, fleet.dt_s)
 

@@ -1,7 +1,8 @@
-"""Running the shield again on what a log holds, to prove that it decides the same, bit for bit."""
+"""Running the shield again on what a log holds: does it decide the same, bit for bit, and was that sent?"""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +11,8 @@ import numpy as np
 from steerclear.shield import Decisions, Shield, SteerclearError
 from steerclear.shield.bridge.blackbox import LogHeader
 from steerclear.shield.bridge.tick import Tick
+
+from .replaying_sent import SentCheck, Strayed
 
 FIELDS = ("intervened", "reason", "certificate_m", "slack_m", "bound")
 """Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
@@ -42,25 +45,41 @@ class Proof:
     Attributes:
         ticks: in the log.
         decisions: decided again.
+        covered: of those, with a boat of ours in it.
         same: of those, the same bit for bit.
         unproven: of those, not the same, but after ticks that are missing, so that the shield's memory is not known.
         different: of those, not the same though everything before is known.
         first: the first of these.
-        missing: (number before, number after) of each stretch of missing ticks.
+        missing: (number before, number after) of each stretch of missing ticks; -1 before the first.
+        strayed: commands that left for a boat and are not what was decided for it, or that did not leave.
+        unfounded: commands that left for a boat, no stops, without any decision.
+        first_sent: the first of these.
+        cut: commands an autopilot's limit cut, by boat and limit, m/s.
     """
 
     ticks: int = 0
     decisions: int = 0
+    covered: int = 0
     same: int = 0
     unproven: int = 0
     different: int = 0
     first: Difference | None = None
     missing: list[tuple[int, int]] = field(default_factory=list)
+    strayed: int = 0
+    unfounded: int = 0
+    first_sent: Difference | None = None
+    cut: Counter[tuple[str, float]] = field(default_factory=Counter)
 
     @property
     def holds(self) -> bool:
-        """Whether no decision differs that could be proved."""
-        return self.different == 0
+        """Whether nothing contradicts: no decision differs that could be proved, and no command from its decision."""
+        return self.different == 0 and self.strayed == 0
+
+    @property
+    def proved(self) -> bool:
+        """Whether every turn is proved: boats were decided for, all the same, none missing, and all that was sent."""
+        unproven = self.unproven or self.missing or self.unfounded
+        return self.holds and self.covered > 0 and not unproven
 
 
 class Prover:
@@ -77,13 +96,17 @@ class Prover:
         self.proof = Proof()
         self._header = header
         self._shield = Shield(header.config, header.surroundings)
+        self._sent = SentCheck(header)
+        self.proof.cut = self._sent.cut
         self._known = False
         self._last: int | None = None
         self._boats: Any = None
 
     def add(self, tick: Tick) -> None:
-        """Decide a tick again and compare."""
+        """Decide a tick again and compare; compare what was sent with what was decided."""
         self._follow(tick)
+        for strayed in self._sent.strayed(tick):
+            self._stray(tick, strayed)
         if tick.fleet is None or tick.wanted is None or tick.decisions is None:
             return
         boats = (tick.fleet.platforms, tick.fleet.names, tick.fleet.team.tobytes())
@@ -93,6 +116,7 @@ class Prover:
             self._shield.reset()
         difference = self._compare(tick, tick.decisions)
         self.proof.decisions += 1
+        self.proof.covered += bool(tick.decisions.fleet.controlled.any())
         if difference is None:
             self.proof.same += 1
         elif self._known:
@@ -101,10 +125,20 @@ class Prover:
         else:
             self.proof.unproven += 1
 
+    def _stray(self, tick: Tick, strayed: Strayed) -> None:
+        self.proof.strayed += not strayed.is_unfounded
+        self.proof.unfounded += strayed.is_unfounded
+        if self.proof.first_sent is None:
+            decided, sent = ("none" if value is None else exact(value) for value in (strayed.decided, strayed.sent))
+            time_s = tick.began_s - self._header.clock_s
+            self.proof.first_sent = Difference(tick.number, time_s, strayed.boat, strayed.what, decided, sent)
+
     def _follow(self, tick: Tick) -> None:
         self.proof.ticks += 1
         if self._last is None:
             self._known = tick.number == 0
+            if tick.number != 0:
+                self.proof.missing.append((-1, tick.number))
         elif tick.number != self._last + 1:
             self.proof.missing.append((self._last, tick.number))
             self._known, self._boats = False, None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.env.record import Record
-from steerclear.shield.bridge.blackbox import LogHeader, LogLine, LogReader
+from steerclear.shield.bridge.blackbox import ChainCheck, LogHeader, LogLine, LogReader
 from steerclear.shield.bridge.blackbox.origin import describe_machine, source_digest, table_digests, versions
 
 from ..breaches import PairDistances
@@ -31,6 +31,7 @@ class Replay:
         header: of the log.
         proof: whether the shield decides the same.
         complete: whether the log was closed properly.
+        chain: what the log's chain says.
         damage: what could not be read.
         began: when the log began, UTC.
         seconds: how long it is, s.
@@ -47,6 +48,7 @@ class Replay:
     header: LogHeader
     proof: Proof
     complete: bool
+    chain: ChainCheck
     damage: list[str]
     began: str
     seconds: float
@@ -59,6 +61,24 @@ class Replay:
     records: list[Record] = field(default_factory=list)
     sides: dict[str, dict[str, Any]] = field(default_factory=dict)
     breaches: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+
+    @property
+    def proved(self) -> bool:
+        """Whether every decision of a log that is as it was written is proved.
+
+        Logs of version 1 have no chain, and one that was killed has no end: that is told, and they count as they are.
+        """
+        return self.proof.proved and self.chain.broken == 0
+
+    @property
+    def made_by(self) -> str:
+        """Which version wrote the log."""
+        return f"steerclear {self.header.versions.get('steerclear', 'unknown')}, sources {self.header.sources[:8]}"
+
+    @property
+    def is_by_another(self) -> bool:
+        """Whether the log's program may decide otherwise than this one."""
+        return bool(self.origin)
 
 
 @dataclass(frozen=True)
@@ -95,7 +115,8 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
     return Replay(
         header=log.header,
         proof=prover.proof,
-        complete=log.complete,
+        complete=log.complete and not log.chain.is_mended,
+        chain=log.chain,
         damage=log.damage,
         began=time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(log.header.unix_ns / 1e9)),
         seconds=last_s - log.header.clock_s,
@@ -196,6 +217,16 @@ def as_content(replay: Replay) -> dict[str, Any]:
         "seconds": replay.seconds,
         "policy": replay.header.policy,
         "complete": replay.complete,
+        "made_by": replay.made_by,
+        "proved": replay.proved,
+        "chain": {
+            "chained": replay.chain.chained,
+            "keyed": replay.chain.keyed,
+            "codes_checked": replay.chain.codes_checked,
+            "mended": replay.chain.is_mended,
+            "broken": replay.chain.broken,
+            "breaks": replay.chain.breaks,
+        },
         "damage": replay.damage,
         "origin": replay.origin,
         "ticks": proof.ticks,
@@ -205,6 +236,10 @@ def as_content(replay: Replay) -> dict[str, Any]:
         "unproven": proof.unproven,
         "missing": [list(stretch) for stretch in proof.missing],
         "first_difference": None if proof.first is None else asdict(proof.first),
+        "strayed": proof.strayed,
+        "unfounded": proof.unfounded,
+        "cut": [{"boat": boat, "limit_mps": limit, "commands": count} for (boat, limit), count in proof.cut.items()],
+        "first_sent": None if proof.first_sent is None else asdict(proof.first_sent),
         "reasons": dict(replay.reasons),
         "actions": [
             {"condition": condition, "response": response, "subject": subject, "ticks": count}

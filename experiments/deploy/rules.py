@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,11 @@ def game_config(fleet: FleetFile) -> GameConfig:
     for rule, key in FROM_FILE.items():
         if rule in fleet.rules:
             raise FleetFileError(f"rules.{rule} is what {key} says; leave it out")
+    for rule in fleet.rules:
+        if rule not in GameConfig.names():
+            near = get_close_matches(rule, GameConfig.names(), 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known settings: {', '.join(GameConfig.names())}"
+            raise FleetFileError(f"rules: unknown game setting {rule!r}; {hint}")
     given: dict[str, Any] = {
         "team_size": len(players) // 2,
         "env_bounds_m": tuple(fleet.field.size_m),

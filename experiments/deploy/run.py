@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
@@ -17,10 +18,11 @@ from steerclear.shield.bridge.timing import Timing
 from .boxes import open_box
 from .checks import checks_of, drilled_check
 from .grounds import grounds_of
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, may_start, read_fleet
+from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet
 from .policy_process import PolicyProcess
 from .preflight_file import DRILLED
 from .quiet import ended_by_signals, undisturbed, warm_up
+from .rehearsal import refuse_early
 from .signing import key_of
 from .station import Station
 from .tally import Tally
@@ -44,6 +46,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
     """
     surface, operator = surface or Surface(), operator or Operator()
     fleet, text = read_fleet(orders)
+    refuse_early(fleet)
     clock, outcome = MonotonicClock(orders.speed), Outcome()
     boats = tuple(entry.name for entry in fleet.commanded(orders.boat))
     with contextlib.ExitStack() as stack:
@@ -51,15 +54,21 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         stack.callback(policy.close)
         warm_up(fleet)
         policy.start()
+        publishers = _publishers(fleet, orders)
+        for publisher in publishers:
+            stack.callback(publisher.close)
         station = Station(fleet, orders.boat, clock, tlog=orders.tlog)
         try:
             with station, ended_by_signals(operator):
-                station.connect(orders.connect_s)
                 checks = checks_of(station, orders.minutes or LONGEST_MINUTES)
                 checks.append(drilled_check(station, text, orders.boat, orders.accept))
-                if may_start(checks, orders.accept, surface, outcome, DRILLED) and not operator.ended:
-                    station.prepare()
-                    _run(station, policy, orders, text, surface, operator, outcome)
+                check_accepted(checks, orders.accept, DRILLED)
+                station.connect(orders.connect_s)  # the first packets to boats; whatever needs none was refused by now
+                if may_start(checks, orders.accept, surface, outcome) and not operator.ended:
+                    with contextlib.closing(open_box(station, text, orders.policy, outcome.checks)) as box:
+                        outcome.log = box.path
+                        station.prepare()
+                        _run(station, policy, orders, [box, *publishers], surface, operator, outcome)
         finally:
             outcome.left = (*station.left, *(f"at the end {text}: take it over by hand" for text in outcome.near))
     return outcome
@@ -69,23 +78,15 @@ def _run(
     station: Station,
     policy: PolicyProcess,
     orders: Orders,
-    text: str,
+    kept: Sequence[TickSink],
     surface: Surface,
     operator: Operator,
     outcome: Outcome,
 ) -> None:
     fleet, clock = station.fleet, station.clock
     with contextlib.ExitStack() as stack:
-        box = open_box(station, text, orders.policy, outcome.checks)
-        outcome.log = box.path
         timing, tally = Timing(), Tally()
-        sinks: list[TickSink] = [
-            box,
-            timing,
-            tally,
-            *_publishers(fleet, orders),
-            *surface.sinks(fleet, operator, clock),
-        ]
+        sinks: list[TickSink] = [*kept, timing, tally, *surface.sinks(fleet, operator, clock)]
         for sink in sinks:
             stack.callback(sink.close)
         parts = Parts(

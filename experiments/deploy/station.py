@@ -58,7 +58,6 @@ class Station:
         """What each boat was left doing, once closed."""
         try:
             if tlog:
-                fleet.log_dir.mkdir(parents=True, exist_ok=True)
                 self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog"))
             self.links = {entry.name: self._link(entry) for entry in commanded}
             self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
@@ -72,6 +71,11 @@ class Station:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def key(self) -> bytes | None:
+        """The signing key, 32 bytes; None: nothing is signed."""
+        return None if self._signing is None else self._signing.key
 
     def connect(self, timeout_s: float = CONNECT_S) -> None:
         """Hear every boat and get its streams, all at once.

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import ipaddress
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from ..config import ShieldConfig
 from ..exceptions import ConfigError, FleetFileError
 from ..platforms import Gains, Platform, get_platform
+from ..surroundings import Surroundings
 from .fleet_settings import FleetSettings
 
 LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
+
+_HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
+_ADDRESS = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
+_NUMERIC = re.compile(r"(^|\.)(0[xX][0-9A-Fa-f]*|[0-9]+)\.?$|[\[\]]")
+_DEVICE = re.compile(r"[^:]+(:[0-9]{1,7})?")
 
 
 def check_fleet(fleet: FleetSettings) -> None:
@@ -25,7 +33,7 @@ def check_fleet(fleet: FleetSettings) -> None:
     _check_fence(fleet)
     for name in {boat.platform for boat in fleet.boats} | set(fleet.platforms):
         platform_of(fleet, name)
-    shield_config(fleet)
+    _check_room(fleet, shield_config(fleet))
     _check_links(fleet)
     _check_contacts(fleet)
     _check_listeners(fleet)
@@ -90,10 +98,21 @@ def address_of(text: str, key: str) -> tuple[str, int]:
     Raises:
         FleetFileError: it is not of that form.
     """
-    host, colon, port = text.rpartition(":")
-    if not colon or not host or not port.isdigit() or not 0 < int(port) < 65536:
+    found = _ADDRESS.fullmatch(text)
+    if found is None or not 0 < int(found["port"]) < 65536 or not _is_host(found["host"]):
         raise FleetFileError(f'{key} is {text!r}; give "HOST:PORT", such as "127.0.0.1:14700"')
-    return host, int(port)
+    return found["host"], int(found["port"])
+
+
+def _is_host(host: str) -> bool:
+    """Whether a host means one thing: what ends in a number is a plain address, not one in octal (010.0.0.1) or cut."""
+    if not _NUMERIC.search(host):
+        return True
+    try:
+        ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return False
+    return True
 
 
 def _check_names(fleet: FleetSettings) -> None:
@@ -126,6 +145,24 @@ def _check_fence(fleet: FleetSettings) -> None:
         raise FleetFileError(f"geofence {fence.box} is empty; give xmin_m < xmax_m and ymin_m < ymax_m")
 
 
+def _check_room(fleet: FleetSettings, config: ShieldConfig) -> None:
+    """The geofence has room for the boats that are kept inside, a separation apart, as the shield keeps its edge."""
+    fence = fleet.geofence
+    try:
+        xmin, ymin, xmax, ymax = Surroundings(field=fence.box).pack(config).field.tolist()
+    except ConfigError as error:
+        raise FleetFileError(f"geofence: {error}") from None
+    sides, apart = (xmax - xmin, ymax - ymin), config.separation_m
+    if min(sides) < apart:
+        raise FleetFileError(
+            f"geofence {fence.box} leaves {min(sides):g} m of water, narrower than the separation of {apart:g} m; "
+            "widen geofence"
+        )
+    kept = sum(boat.link is not None and boat.commanded for boat in fleet.boats)
+    if math.prod(int(min(side / apart, kept)) + 1 for side in sides) < kept:
+        raise FleetFileError(f"geofence {fence.box} has no room for {kept} boats {apart:g} m apart; widen geofence")
+
+
 def _check_links(fleet: FleetSettings) -> None:
     seen: dict[tuple[str, int], str] = {}
     for boat in fleet.boats:
@@ -137,8 +174,14 @@ def _check_links(fleet: FleetSettings) -> None:
                 f"boat {boat.name!r}: link address {boat.link.address!r}; give one of "
                 f"{', '.join(f'{k}:...' for k in LINK_KINDS)}, such as udpin:127.0.0.1:14550"
             )
+        rest = boat.link.address.partition(":")[2]
         if kind != "serial":
-            address_of(boat.link.address.partition(":")[2], f"boat {boat.name!r}: link address")
+            address_of(rest, f"boat {boat.name!r}: link address")
+        elif not _DEVICE.fullmatch(rest):
+            raise FleetFileError(
+                f"boat {boat.name!r}: link address {boat.link.address!r}; give serial:DEVICE:BAUD, such as "
+                "serial:/dev/ttyUSB0:57600"
+            )
         other = seen.setdefault((boat.link.address, boat.link.system_id), boat.name)
         if other != boat.name:
             raise FleetFileError(

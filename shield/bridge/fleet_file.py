@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import json
+import os
+import stat
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from ..config import ShieldConfig
@@ -17,6 +20,7 @@ from ..surroundings import Surroundings
 from .fleet_checks import check_fleet, platform_of, shield_config
 from .fleet_messages import explain
 from .fleet_settings import BoatSettings, FleetSettings
+from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
 
 OUTSIDE_TEAM = 2
@@ -157,24 +161,6 @@ class FleetFile(FleetSettings):
         return (*self.feed_listeners(), *referee)
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
-    """Safe loader that refuses a key given twice, which YAML would silently let the last one win."""
-
-
-def _mapping(loader: _Loader, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-    seen: set[Any] = set()
-    for key_node, _ in node.value:
-        key = loader.construct_object(key_node, deep=True)
-        if isinstance(key, (str, int)) and key in seen:
-            line = key_node.start_mark.line + 1
-            raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice (line {line})")
-        seen.add(key if isinstance(key, (str, int)) else id(key_node))
-    return yaml.SafeLoader.construct_mapping(loader, node, deep=True)
-
-
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
-
-
 def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None) -> FleetFile:
     """A fleet file from its text.
 
@@ -188,13 +174,13 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
             each other; one line.
     """
     try:
-        content = yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        raise FleetFileError(f"{where} is not YAML: {' '.join(str(error).split())}") from None
+        content = read_settings(text)
+    except FleetFileError as error:
+        raise FleetFileError(f"{where} is not YAML of a fleet file: {error}") from None
     if not isinstance(content, dict):
         raise FleetFileError(f"{where} holds no settings; give version, field, geofence, team and boats")
     try:
-        fleet = FleetFile.model_validate(content)
+        fleet = FleetFile.model_validate_json(json.dumps(content))  # by JSON's rules lists are lists, and texts paths
     except ValidationError as error:
         raise FleetFileError(f"{where}: {explain(error, FleetFile)}") from None
     if folder is not None:
@@ -212,12 +198,36 @@ def load_fleet(path: str | Path) -> FleetFile:
     Raises:
         FleetFileError: as `parse_fleet`, or the file cannot be read.
     """
-    path = Path(path)
+    return load_with_text(path)[0]
+
+
+def load_with_text(path: str | Path) -> tuple[FleetFile, str]:
+    """`load_fleet`, and the text it was read from, word for word.
+
+    Raises:
+        FleetFileError: as `load_fleet`.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FleetFileError(f"cannot read {path} ({error}); give the path of a FLEET.yaml") from None
-    return parse_fleet(text, str(path), path.resolve().parent)
+        text = _read(Path(path))
+        folder = Path(path).resolve().parent
+    except (OSError, ValueError) as error:  # a path may hold what no path can
+        why = getattr(error, "strerror", None) or error
+        raise FleetFileError(f"cannot read {path} ({why}); give the path of a FLEET.yaml") from None
+    return parse_fleet(text, str(path), folder), text
+
+
+def _read(path: Path) -> str:
+    """The text of a file that is one, no more of it than a fleet file may hold.
+
+    Raises:
+        OSError: it cannot be read, or is no plain file.
+        ValueError: it holds no text.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    with os.fdopen(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file")
+        return file.read(MOST_BYTES + 1).decode("utf-8")
 
 
 def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:

@@ -8,6 +8,9 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+LONGEST_NAME = 120
+"""Of a place in the file, characters."""
+
 
 def explain(error: ValidationError, root: type[BaseModel]) -> str:
     """The first fault with where it is and the remedy, and how many more there are."""
@@ -65,7 +68,7 @@ def _dotted(place: tuple[int | str, ...]) -> str:
     text = ""
     for part in place:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return text
+    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
 
 
 def _short(value: Any) -> str:

@@ -21,9 +21,9 @@ Length = Annotated[float, Field(gt=0.0, le=1e5, description="give metres > 0")]
 
 
 class Section(BaseModel):
-    """Part of the file: unknown keys are errors, values never change."""
+    """Part of the file: unknown keys are errors, nothing is taken for something else, values never change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class Origin(Section):
@@ -86,7 +86,7 @@ class BoatSettings(Section):
     """
 
     name: Name
-    agent: Annotated[str, Field(pattern=r"^agent_\d+$", description="give agent_0, agent_1, ...")] | None = None
+    agent: Annotated[str, Field(pattern=r"^agent_[0-9]{1,4}$", description="give agent_0, agent_1, ...")] | None = None
     team: Literal["blue", "red"] | None = Field(None, description="give blue or red")
     platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron")]
     link: LinkSettings | None = None
@@ -190,7 +190,7 @@ class End(Section):
 class FleetSettings(Section):
     """The whole file, section by section; `fleet_file.FleetFile` adds what follows from it."""
 
-    version: Literal[1] = Field(description="the version of the format: 1")
+    version: Annotated[int, Field(ge=1, le=1, description="the version of the format: 1")]
     rate_hz: Annotated[float, Field(ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")] = 10.0
     field: FieldSettings = Field(description="give origin and size_m of the field")
     geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the water no boat may leave")

@@ -108,8 +108,10 @@ class Helm:
             decisions = self._shield.decide(fleet, wanted, so_far.surroundings)
         except Exception as error:  # whatever broke, no boat may go on with an old command
             return self._finish(self._failed(so_far, commanded, error), verdict)
-        sent = {name: self._send(name, decisions, fleet) for name in commanded}
-        return self._finish(replace(so_far, decisions=decisions, shield_reset=reset, sent=sent), verdict)
+        actions: list[Action] = []
+        sent = {name: self._send(name, decisions, fleet, actions) for name in commanded}
+        steered = replace(so_far, decisions=decisions, shield_reset=reset, sent=sent, actions=tuple(actions))
+        return self._finish(steered, verdict)
 
     def stop_all(self, names: Collection[str]) -> dict[str, Sent]:
         """Tell boats to stop by their links' surest way, past the shield."""
@@ -141,13 +143,14 @@ class Helm:
             return answer.values[self._file.names.index(name)]
         return self._responders[name].wanted("stop" if response == "go_on" else response, row)
 
-    def _send(self, name: str, decisions: Decisions, fleet: Fleet) -> Sent:
+    def _send(self, name: str, decisions: Decisions, fleet: Fleet, actions: list[Action]) -> Sent:
         i = fleet.names.index(name)
         speed, heading = decisions.sent.absolute(i, fleet.heading_rad[i])
         try:
             return self._links[name].send(heading, speed)
         except BridgeError as error:
             LOG.error("%s: command (%s rad, %s m/s) not sent: %s; told to stop", name, heading, speed, error)
+            actions.append(Action(name, "send", "stop", f"the command was not sent ({error}); the link's own stop"))
             return self._links[name].stop()
 
     def _failed(self, so_far: Steered, commanded: Collection[str], error: Exception) -> Steered:

@@ -78,6 +78,7 @@ class Sent:
         speed_mps: as encoded and limited by the autopilot's own limit, m/s.
         route: name of the message used, or why nothing was sent.
         delivered: whether bytes left this machine.
+        limit_mps: speeds beyond it, either way, are cut by the link to what the autopilot would do; inf: none are.
     """
 
     boat: str
@@ -86,6 +87,7 @@ class Sent:
     speed_mps: float
     route: str
     delivered: bool
+    limit_mps: float = math.inf
 
 
 class Link(Protocol):

@@ -34,6 +34,11 @@ class Water:
         self._open = replace(home, stops=())
         self._home = home if grounds.stops else self._open
 
+    @property
+    def forms(self) -> tuple[Surroundings, ...]:
+        """What is around boats inside the geofence: without a referee, and with one."""
+        return (self._open,) if self._home is self._open else (self._open, self._home)
+
     def around(self, fleet: Fleet, game: GameState | None = None, game_age_s: float = math.inf) -> Surroundings:
         """What is around a fleet now.
 

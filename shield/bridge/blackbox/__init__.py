@@ -14,6 +14,7 @@ How to use it::
     mend(path, target)                                       # what is left of such a log, for viewers
 """
 
+from .chain_check import ChainCheck
 from .disk import Disk
 from .fleet_header import header_of_fleet
 from .header import LoggedBoat, LogHeader, platforms_of
@@ -24,6 +25,7 @@ from .space import check_disk
 from .tlog import TlogWriter
 
 __all__ = [
+    "ChainCheck",
     "Disk",
     "LogHeader",
     "LogLine",

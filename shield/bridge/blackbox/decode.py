@@ -21,6 +21,7 @@ from ..link import BoatReading, Sent
 from ..tick import Action, Tick
 from .header import platform_from
 from .numbers import from_json, row_from_json
+from .odd import put_back
 
 
 def tick_from_json(message: Mapping[str, Any], platforms: Mapping[str, Platform]) -> Tick:
@@ -34,6 +35,7 @@ def tick_from_json(message: Mapping[str, Any], platforms: Mapping[str, Platform]
         LogError: something is missing or of the wrong kind.
     """
     try:
+        put_back(message, message.get("odd", ()))  # logs of version 1 have texts in their place
         return _tick(message, platforms)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         if isinstance(error, LogError):
@@ -127,14 +129,15 @@ def _surroundings(row: Mapping[str, Any]) -> Surroundings:
 
 
 _CONTACT = ("heading_rad", "speed_mps", "fixed_s", "error_m")
-_SENT = ("sent_s", "heading_rad", "speed_mps")
+_SENT = ("sent_s", "heading_rad", "speed_mps", "limit_mps")
 _READING = tuple(name for name in BoatReading.__dataclass_fields__ if name.endswith(("_s", "_rad", "_mps", "_rads")))
 
 
 def _floats(row: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     values = dict(row)
     for name in names:
-        values[name] = from_json(values[name])
+        if name in values or name != "limit_mps":  # which logs of version 1 do not know
+            values[name] = from_json(values[name])
     if "position_m" in values:
         x_m, y_m = row_from_json(values["position_m"], 2)
         values["position_m"] = (x_m, y_m)

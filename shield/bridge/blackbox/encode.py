@@ -1,4 +1,7 @@
-"""A `Tick` as JSON: every float bit for bit, arrays as one entry per boat so that log viewers can plot them."""
+"""A `Tick` as JSON: every float bit for bit, arrays as one entry per boat so that log viewers can plot them.
+
+The message fits its schema, see `odd` for numbers that are not finite.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from ..link import BoatReading, Sent
 from ..tick import Tick
 from .header import platform_to_text
 from .numbers import row_to_json, to_json
+from .odd import take_odd
 
 
 def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any]:
@@ -26,7 +30,7 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         platforms: those the header holds; others are written out in full.
     """
     fleet, decisions = tick.fleet, tick.decisions
-    return {
+    message: dict[str, Any] = {
         "number": tick.number,
         "due_s": to_json(tick.due_s),
         "began_s": to_json(tick.began_s),
@@ -47,6 +51,8 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         "actions": [vars(action) for action in tick.actions],
         "game": json.dumps(dict(tick.game), default=_any) if tick.game else "",
     }
+    message["odd"] = take_odd(message)
+    return message
 
 
 def _boats(

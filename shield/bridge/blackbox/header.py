@@ -13,10 +13,13 @@ from ...exceptions import LogError, SteerclearError
 from ...platforms import Gains, Platform, get_platform
 from ...surroundings import OPEN_WATER, Surroundings
 from ..frame import FieldFrame
+from .chain import ChainHead
 from .numbers import plain, restored
 from .origin import describe_machine, source_digest, table_digests, versions
 
-LOG_VERSION = 1
+LOG_VERSION = 2
+READ_VERSIONS = (1, 2)
+"""Logs of version 1 have no chain, and texts where numbers are not finite."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class LogHeader:
         tables: digests of the value tables for pairs of those platforms; None: those there are now.
         machine: processor architecture, system and C library, which sines and cosines come from.
         version: of the log's format.
+        chain: where the file's chain begins; None in logs of version 1.
     """
 
     config: ShieldConfig
@@ -79,6 +83,7 @@ class LogHeader:
     tables: Mapping[str, str] | None = None
     machine: str = field(default_factory=describe_machine)
     version: int = LOG_VERSION
+    chain: ChainHead | None = field(default_factory=ChainHead.new)
 
     def __post_init__(self) -> None:
         if self.tables is None:
@@ -110,6 +115,7 @@ class LogHeader:
             "notes": dict(self.notes),
             "versions": dict(self.versions),
             "tables": dict(self.tables or {}),
+            "chain": None if self.chain is None else asdict(self.chain),
         }
         return shown | {name: json.dumps(plain(value), allow_nan=False) for name, value in hidden.items()}
 
@@ -121,9 +127,10 @@ class LogHeader:
             LogError: the message is of another version, or a part is missing or makes no sense.
         """
         found = message.get("version")
-        if found != LOG_VERSION:
+        if found not in READ_VERSIONS or isinstance(found, bool):
             raise LogError(
-                f"the log is of version {found}, this program reads version {LOG_VERSION}; use the one that wrote it"
+                f"the log is of version {found}, this program reads versions {', '.join(map(str, READ_VERSIONS))}; use "
+                "the one that wrote it"
             )
         try:
             return cls(**_parts(message))
@@ -155,6 +162,8 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
         "tables": json.loads(message["tables"]),
         "sources": str(message["sources"]),
         "machine": str(message["machine"]),
+        "version": message["version"],
+        "chain": ChainHead.from_text(str(message["chain"])) if message["version"] > 1 else None,
     }
 
 

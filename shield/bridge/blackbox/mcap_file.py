@@ -10,16 +10,17 @@ from mcap.writer import CompressionType, Writer
 
 from ..tick import Action, Tick
 from . import foxglove as fg
+from .chain import ENDS, Chain, ChainHead, Link
 from .disk import Disk
 from .drawing import field_of, fixes_of, scene_of
 from .encode import tick_to_json
 from .header import LogHeader
 from .numbers import plain
-from .schemas import HEADER, TICK, Schema
+from .schemas import HEADER, LINK, TICK, Schema
 
 LOG = logging.getLogger(__name__)
 
-TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC = "/tick", "/header", "/log"
+TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC = "/tick", "/header", "/log", "/link"
 SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
 SCENE_EVERY_S, FIX_EVERY_S, FIELD_EVERY_S = 0.2, 1.0, 10.0
 CHUNK_BYTES = 1 << 20
@@ -32,13 +33,15 @@ class McapFile:
     Args:
         disk: the file.
         header: first message; on the disk when this returns.
+        key: of the codes in the chain's links; None: without.
 
     Raises:
         OSError: the disk does not take it.
     """
 
-    def __init__(self, disk: Disk, header: LogHeader) -> None:
+    def __init__(self, disk: Disk, header: LogHeader, key: bytes | None = None) -> None:
         self._disk, self._header = disk, header
+        self._chain = Chain(ChainHead.new() if header.chain is None else header.chain, key)
         self._writer = Writer(disk, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="", library="steerclear")
         self._schemas: dict[str, int] = {}
@@ -60,6 +63,7 @@ class McapFile:
             self._draw(tick, time_ns)
         except Exception as error:  # a picture is no reason to lose the record
             self._tell_undrawn(error)
+        self._link(self._chain.next_link())
 
     def add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
         """Write a line of the log, at the time of the last message when none is given."""
@@ -67,12 +71,23 @@ class McapFile:
         self._add(LOG_TOPIC, fg.LOG, fg.log_message(at_ns, level, name, text), at_ns)
 
     def flush(self) -> None:
-        """Bring everything to the disk."""
+        """Bring everything to the disk, up to a link."""
+        if self._chain.loose:
+            self._link(self._chain.next_link())
         self._writer.flush()
         self._disk.sync()
 
-    def finish(self) -> None:
-        """Write the index, close the file."""
+    def last_link(self, end: str) -> Link:
+        """What `finish` closes the file with."""
+        return self._chain.next_link(end)
+
+    def finish(self, end: str = ENDS) -> None:
+        """Write the closing link and the index, close the file.
+
+        Args:
+            end: `chain.GOES_ON` when another part follows.
+        """
+        self._link(self._chain.next_link(end))
         self._writer.finish()
         self._disk.flush()
         self._disk.sync()
@@ -132,7 +147,13 @@ class McapFile:
         self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
         data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=plain).encode()
         self._counts[topic] += 1
+        if topic != LINK_TOPIC:
+            self._chain.add(topic, (self._last_ns, self._last_ns, self._counts[topic]), data)
         self._writer.add_message(channel, self._last_ns, data, self._last_ns, self._counts[topic])
+
+    def _link(self, link: Link) -> None:
+        self._add(LINK_TOPIC, LINK, vars(link), self._last_ns)
+        self._chain.go_on(link)
 
     def _open(self, topic: str, schema: Schema) -> int:
         title = schema["title"]

@@ -14,8 +14,9 @@ from ...exceptions import BridgeError
 from ...fleet import Fleet
 from ..tick import Tick
 from . import foxglove as fg
+from .chain import GOES_ON, ChainHead, Link
 from .disk import Disk, explain
-from .header import LogHeader
+from .header import LOG_VERSION, LogHeader
 from .mcap_file import McapFile
 from .parts import part_header, part_path
 from .spool import Spool
@@ -31,13 +32,13 @@ class _Store:
     """What the spool's thread does with ticks and lines, and with the count of those dropped; part after part.
 
     Args:
-        begin: makes the file of a part, by its number from 1 on.
+        begin: makes the file of a part, by its number from 1 on and the last link of the part before.
         part_s: length of a part, s of the ticks.
     """
 
-    def __init__(self, begin: Callable[[int], McapFile], part_s: float) -> None:
+    def __init__(self, begin: Callable[[int, Link | None], McapFile], part_s: float) -> None:
         self._begin, self._part_s = begin, part_s
-        self._file, self._number = begin(1), 1
+        self._file, self._number = begin(1, None), 1
         self._began_s: float | None = None
         self._told = 0
         self.dropped: Callable[[], int] = lambda: 0
@@ -66,9 +67,15 @@ class _Store:
             self._began_s = now_s
         if now_s - self._began_s < self._part_s:
             return
-        self.finish()
+        self._tell_dropped()
+        try:
+            later = self._begin(self._number + 1, self._file.last_link(GOES_ON))
+        except BaseException:
+            self._file.finish()  # the log ends here
+            raise
+        self._file.finish(GOES_ON)
         self._number += 1
-        self._file, self._began_s = self._begin(self._number), now_s
+        self._file, self._began_s = later, now_s
 
     def _tell_dropped(self) -> None:
         dropped = self.dropped()
@@ -94,6 +101,7 @@ class McapWriter:
         give_up_s: when the disk has taken nothing for so long, s, `take` raises.
         part_s: length of each file, s.
         open_disk: makes a file.
+        key: 32 bytes of those who may write this log: its chain then carries codes; None: without.
 
     Raises:
         BridgeError: the file cannot be made, or not even the header fits on the disk.
@@ -109,8 +117,11 @@ class McapWriter:
         give_up_s: float = 10.0,
         part_s: float = PART_S,
         open_disk: Callable[[Path], Disk] = Disk,
+        key: bytes | None = None,
     ) -> None:
-        self.path, self.header = path, header
+        head = header.chain or ChainHead.new()
+        self.path, self._key = path, key
+        self.header = replace(header, version=LOG_VERSION, chain=replace(head, count=0, keyed=key is not None))
         self._open_disk = open_disk
         store = _Store(self._begin, part_s)
         self._spool: Spool[Tick | _Line] = Spool(
@@ -118,11 +129,12 @@ class McapWriter:
         )
         store.dropped = lambda: self._spool.dropped
 
-    def _begin(self, number: int) -> McapFile:
+    def _begin(self, number: int, last: Link | None) -> McapFile:
         path = part_path(self.path, number)
+        chain = self.header.chain if last is None else ChainHead(last.digest, last.count, self._key is not None)
         disk = self._open_disk(path)
         try:
-            return McapFile(disk, part_header(self.header, number))
+            return McapFile(disk, part_header(self.header, number, chain), self._key)
         except OSError as error:
             disk.close()
             raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error

@@ -11,7 +11,14 @@ import numpy as np
 from ...exceptions import LogError
 from ...jit import Array
 
-Number = float | str
+
+class Odd(str):
+    """The text of a float that is not finite; in a message `odd.take_odd` finds it by its kind."""
+
+    __slots__ = ()
+
+
+Number = float | Odd
 
 _PLAIN_NAN = struct.pack(">d", math.nan)
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -29,11 +36,11 @@ def to_json(value: float) -> Number:
     if math.isfinite(value):
         return float(value)
     if value == math.inf:
-        return "inf"
+        return Odd("inf")
     if value == -math.inf:
-        return "-inf"
+        return Odd("-inf")
     packed = struct.pack(">d", value)
-    return "nan" if packed == _PLAIN_NAN else f"nan:{packed.hex()}"
+    return Odd("nan" if packed == _PLAIN_NAN else f"nan:{packed.hex()}")
 
 
 def from_json(value: Any) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from .chain import ChainHead
 from .header import LogHeader
 
 _NAME = re.compile(r"(?P<stem>.+)\.part(?P<number>[1-9]\d*)(?P<ending>\.[^.]*)")
@@ -18,9 +19,10 @@ def part_path(first: Path, number: int) -> Path:
     return first if number == 1 else first.with_name(f"{first.stem}.part{number}{first.suffix}")
 
 
-def part_header(header: LogHeader, number: int) -> LogHeader:
-    """The log's header, which part it is noted in it."""
-    return header if number == 1 else replace(header, notes={**header.notes, _NOTE: str(number)})
+def part_header(header: LogHeader, number: int, chain: ChainHead | None) -> LogHeader:
+    """The log's header, which part it is noted in it, and where its chain begins."""
+    notes = header.notes if number == 1 else {**header.notes, _NOTE: str(number)}
+    return replace(header, notes=notes, chain=chain)
 
 
 def follows(before: LogHeader, header: LogHeader) -> bool:

@@ -14,11 +14,13 @@ from mcap.records import Channel, Footer, Message
 
 from ...exceptions import LogError
 from ..tick import Tick
+from .chain_check import ChainCheck
 from .decode import tick_from_json
 from .header import LogHeader
-from .mcap_file import HEADER_TOPIC, LOG_TOPIC, TICK_TOPIC
-from .parts import follows, later_parts
-from .records import read_records
+from .mcap_file import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
+from .origin import source_digest
+from .parts import follows, later_parts, number_of
+from .records import MENDED_TOPIC, read_records
 
 LOG = logging.getLogger(__name__)
 
@@ -45,6 +47,7 @@ class LogReader:
 
     Args:
         path: of the log, ``.mcap``, or of a later part, to begin there.
+        key: 32 bytes, to check the codes of a log whose chain carries them; None: they are not looked at.
 
     Raises:
         LogError: no such file, no log, of another version, or cut off before its header.
@@ -52,13 +55,15 @@ class LogReader:
     Attributes:
         header: what the shield was built with.
         files: those read so far.
-        complete: whether the log was closed properly; known once `entries` is used up.
+        complete: whether the log was closed, if only by `mend`; known once `entries` is used up.
         damage: what could not be read, in words; likewise.
+        chain: what the log's chain says; likewise.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, key: bytes | None = None) -> None:
         self.path, self.complete = path, False
         self.damage: list[str] = []
+        self.chain = ChainCheck(key)
         self.files = [path]
         self._topics: dict[int, str] = {}
         try:
@@ -80,7 +85,10 @@ class LogReader:
         """
         for topic, message in self._messages:
             if topic == TICK_TOPIC:
-                yield tick_from_json(_object(message), self.header.platforms)
+                content = _object(message)
+                if "odd" in content and self.header.chain is None:
+                    self.chain.deny()  # only logs with a chain have it
+                yield tick_from_json(content, self.header.platforms)
             elif topic == LOG_TOPIC:
                 row = _object(message)
                 yield LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
@@ -115,6 +123,10 @@ class LogReader:
     def _read(self) -> Iterator[tuple[str, Message]]:
         """Messages with their topics, file after file; ends where the log can no longer be read."""
         yield from self._read_file()
+        yield from self._read_later()
+        self.chain.finish()
+
+    def _read_later(self) -> Iterator[tuple[str, Message]]:
         are_whole = True
         for number, path in later_parts(self.path):
             if not self.complete:
@@ -141,12 +153,41 @@ class LogReader:
         return follows(self.header, LogHeader.from_message(_object(message)))
 
     def _read_file(self) -> Iterator[tuple[str, Message]]:
+        has_begun = False
         for item in read_records(self._file, self._tell):
             self.complete = isinstance(item, Footer)
             if isinstance(item, Channel):
                 self._topics[item.id] = item.topic
             elif isinstance(item, Message):
-                yield self._topics.get(item.channel_id, ""), item
+                topic = self._topics.get(item.channel_id, "")
+                if topic == HEADER_TOPIC and not has_begun:
+                    has_begun = True
+                    self._begin_chain(item)
+                if self._is_record(topic, item):
+                    yield topic, item
+        self.chain.close(self.complete)
+
+    def _begin_chain(self, message: Message) -> None:
+        """Follow the chain of the file whose header was met."""
+        is_first = len(self.files) == 1 and number_of(self.path)[1] == 1
+        header = LogHeader.from_message(_object(message))
+        self.chain.begin(header.chain, is_first)
+        if header.chain is None and header.sources == source_digest():
+            self.chain.deny()
+
+    def _is_record(self, topic: str, message: Message) -> bool:
+        """Whether a message is one of the log's records; all are added to the chain, links are checked."""
+        if topic == LINK_TOPIC:
+            try:
+                self.chain.link(_object(message))
+            except LogError:
+                self.chain.link({})
+        elif topic == MENDED_TOPIC:
+            self.chain.mend()
+        else:
+            self.chain.add(topic, (message.log_time, message.publish_time, message.sequence), message.data)
+            return True
+        return False
 
     def _tell(self, text: str) -> None:
         LOG.info("%s: %s", self.path, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,7 +16,9 @@ from zstandard import ZstdError
 
 from ...exceptions import LogError
 from .disk import Disk
+from .schemas import MENDED
 
+MENDED_TOPIC = "/mended"
 LARGEST_RECORD = 64 << 20
 """Longer records than this are damage, bytes."""
 
@@ -68,28 +71,39 @@ def mend(source: Path, target: Path) -> tuple[int, list[str]]:
     damage: list[str] = []
     try:
         with source.open("rb") as file:
-            return _copy(read_records(file, damage.append), target), damage
+            return _copy(read_records(file, damage.append), target, damage), damage
     except OSError as error:
         raise LogError(f"cannot mend {source} ({error.strerror}); check both paths and the room on the disk") from None
 
 
-def _copy(records: Iterator[Any], target: Path) -> int:
+def _copy(records: Iterator[Any], target: Path, damage: list[str]) -> int:
     disk = Disk(target)
     writer = Writer(disk)  # type: ignore[arg-type]
     writer.start(library="steerclear")
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
-    count = 0
+    count, last_ns, is_whole = 0, 0, False
     for item in records:
         if isinstance(item, Schema) and item.id not in schemas:
             schemas[item.id] = writer.register_schema(item.name, item.encoding, item.data)
         elif isinstance(item, Channel) and item.id not in channels and item.schema_id in schemas:
             channels[item.id] = writer.register_channel(item.topic, item.message_encoding, schemas[item.schema_id])
         elif isinstance(item, Message) and item.channel_id in channels:
-            count += 1
+            count, last_ns = count + 1, item.log_time
             writer.add_message(channels[item.channel_id], item.log_time, item.data, item.publish_time, item.sequence)
             disk.flush()
+        is_whole = isinstance(item, Footer)
+    if not is_whole:
+        count += 1
+        _mark(writer, last_ns, damage)
     writer.finish()
     disk.flush()
     disk.close()
     return count
+
+
+def _mark(writer: Writer, time_ns: int, damage: list[str]) -> None:
+    """Say in the file that it was cut off: it is closed, and yet not whole."""
+    schema = writer.register_schema(MENDED["title"], "jsonschema", json.dumps(MENDED).encode())
+    channel = writer.register_channel(MENDED_TOPIC, "json", schema)
+    writer.add_message(channel, time_ns, json.dumps({"damage": damage}).encode(), time_ns, 1)

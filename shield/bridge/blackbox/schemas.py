@@ -85,7 +85,7 @@ _READING = record(
 TICK = named(
     "steerclear.Tick",
     record(
-        "One turn of the loop. Numbers that are not finite are the texts nan, inf and -inf.",
+        "One turn of the loop. A number that is not finite is left out, 0 in a list, and listed in odd.",
         number=WHOLE,
         due_s=NUMBER,
         began_s=NUMBER,
@@ -131,10 +131,12 @@ TICK = named(
                 speed_mps=NUMBER,
                 route=TEXT,
                 delivered=FLAG,
+                limit_mps=NUMBER,
             )
         ),
         actions=many(record("declared and in effect", subject=TEXT, condition=TEXT, response=TEXT, text=TEXT)),
         game=TEXT,
+        odd=many(record("a number that is not finite: its place, and nan, inf, -inf or nan:BITS", at=TEXT, value=TEXT)),
     ),
 )
 
@@ -159,5 +161,19 @@ HEADER = named(
         notes=TEXT,
         versions=TEXT,
         tables=TEXT,
+        chain=TEXT,
     ),
 )
+
+LINK = named(
+    "steerclear.Link",
+    record(
+        "A link of the log's chain: the digest of the records since the last link, and of that.",
+        count=WHOLE,
+        digest=TEXT,
+        end=TEXT,
+        code=TEXT,
+    ),
+)
+
+MENDED = named("steerclear.Mended", record("The file was written from one that was cut off.", damage=many(TEXT)))

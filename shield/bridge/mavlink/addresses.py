@@ -42,7 +42,7 @@ def parse_address(text: str) -> Address:
         )
     host, colon, number = rest.rpartition(":")
     if kind == "serial":
-        if not (colon and number.isdigit()):
+        if not (colon and number.isascii() and number.isdigit()):
             host, number = rest, str(DEFAULT_BAUD)
         return Address(kind, host, int(number))
     if not host or not number.isascii() or not number.isdigit() or not 0 <= int(number) <= 65535:

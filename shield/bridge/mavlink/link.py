@@ -198,7 +198,7 @@ class MavlinkLink:
             boat.told(encoded.heading_rad, encoded.speed_mps, now_s)
         self._last_rad = encoded.heading_rad
         heading_rad = self._frame.heading_to_field_rad(encoded.heading_rad)
-        return Sent(self.boat, now_s, heading_rad, encoded.speed_mps, route, delivered)
+        return Sent(self.boat, now_s, heading_rad, encoded.speed_mps, route, delivered, encoded.limit_mps)
 
     def _boot_ms(self) -> int:
         return int((self._clock.now_s() - self._started_s) * 1000.0) & 0xFFFFFFFF

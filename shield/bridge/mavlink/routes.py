@@ -28,11 +28,12 @@ OLDEST = (4, 0)
 
 @dataclass(frozen=True)
 class Encoded:
-    """A message and what it says after rounding: heading rad clockwise from true north, speed m/s."""
+    """A message and what it says after rounding: heading rad clockwise from true north, speed m/s, cut to a limit."""
 
     message: Any
     heading_rad: float
     speed_mps: float
+    limit_mps: float = math.inf
 
 
 class Route(Protocol):
@@ -67,7 +68,7 @@ class AttitudeRoute:
         message = mavlink.MAVLink_set_attitude_target_message(
             boot_ms, *target, ATTITUDE_MASK, [w, 0.0, 0.0, z], 0.0, 0.0, 0.0, thrust
         )
-        return Encoded(message, 2.0 * math.atan2(z, w) % (2.0 * math.pi), thrust * self.top_mps)
+        return Encoded(message, 2.0 * math.atan2(z, w) % (2.0 * math.pi), thrust * self.top_mps, self.top_mps)
 
     def straight_stop(self, target: tuple[int, int], boot_ms: int) -> Any:
         """Stop without turning, for a boat whose heading nobody knows."""
@@ -97,7 +98,7 @@ class VelocityRoute:
             boot_ms, *target, mavlink.MAV_FRAME_LOCAL_NED, VELOCITY_MASK,
             0.0, 0.0, 0.0, north, east, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
         )  # fmt: skip
-        return Encoded(message, math.atan2(east, north) % (2.0 * math.pi), math.hypot(north, east))
+        return Encoded(message, math.atan2(east, north) % (2.0 * math.pi), math.hypot(north, east), top)
 
 
 ROUTES = (AttitudeRoute.name, VelocityRoute.name)

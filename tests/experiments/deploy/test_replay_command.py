@@ -9,6 +9,7 @@ from steerclear.env.record import load
 from steerclear.experiments.cli import app
 from steerclear.experiments.keys import KEYS, undocumented
 from steerclear.shield import ShieldConfig
+from steerclear.shield.bridge.blackbox import McapWriter
 from typer.testing import CliRunner
 
 STEPS = 160
@@ -22,7 +23,11 @@ def folder(tmp_path_factory):
     write_log(folder / "sound.mcap", STEPS, header=header)
     write_log(folder / "lie.mcap", STEPS, header=header, edit=_lie)
     write_log(folder / "crash.mcap", STEPS, header=header, shielded=False)
-    whole = (folder / "sound.mcap").read_bytes()
+    writer = McapWriter(folder / "steady.mcap", header, flush_s=0.0)
+    for tick in Encounter(header, STEPS):
+        writer.take(tick)
+    writer.close()
+    whole = (folder / "steady.mcap").read_bytes()
     (folder / "cut.mcap").write_bytes(whole[: int(0.4 * len(whole))])
     return folder
 
@@ -59,6 +64,8 @@ def test_a_cut_log_is_proved_as_far_as_it_goes(folder):
     result = run(folder / "cut.mcap")
     assert result.exit_code == 0
     assert "not closed" in result.output
+    assert "not as it was written" not in result.output
+    assert "the same bit for bit" in result.output
 
 
 def test_a_cut_log_is_mended(folder, tmp_path):
@@ -67,6 +74,7 @@ def test_a_cut_log_is_mended(folder, tmp_path):
     again = run(tmp_path / "mended.mcap")
     assert again.exit_code == 0
     assert "not closed" not in again.output
+    assert "cut off (crash, power or kill) and mended" in again.output
 
 
 def test_without_the_shield_with_everything_written(folder, tmp_path):
@@ -124,8 +132,8 @@ def test_bad_input_is_one_line_and_2(tmp_path, content, words):
 def test_a_log_without_a_decision_says_so(tmp_path):
     write_log(tmp_path / "x.mcap", 3, edit=lambda tick: dataclasses.replace(tick, fleet=None, decisions=None))
     result = run(tmp_path / "x.mcap")
-    assert result.exit_code == 0
-    assert "no decision of the shield" in result.output
+    assert result.exit_code == 3
+    assert "no decision of the shield: nothing is proved" in result.output
     assert run(tmp_path / "x.mcap", "--without-shield").exit_code == 2
 
 

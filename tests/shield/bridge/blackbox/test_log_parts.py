@@ -147,7 +147,7 @@ class NoSync(Disk):
 def grown_kib(ticks, folder, part_s, seconds):
     """Memory after that long less memory after a minute, at the run's own flushes."""
 
-    def begin(number):
+    def begin(number, last):
         return McapFile(NoSync(part_path(folder / "run.mcap", number)), header_of())
 
     store, sizes = _Store(begin, part_s), []

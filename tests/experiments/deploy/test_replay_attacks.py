@@ -1,0 +1,240 @@
+"""Logs that were tampered with: `steerclear replay` never calls them proved, and says what is wrong with them."""
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from forged_logs import read_records, write_records
+from logged_runs import Encounter, header_of
+from steerclear.experiments.cli import app
+from steerclear.shield import ShieldConfig
+from steerclear.shield.bridge.blackbox import LogReader, McapWriter
+from steerclear.shield.bridge.blackbox.parts import part_path
+from typer.testing import CliRunner
+
+STEPS = 120
+OLD = Path(__file__).parents[2] / "shield" / "bridge" / "blackbox" / "data" / "version_1.mcap"
+KEY = "11" * 32
+
+
+def write(path, ticks, header=None, **more):
+    writer = McapWriter(path, header or header_of(ShieldConfig()), flush_s=0.0, capacity=STEPS + 10, **more)
+    for tick in ticks:
+        writer.take(tick)
+    writer.close()
+    assert writer.fault == ""
+    return path
+
+
+@pytest.fixture(scope="module")
+def ticks():
+    return list(Encounter(header_of(ShieldConfig()), STEPS))
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory, ticks):
+    return write(tmp_path_factory.mktemp("logs") / "run.mcap", ticks)
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, ["replay", *map(str, arguments)], terminal_width=200)
+    return result.exit_code, " ".join(result.output.split())
+
+
+def lied(tick, from_number=30):
+    if tick.number < from_number:
+        return tick
+    decisions = dataclasses.replace(tick.decisions, certificate_m=tick.decisions.certificate_m + 1.0)
+    return dataclasses.replace(tick, decisions=decisions)
+
+
+def sent_at(tick, speed_mps):
+    return dataclasses.replace(
+        tick, sent={name: dataclasses.replace(sent, speed_mps=speed_mps) for name, sent in tick.sent.items()}
+    )
+
+
+def test_a_dropped_tick_and_every_later_decision_forged_is_not_proved(tmp_path, ticks):
+    forged = [lied(tick) for tick in ticks if tick.number != 29]
+    code, said = run(write(tmp_path / "x.mcap", forged))
+    assert code == 3
+    assert f"{STEPS - 30} differ after missing ticks and are not proved (1 gaps)" in said
+    assert "1 turns are missing" in said
+    assert "NOT PROVED" in said
+
+
+def test_a_dropped_tick_alone_is_not_proved(tmp_path, ticks):
+    code, said = run(write(tmp_path / "x.mcap", [tick for tick in ticks if tick.number != 29]))
+    assert code == 3
+    assert "1 turns are missing" in said
+
+
+def test_first_ticks_left_out_are_not_proved(tmp_path, ticks):
+    code, said = run(write(tmp_path / "x.mcap", ticks[10:]))
+    assert code == 3
+    assert "10 turns are missing" in said
+
+
+def test_a_log_cut_and_closed_again_is_not_proved(tmp_path, log):
+    records = read_records(log)
+    code, said = run(write_records(tmp_path / "x.mcap", records[: len(records) // 2]))
+    assert code == 3
+    assert "The log is not as it was written: its end was cut off and the file closed again" in said
+    assert "the same bit for bit" in said
+
+
+def test_altered_speeds_of_the_links_are_found_though_the_chain_was_made_anew(tmp_path, ticks):
+    code, said = run(write(tmp_path / "x.mcap", [sent_at(tick, 0.7) for tick in ticks]))
+    assert code == 1
+    assert f"{2 * STEPS} commands are not what was decided" in said
+    assert "First of them: tick 0 at 0.00 s, blue_1, speed: decided 2.0" in said
+
+
+def test_altered_speeds_in_the_file_show_twice(tmp_path, log):
+    records = read_records(log)
+    k = next(k for k, record in enumerate(records) if record.topic == "/tick" and record.content["number"] == 50)
+    sent = [{**row, "speed_mps": 0.1} for row in records[k].content["sent"]]
+    records[k] = records[k].with_content(sent=sent)
+    code, said = run(write_records(tmp_path / "x.mcap", records))
+    assert code == 1
+    assert "2 commands are not what was decided" in said
+    assert "some are not as they were written" in said
+
+
+def test_no_decisions_at_all_prove_nothing(tmp_path, ticks):
+    bare = [dataclasses.replace(tick, decisions=None) for tick in ticks]
+    code, said = run(write(tmp_path / "x.mcap", bare))
+    assert code == 3
+    assert "no decision of the shield: nothing is proved" in said
+    assert f"{2 * STEPS} were sent without a decision" in said
+
+
+def test_decisions_left_out_in_between_are_not_proved(tmp_path, ticks):
+    holed = [dataclasses.replace(tick, decisions=None) if tick.number in (60, 61) else tick for tick in ticks]
+    code, said = run(write(tmp_path / "x.mcap", holed))
+    assert code in (1, 3)
+    assert "4 were sent without a decision" in said
+
+
+def test_a_turn_that_stands_twice_is_not_proved(tmp_path, ticks):
+    code, said = run(write(tmp_path / "x.mcap", [*ticks[:20], ticks[19], *ticks[20:]]))
+    assert code == 3
+    assert "1 times they go back" in said
+
+
+def test_a_log_in_which_no_boat_was_decided_for_proves_nothing(tmp_path):
+    class Nobody(Encounter):
+        def fleet(self, number):
+            seen = super().fleet(number)
+            return dataclasses.replace(seen, controlled=np.zeros(4, dtype=bool))
+
+    def stopped(tick):
+        return sent_at(tick, 0.0)
+
+    code, said = run(write(tmp_path / "x.mcap", list(Nobody(header_of(ShieldConfig()), 20, edit=stopped))))
+    assert code == 3
+    assert "No boat was covered: nothing is proved" in said
+
+
+def test_commands_an_autopilot_cut_are_told(tmp_path, ticks):
+    def cut(tick):
+        sent = {
+            name: dataclasses.replace(one, speed_mps=min(one.speed_mps, 0.5), limit_mps=0.5)
+            for name, one in tick.sent.items()
+        }
+        return dataclasses.replace(tick, sent=sent)
+
+    code, said = run(write(tmp_path / "x.mcap", [cut(tick) for tick in ticks]))
+    assert code == 0
+    assert "blue_1: its autopilot's limit of 0.5 m/s cut" in said
+
+
+def test_an_altered_certificate_shows_in_the_chain_and_the_decision(tmp_path, log):
+    records = read_records(log)
+    k = next(k for k, record in enumerate(records) if record.topic == "/tick" and record.content["number"] == 50)
+    boats = records[k].content["boats"]
+    boats[0] = {**boats[0], "certificate_m": 9.0}
+    records[k] = records[k].with_content(boats=boats)
+    code, said = run(write_records(tmp_path / "x.mcap", records))
+    assert code == 1
+    assert "1 differ" in said
+    assert "some are not as they were written" in said
+
+
+def test_a_line_taken_out_is_not_proved(tmp_path, log):
+    records = [record for record in read_records(log) if record.topic != "/log"]
+    code, said = run(write_records(tmp_path / "x.mcap", records))
+    assert code == 3
+    assert "2 records" in said or "1 records are missing" in said
+
+
+def test_a_part_taken_away_is_not_proved(tmp_path, ticks):
+    path = write(tmp_path / "run.mcap", ticks, part_s=5.0)
+    assert run(path)[0] == 0
+    part_path(path, 3).rename(tmp_path / "gone")
+    code, said = run(path)
+    assert code == 3
+    assert "the next part is missing" in said
+    shutil.copy(tmp_path / "gone", part_path(path, 2))
+    assert run(path)[0] == 3
+
+
+def test_a_log_that_was_killed_is_told_as_such_and_not_as_forged(tmp_path, log):
+    whole = log.read_bytes()
+    (tmp_path / "x.mcap").write_bytes(whole[: len(whole) // 2])
+    code, said = run(tmp_path / "x.mcap")
+    assert code == 0
+    assert "not closed (crash, power or kill)" in said
+    assert "not as it was written" not in said
+
+
+def test_codes_are_checked_with_the_key(tmp_path, ticks):
+    path = write(tmp_path / "run.mcap", ticks, key=bytes.fromhex(KEY))
+    for name, digits in (("boats.key", KEY), ("other.key", "22" * 32)):
+        (tmp_path / name).write_text(digits)
+        (tmp_path / name).chmod(0o600)
+    code, said = run(path)
+    assert code == 0
+    assert "codes were not checked: give --key" in said
+    code, said = run(path, "--key", tmp_path / "boats.key")
+    assert code == 0
+    assert "codes are of this key" in said
+    code, said = run(path, "--key", tmp_path / "other.key")
+    assert code == 3
+    assert "is not of this key" in said
+    assert run(path, "--key", tmp_path / "none.key")[0] == 2
+
+
+def test_a_log_of_the_first_version_is_said_to_be_unchained_and_by_whom_it_was_made():
+    code, said = run(OLD)
+    assert code in (0, 1), "an older program may have decided otherwise"
+    assert "The log is not chained (steerclear 0.1.0, sources" in said
+    assert "what was cut out or changed does not show" in said
+
+
+def test_a_log_of_another_program_says_so_though_all_is_the_same(tmp_path, ticks):
+    header = header_of(ShieldConfig(), versions={"steerclear": "0.9"}, sources="abcdef0123")
+    code, said = run(write(tmp_path / "x.mcap", ticks, header))
+    assert code == 0
+    assert "Made by steerclear 0.9, sources abcdef01. Not all is as here, and this program may decide otherwise" in said
+
+
+def test_the_json_says_all_of_it(tmp_path, log):
+    records = read_records(log)
+    forged = write_records(tmp_path / "x.mcap", records[: len(records) // 2])
+    run(forged, "--json", tmp_path / "out.json")
+    content = json.loads((tmp_path / "out.json").read_text())
+    assert content["proved"] is False
+    assert content["chain"]["chained"] is True
+    assert content["chain"]["broken"] == len(content["chain"]["breaks"]) == 1
+    assert content["strayed"] == content["unfounded"] == 0
+    assert content["first_sent"] is None
+
+
+def test_the_tests_log_is_sound(log):
+    assert run(log)[0] == 0
+    with LogReader(log) as reader:
+        assert len(list(reader.ticks())) == STEPS

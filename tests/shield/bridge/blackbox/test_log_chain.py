@@ -1,0 +1,435 @@
+"""The chain of a log: whatever is cut out, put in, moved or altered shows; a log that was killed is no forgery."""
+
+import dataclasses
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from forged_logs import read_records, write_records
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from logged_runs import Encounter, header_of
+from steerclear.shield.bridge.blackbox import LogReader, McapWriter, mend
+from steerclear.shield.bridge.blackbox.chain import Chain, ChainHead, Link
+from steerclear.shield.bridge.blackbox.parts import part_path
+from steerclear.shield.exceptions import LogError
+
+quick = settings(max_examples=80, deadline=None, derandomize=True)
+OLD = Path(__file__).parent / "data" / "version_1.mcap"
+STEPS, PART_S = 40, 1.5
+KEY, OTHER_KEY = bytes(range(32)), bytes(32)
+
+
+@pytest.fixture(scope="module")
+def ticks():
+    return list(Encounter(header_of(), STEPS))
+
+
+def write(path, ticks, **more):
+    writer = McapWriter(path, header_of(), flush_s=0.0, **more)
+    for tick in ticks:
+        writer.take(tick)
+    writer.note("the end")
+    writer.close()
+    assert writer.fault == ""
+    return path
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory, ticks):
+    return write(tmp_path_factory.mktemp("chain") / "run.mcap", ticks)
+
+
+@pytest.fixture
+def parts(tmp_path, ticks):
+    """The first of three files."""
+    return write(tmp_path / "run.mcap", ticks, part_s=PART_S)
+
+
+def check(path, key=None):
+    """What the chain says, and the numbers of the ticks."""
+    with LogReader(path, key) as reader:
+        numbers = [tick.number for tick in reader.ticks()]
+        return reader.chain, numbers
+
+
+def said(path, key=None):
+    return "; ".join(check(path, key)[0].breaks)
+
+
+def test_a_log_as_it_was_written_has_a_chain_that_holds(log):
+    chain, numbers = check(log)
+    assert chain.holds
+    assert (chain.chained, chain.keyed, chain.broken, chain.breaks) == (True, False, 0, [])
+    assert numbers == list(range(STEPS))
+
+
+def test_every_record_is_under_a_link_and_the_last_says_how_many_there_are(log):
+    records = read_records(log)
+    links = [record.content for record in records if record.topic == "/link"]
+    assert len(links) >= STEPS
+    assert records[-1].topic == "/link"
+    assert links[-1]["end"] == "log"
+    assert links[-1]["count"] == len(records) - len(links)
+    assert [link["end"] for link in links[:-1]] == [""] * (len(links) - 1)
+    head = json.loads(records[0].content["chain"])
+    assert re.fullmatch(r"[0-9a-f]{64}", head["head"])
+
+
+def test_two_logs_begin_their_chains_differently():
+    assert ChainHead.new() != ChainHead.new()
+
+
+def indices(records, topic):
+    return [k for k, record in enumerate(records) if record.topic == topic]
+
+
+def cut_out(records):
+    k = indices(records, "/tick")[10]
+    return records[:k] + records[k + 1 :]
+
+
+def cut_out_with_its_link(records):
+    k, last = indices(records, "/tick")[10], indices(records, "/tick")[11]
+    return records[:k] + records[last:]
+
+
+def cut_out_the_middle(records):
+    k, last = indices(records, "/tick")[10], indices(records, "/tick")[20]
+    return records[:k] + records[last:]
+
+
+def cut_out_a_line(records):
+    k = indices(records, "/log")[0]
+    return records[:k] + records[k + 1 :]
+
+
+def put_in(records):
+    k = indices(records, "/tick")[10]
+    return [*records[: k + 1], records[k], *records[k + 1 :]]
+
+
+def put_in_before_the_header(records):
+    return [records[indices(records, "/log")[0]], *records]
+
+
+def moved(records):
+    a, b = indices(records, "/tick")[10:12]
+    found = list(records)
+    found[a], found[b] = records[b], records[a]
+    return found
+
+
+def altered(records):
+    k = indices(records, "/tick")[10]
+    return [*records[:k], records[k].with_content(policy_age_s=0.25), *records[k + 1 :]]
+
+
+def altered_header(records):
+    return [records[0].with_content(policy="another"), *records[1:]]
+
+
+def altered_line(records):
+    k = indices(records, "/log")[0]
+    return [*records[:k], records[k].with_content(message="all is well"), *records[k + 1 :]]
+
+
+def altered_time(records):
+    k = indices(records, "/tick")[10]
+    return [*records[:k], dataclasses.replace(records[k], log_time=records[k].log_time + 1), *records[k + 1 :]]
+
+
+def altered_topic(records):
+    k = indices(records, "/log")[0]
+    return [*records[:k], dataclasses.replace(records[k], topic="/hidden"), *records[k + 1 :]]
+
+
+def altered_link(records):
+    k = indices(records, "/link")[10]
+    return [*records[:k], records[k].with_content(digest="0" * 64), *records[k + 1 :]]
+
+
+def damaged_link(records):
+    k = indices(records, "/link")[10]
+    return [*records[:k], records[k].with_content(digest="zero", count=None), *records[k + 1 :]]
+
+
+def no_links(records):
+    return [record for record in records if record.topic != "/link"]
+
+
+def cut_off_and_closed(records):
+    return records[: indices(records, "/tick")[20]]
+
+
+def cut_off_at_a_link_and_closed(records):
+    return records[: indices(records, "/link")[20] + 1]
+
+
+def cut_off_and_ended(records):
+    return [*records[: indices(records, "/tick")[20]], records[-1]]
+
+
+def cut_off_before_the_last_link(records):
+    return records[:-1]
+
+
+def gone_on_after_the_end(records):
+    return [*records, records[indices(records, "/tick")[-1]]]
+
+
+FORGERIES = {
+    cut_out: "1 records are missing before record", cut_out_with_its_link: "records are missing before record",
+    cut_out_the_middle: "records are missing before record", cut_out_a_line: "1 records are missing",
+    put_in: "1 records are too many", put_in_before_the_header: "1 records stand before the header",
+    moved: "not as they were written", altered: "not as they were written", altered_header: "of records 1 to 1 ",
+    altered_line: "not as they were written", altered_time: "not as they were written",
+    altered_topic: "not as they were written", altered_link: "not as they were written",
+    damaged_link: "a link of the log's chain is damaged", no_links: "its end was cut off and the file closed again",
+    cut_off_and_closed: "its end was cut off and the file closed again",
+    cut_off_at_a_link_and_closed: "its end was cut off and the file closed again",
+    cut_off_and_ended: "records are missing",
+    cut_off_before_the_last_link: "its end was cut off and the file closed again",
+    gone_on_after_the_end: "records follow after the end",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("forge", FORGERIES, ids=lambda forge: forge.__name__)
+def test_what_was_done_to_a_log_shows_in_words(log, tmp_path, forge):
+    path = write_records(tmp_path / "forged.mcap", forge(read_records(log)))
+    chain, _ = check(path)
+    assert not chain.holds
+    assert FORGERIES[forge] in "; ".join(chain.breaks)
+    assert chain.broken <= 3, "what is sound before and after is not blamed"
+
+
+def test_writing_a_log_anew_as_it_was_shows_nothing(log, tmp_path):
+    path = write_records(tmp_path / "copy.mcap", read_records(log))
+    assert check(path)[0].holds
+
+
+def test_a_link_where_the_change_is_names_it(log, tmp_path):
+    records = read_records(log)
+    k = indices(records, "/tick")[10]
+    number = sum(record.topic != "/link" for record in records[: k + 1])
+    text = said(write_records(tmp_path / "x.mcap", altered(records)))
+    before, after = re.search(r"of records (\d+) to (\d+)", text).groups()
+    assert int(before) <= number <= int(after)
+    assert int(after) - int(before) < 10
+
+
+@quick
+@given(data=st.data())
+def test_no_record_but_links_can_be_left_out_doubled_or_moved(log, tmp_path_factory, data):
+    records = read_records(log)
+    k = data.draw(st.sampled_from([k for k, record in enumerate(records) if record.topic != "/link"]))
+    at = data.draw(st.integers(0, len(records)))
+    how = data.draw(st.sampled_from(["out", "twice", "move"]))
+    rest = records[:k] + records[k + 1 :]
+    forged = {
+        "out": rest,
+        "twice": [*records[:at], records[k], *records[at:]],
+        "move": [*rest[:at], records[k], *rest[at:]],
+    }[how]
+    if forged == records or k == 0:
+        return
+    path = write_records(tmp_path_factory.mktemp("forged") / "x.mcap", forged)
+    chain, _ = check(path)
+    assert not chain.holds
+
+
+@quick
+@given(share=st.floats(0.0, 1.0))
+def test_a_log_that_was_killed_is_no_forgery(log, tmp_path_factory, share):
+    whole = log.read_bytes()
+    path = tmp_path_factory.mktemp("killed") / "x.mcap"
+    path.write_bytes(whole[: int(share * (len(whole) - 100))])  # the footer is gone
+    try:
+        with LogReader(path) as reader:
+            list(reader.ticks())
+            assert not reader.complete
+            assert reader.chain.holds
+    except LogError:
+        assert share < 0.5, "cut off before its header"
+
+
+def test_a_mended_log_says_that_it_was_cut_off(log, tmp_path):
+    cut, mended, again = (tmp_path / name for name in ("cut.mcap", "mended.mcap", "again.mcap"))
+    whole = log.read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    mend(cut, mended)
+    chain, numbers = check(mended)
+    assert chain.holds
+    assert chain.is_mended
+    assert numbers == list(range(len(numbers)))
+    mend(mended, again)
+    assert check(again)[0].is_mended
+    assert "records follow" in said(write_records(tmp_path / "x.mcap", [*read_records(mended), read_records(log)[-2]]))
+
+
+def test_mending_a_whole_log_leaves_it_whole(log, tmp_path):
+    mend(log, tmp_path / "mended.mcap")
+    chain, _ = check(tmp_path / "mended.mcap")
+    assert chain.holds
+    assert not chain.is_mended
+
+
+def test_a_chunk_that_is_damaged_shows_in_the_chain_too(log, tmp_path):
+    whole = bytearray(log.read_bytes())
+    whole[len(whole) // 2] ^= 0xFF
+    (tmp_path / "x.mcap").write_bytes(bytes(whole))
+    with LogReader(tmp_path / "x.mcap") as reader:
+        list(reader.ticks())
+    assert reader.damage
+    assert not reader.chain.holds
+
+
+def test_the_chain_goes_on_through_the_parts(parts):
+    assert part_path(parts, 3).exists()
+    chain, numbers = check(parts)
+    assert chain.holds
+    assert numbers == list(range(STEPS))
+    ends = [read_records(part_path(parts, k))[-1].content["end"] for k in (1, 2, 3)]
+    assert ends == ["part", "part", "log"]
+    assert check(part_path(parts, 2))[0].holds, "a part can be looked at by itself"
+
+
+def test_a_last_part_that_is_gone_shows(parts):
+    part_path(parts, 3).unlink()
+    assert said(parts) == "the next part is missing"
+
+
+def test_a_middle_part_that_is_gone_shows_also_when_the_others_are_renamed(parts):
+    part_path(parts, 2).unlink()
+    assert said(parts) == "the next part is missing"
+    part_path(parts, 3).rename(part_path(parts, 2))
+    assert "a part begins with record" in said(parts)
+
+
+def test_a_first_part_that_is_gone_shows(parts):
+    part_path(parts, 2).rename(parts)
+    part_path(parts, 3).rename(part_path(parts, 2))
+    assert "records before its first are missing" in said(parts)
+
+
+def test_parts_of_two_runs_do_not_make_a_log(parts, tmp_path, ticks):
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other" / "run.mcap"
+    write(other, ticks, part_s=PART_S)
+    shutil.copy(part_path(other, 2), part_path(parts, 2))
+    assert "a part begins with record" in said(parts)
+
+
+def test_a_part_added_after_the_end_shows(parts):
+    shutil.copy(part_path(parts, 3), part_path(parts, 4))
+    assert "a part follows after the log's end" in said(parts)
+
+
+def test_a_writer_killed_between_two_parts_is_no_forgery(parts):
+    """The next part is begun before the one before is closed, so that its head is known."""
+    records = read_records(parts)[:-1]
+    cut = write_records(parts, records).read_bytes()
+    parts.write_bytes(cut[: cut.rindex(b"/link")])
+    chain, _ = check(parts)
+    assert chain.breaks == []
+
+
+def test_a_keyed_chain_is_checked_with_its_key_only(tmp_path, ticks):
+    path = write(tmp_path / "run.mcap", ticks, key=KEY, part_s=PART_S)
+    chain, _ = check(path)
+    assert (chain.holds, chain.keyed, chain.codes_checked) == (True, True, 0)
+    chain, _ = check(path, KEY)
+    assert chain.holds
+    assert chain.codes_checked >= STEPS
+    assert "is not of this key" in said(path, OTHER_KEY)
+
+
+def chained_anew(records, head):
+    """Records with links that fit them: whoever can write a log can do that, without the key."""
+    chain, found = Chain(head), []
+    for record in records:
+        if record.topic == "/link":
+            link = chain.next_link(record.content["end"])
+            chain.go_on(link)
+            found.append(record.with_content(**vars(link)))
+        else:
+            chain.add(record.topic, (record.log_time, record.publish_time, record.sequence), record.data)
+            found.append(record)
+    return found
+
+
+@pytest.mark.parametrize("forge", [altered, cut_out, cut_off_and_ended])
+def test_a_forger_who_makes_the_chain_anew_is_found_by_the_key_alone(tmp_path, ticks, forge):
+    path = write(tmp_path / "run.mcap", ticks, key=KEY)
+    head = ChainHead.from_text(read_records(path)[0].content["chain"])
+    forged = write_records(tmp_path / "forged.mcap", chained_anew(forge(read_records(path)), head))
+    assert check(forged)[0].holds
+    assert "is not of this key" in said(forged, KEY)
+
+
+def test_a_log_without_codes_is_not_taken_for_one_with(tmp_path, log):
+    assert "carries no codes, though a key was given" in said(log, KEY)
+
+
+@pytest.mark.parametrize("chain", ["null", "{}", '{"head": "zz"}', '{"head": 5}', "[", '{"head": "", "count": -1}'])
+def test_a_header_without_a_sound_head_is_damaged(log, tmp_path, chain):
+    records = read_records(log)
+    path = write_records(tmp_path / "x.mcap", [records[0].with_content(chain=chain), *records[1:]])
+    with pytest.raises(LogError, match="head of its chain"):
+        LogReader(path)
+
+
+def without_chain(records, tick_parts=(), **header_parts):
+    """Records of a log that says it is of the first version, as far as that was thought of."""
+    header = {name: value for name, value in records[0].content.items() if name != "chain"}
+    header |= {"version": 1, **header_parts}
+    found = [dataclasses.replace(records[0], data=json.dumps(header).encode())]
+    for record in records[1:]:
+        kept = {name: value for name, value in record.content.items() if name not in tick_parts}
+        if record.topic != "/link":
+            found.append(dataclasses.replace(record, data=json.dumps(kept).encode()))
+    return found
+
+
+@pytest.mark.parametrize("forge", [
+    lambda records: without_chain(records[:1]),
+    lambda records: without_chain(records, sources="of another program"),
+    lambda records: [without_chain(records, ("odd",), sources="other")[0], *records[1:]],
+], ids=["by this program", "with what only later ones have", "with links"])  # fmt: skip
+def test_a_chain_that_was_taken_out_shows(log, tmp_path, forge):
+    chain, _ = check(write_records(tmp_path / "x.mcap", forge(read_records(log))))
+    assert "its chain was taken out" in chain.breaks
+    assert not chain.holds
+
+
+def test_a_log_of_the_first_version_is_read_and_has_no_chain():
+    chain, numbers = check(OLD)
+    assert numbers == list(range(12))
+    assert (chain.chained, chain.broken, chain.holds) == (False, 0, False)
+
+
+def test_a_log_of_the_first_version_written_anew_gets_a_chain(tmp_path):
+    with LogReader(OLD) as reader:
+        header, ticks = reader.header, list(reader.ticks())
+    writer = McapWriter(tmp_path / "run.mcap", header)
+    for tick in ticks:
+        writer.take(tick)
+    writer.close()
+    assert check(tmp_path / "run.mcap")[0].holds
+    with LogReader(tmp_path / "run.mcap") as reader:
+        assert [repr(tick) for tick in reader.ticks()] == [repr(tick) for tick in ticks]
+
+
+def test_a_link_is_what_it_says():
+    head = ChainHead(os.urandom(32).hex())
+    chain = Chain(head)
+    chain.add("/tick", (1, 2, 3), b"{}")
+    link = chain.next_link()
+    assert link == chain.next_link()
+    assert link.digest != chain.next_link("log").digest
+    assert Link.of(vars(link)) == link
+    with pytest.raises(LogError, match="damaged"):
+        Link.of({"count": "x"})
