@@ -11,12 +11,16 @@ import math
 import os
 import pickle
 import threading
+import time
 from typing import Any
 
 from .frames import read_message, write_message
 
 FAILED = 3
 """Exit status when the policy could not be loaded; the answer before it says why."""
+
+GRACE_S = 5.0
+"""Time the keeper has to end this process once the runner is gone, s."""
 
 
 class Slot:
@@ -41,7 +45,8 @@ class Slot:
             with contextlib.suppress(OSError):
                 message = read_message(self._descriptor)
             if message is None:
-                os._exit(0)  # the runner is gone; the policy may be in the middle of anything
+                time.sleep(GRACE_S)  # the runner is gone, and the keeper ends all this, whatever the policy is at
+                os._exit(0)
             with self._ready:
                 self._message = message
                 self._ready.notify()

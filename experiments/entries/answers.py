@@ -35,7 +35,7 @@ def to_plain(action: Any, depth: int = 0) -> Any:
         action = action.detach().cpu().numpy()
     if isinstance(action, (np.ndarray, np.generic)):
         if action.size <= MOST and action.dtype.name in _NUMBERS:
-            return {"array": action.tolist(), "dtype": action.dtype.name}
+            return {"array": action.tolist(), "dtype": action.dtype.name, "scalar": isinstance(action, np.generic)}
         return _unreadable(action)
     if isinstance(action, list | tuple):
         if len(action) > MOST or depth >= DEEPEST:
@@ -60,7 +60,7 @@ def from_plain(content: Any, depth: int = 0) -> Any:
             made = np.array(array, dtype=dtype)
         except (TypeError, ValueError, OverflowError):
             return Unreadable("an array")
-        return made if isinstance(array, list) else made[()]
+        return made[()] if content.get("scalar") is True and made.ndim == 0 else made
     for name, kind in (("tuple", tuple), ("list", list)):
         items = content.get(name)
         if isinstance(items, list) and depth < DEEPEST:

@@ -56,6 +56,8 @@ class Keeper:
         while True:
             pid = self._fork()
             status, why = self._watch(pid)
+            if status is None:  # the folder goes first: when the code is gone, nothing is left
+                shutil.rmtree(self._folder, ignore_errors=True)
             end_group(pid)
             end_children()
             if status is None:

@@ -19,7 +19,7 @@ from typing import Any
 
 from steerclear.policies.registry import SB3_PREFIX
 
-from ..deploy.frames import GONE, Broken
+from ..deploy.frames import Broken
 from ..deploy.worker import Worker
 from .limits import Limits
 
@@ -32,6 +32,7 @@ MOST_IDLE = 2
 """Processes kept for later games."""
 HEAVY = ("torch", "stable_baselines3")
 """Modules that take long to import: done once for all games of an entry that imports them."""
+MOST_SOURCES, SOURCE_BYTES = 50, 1 << 16
 _IDLE: list[Worker] = []
 
 
@@ -114,14 +115,18 @@ def heavy_modules(policy: str) -> tuple[str, ...]:
 
 def _sources(path: Path) -> str:
     """The beginning of its Python files, for a look at what they import."""
+    texts: list[bytes] = []
     try:
         if path.suffix == ".zip":
             with zipfile.ZipFile(path) as archive:
-                names = [name for name in archive.namelist() if name.endswith(".py")][:50]
-                texts = [archive.open(name).read(1 << 16) for name in names]
+                for name in [name for name in archive.namelist() if name.endswith(".py")][:MOST_SOURCES]:
+                    with archive.open(name) as member:
+                        texts.append(member.read(SOURCE_BYTES))
         else:
-            files = sorted((path if path.is_dir() else path.parent).glob("*.py"))[:50]
-            texts = [file.open("rb").read(1 << 16) for file in files]
+            for place in sorted((path if path.is_dir() else path.parent).glob("*.py"))[:MOST_SOURCES]:
+                if place.is_file():
+                    with place.open("rb") as file:
+                        texts.append(file.read(SOURCE_BYTES))
     except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError):
         return ""  # whoever loads it will say so
     return "\n".join(text.decode(errors="replace") for text in texts)
@@ -154,6 +159,3 @@ def _content(message: bytes) -> dict[str, Any]:
     if not isinstance(content, Mapping):
         raise Broken("its answer is no object")
     return dict(content)
-
-
-__all__ = ["GONE", "EntryProcess", "Lost"]
