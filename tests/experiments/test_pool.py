@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError, GameError
 
 
 def work(job):
-    """Importable by spawned workers: negative numbers go wrong, 99 kills the worker, 50 takes for ever, 20 and 21 take a while."""
+    """Importable by spawned workers: negatives go wrong, 99 kills the worker, 50 takes for ever, 20 and 21 a while."""
     if job == -1:
         raise GameError("a game setting is wrong; change it")
     if job < 0:

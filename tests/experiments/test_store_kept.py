@@ -137,7 +137,8 @@ def test_a_whole_last_line_without_its_end_is_counted_and_stays(tmp_path):
     "line",
     [
         "3", "null", "[]", '"key"', "{}", '{"key": 3}', '{"key": ["a"]}', '{"key": {"a": 1}}',
-        '{"key": "a", "value": 9}', '{"key": "a", "code": 3, "sum": []}', "[" * 100_000, "9" * 5000, '{"key": null, "sum": "x"}', "\u2028", "NaN",
+        '{"key": "a", "value": 9}', '{"key": "a", "code": 3, "sum": []}', "[" * 100_000, "9" * 5000,
+        '{"key": null, "sum": "x"}', "\u2028", "NaN",
     ],
 )  # fmt: skip
 def test_valid_json_of_a_wrong_form_is_left_out_by_name_and_nothing_is_lost(tmp_path, caplog, line):
