@@ -34,13 +34,13 @@ def steerclear(*arguments, **options):
 
 
 def test_an_entry_that_exits_forfeits_and_the_results_say_so(write_entry):
-    entry = write_entry("os._exit(0)")
+    entry = write_entry("self.n += 1\nif self.n > 6: os._exit(0)\nreturn 4", start="self.n = 0")
     done = run("evaluate", entry, "--opponents", "hold", *TINY, "--out", "out")
     assert done.exit_code == ExitCode.OK, done.output
     content = json.loads(Path("out/results.json").read_text())
     assert content["complete"]
     (words,) = content["warnings"]
-    assert "failed 30 times" in words
+    assert "failed 24 times" in words
     assert "process ended: ended itself with exit status 0; its boats hold for the rest of the game" in words
     assert "exit status 0" in Path("out/report.html").read_text()
     assert "exit status 0" in done.stdout.replace("\n", " ")
@@ -55,12 +55,13 @@ def test_an_entry_that_leaves_a_thread_ends_with_the_command(write_entry):
 
 
 def test_an_entry_that_does_not_answer_forfeits_after_the_time_given(write_entry):
-    done = run("play", "--own", "hold", "--opponent", write_entry("time.sleep(600)"), "--max-time", "1",
-               "--answer-time", "0.5", "--json", "a.json")  # fmt: skip
+    entry = write_entry("self.n += 1\nif self.n > 6: time.sleep(600)\nreturn 4", start="self.n = 0")
+    given = ["--opponent", entry, "--max-time", "1", "--answer-time", "0.5", "--json", "a.json"]
+    done = run("play", "--own", "hold", *given)
     assert done.exit_code == ExitCode.OK, done.output
     row = json.loads(Path("a.json").read_text())["game"]
     assert "did not answer within 0.5 s" in row["first_failure"]
-    assert row["opponent_policy_failures"] == 30
+    assert row["opponent_policy_failures"] == 24
     refused = run("play", "--max-time", "1", "--answer-time", "0")
     assert refused.exit_code == ExitCode.BAD_INPUT
     assert "--answer-time must be above 0" in refused.stderr

@@ -1,14 +1,18 @@
 """A well-behaved entry plays in its own process what it plays in ours, to the bit."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steerclear import policies
 from steerclear.experiments import match
+from steerclear.experiments.entries import limits
+from steerclear.experiments.entries import team as entry_team
 from steerclear.experiments.entries.answers import Unreadable, from_plain, to_plain
 from steerclear.experiments.entries.packing import Packer, Unpacker
-from steerclear.experiments.entries.team import is_entry, make_team
+from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
 from steerclear.experiments.match import play_match
 from steerclear.experiments.spec import MatchSpec
 from steerclear.shield.exceptions import PolicyError
@@ -102,3 +106,39 @@ def test_only_foreign_code_is_put_apart(write_entry):
         make_team("mediun")
     with pytest.raises(PolicyError, match="there is no policy at"):
         make_team("nowhere/entry.zip")
+
+
+def test_a_model_plays_in_its_own_process_as_in_ours(game, tmp_path):
+    library = pytest.importorskip("stable_baselines3")
+    gymnasium = pytest.importorskip("gymnasium")
+
+    class Spaces(gymnasium.Env):
+        observation_space = gymnasium.spaces.Box(-1.0, 1.0, (game[0].core.n_obs,), np.float32)
+        action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    options = {"policy_kwargs": {"net_arch": [4]}, "seed": 0, "device": "cpu"}
+    library.SAC("MlpPolicy", Spaces(), **options).save(tmp_path / "model")
+    env, observations, infos = game
+    teams = [policies.make(f"sb3:{tmp_path / 'model.zip'}"), make_team(f"sb3:{tmp_path / 'model.zip'}")]
+    assert isinstance(teams[1], EntryTeam)
+    here, apart = [], []
+    for team, actions in zip(teams, (here, apart), strict=True):
+        team.reset(env, ["agent_0", "agent_2"], 0)
+        actions.append(team.act(observations, infos))
+        assert team.report().failures == ()
+        team.close()
+    assert here == apart
+
+
+def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_entry, monkeypatch, caplog):
+    monkeypatch.delattr(limits.os, "fork")
+    entry_team._say_once.cache_clear()
+    for _ in range(2):
+        team = make_team(write_entry("return 4"))
+        assert not isinstance(team, EntryTeam)
+        team.close()
+    assert caplog.text.count("entries cannot be run in a process of their own on this system") == 1
+    monkeypatch.undo()
+    assert limits.unlimited() == "" or sys.platform != "linux"
+    monkeypatch.setattr(limits.sys, "platform", "darwin")
+    assert "memory and number of processes of entries are not limited" in limits.unlimited()
