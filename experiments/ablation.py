@@ -11,7 +11,7 @@ from steerclear import policies
 
 from .conditions import CALM, Conditions
 from .score import DEFAULT_PENALTY
-from .spec import SIDES, MatchSpec
+from .spec import ANSWER_S, SIDES, MatchSpec
 from .statistics import count_interval, paired_ratio
 from .summary import Row, by_game, summarise
 from .tally import RADII_M, breach_column
@@ -47,6 +47,8 @@ class AblationSettings:
     penalty: float = DEFAULT_PENALTY
     judge: str = "shielded"
     conditions: Conditions = CALM
+    trust: bool = False
+    answer_s: float = ANSWER_S
 
     @property
     def separation_m(self) -> float:
@@ -85,6 +87,8 @@ class AblationSettings:
             judge=self.judge,
             conditions=self.conditions,
             files=files,
+            trust=self.trust,
+            answer_s=self.answer_s,
         )
 
 

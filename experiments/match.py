@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches
 from steerclear.env.record_meta import meta_of
@@ -16,6 +16,7 @@ from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
+from .entries.team import make_team
 from .judging import StateLog, judge_game
 from .openings import opening
 from .score import scores
@@ -66,8 +67,7 @@ class Match:
         names = [spec.own, spec.opponent] if spec.side == "blue" else [spec.opponent, spec.own]
         self.names = dict(zip(SIDES, names, strict=True))
         self.teams = [
-            Seat(policies.make(name, game=spec.game), self.env, ids[k * size : (k + 1) * size])
-            for k, name in enumerate(names)
+            Seat(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
         ]
         self._recorder = GameRecorder()
         self._log = StateLog() if spec.judged else None
@@ -207,6 +207,18 @@ class Match:
             return {"decision_p50_us": None, "decision_p99_us": None, "decision_max_us": None}
         p50, p99, most = np.quantile(timed, [0.5, 0.99, 1.0])
         return {"decision_p50_us": float(p50), "decision_p99_us": float(p99), "decision_max_us": float(most)}
+
+
+def _teams(spec: MatchSpec, names: Sequence[str]) -> list[Any]:
+    """The policies; those built before one that cannot be are closed."""
+    with contextlib.ExitStack() as stack:
+        teams = []
+        for name in names:
+            teams.append(make_team(name, spec.game, spec.trust, spec.answer_s))
+            if hasattr(teams[-1], "close"):
+                stack.callback(teams[-1].close)
+        stack.pop_all()
+    return teams
 
 
 def play_match(

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import multiprocessing.connection
 import multiprocessing.process
 import os
 import signal
+import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
@@ -20,6 +23,7 @@ Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 logger = logging.getLogger(__name__)
 
+DIED = "its worker process died, also when it ran alone (out of memory?); mend that, then --resume"
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -53,8 +57,8 @@ def run_all(
 ) -> Iterator[Outcome[Job, Answer]]:
     """Run ``function`` on every job and yield the outcomes as they come.
 
-    A job that raises does not stop the others; neither does a worker that dies. Leaving the loop early or
-    interrupting it (Ctrl-C) drops the jobs that have not ended.
+    A job that raises does not stop the others; neither does a worker that dies: the jobs under way then are run again,
+    each alone. Leaving the loop early or interrupting it (Ctrl-C) drops the jobs that have not ended.
 
     Args:
         function: importable by name (workers are spawned, not forked), as is every job's data.
@@ -68,10 +72,39 @@ def run_all(
     if processes <= 1:
         yield from (attempt(function, job) for job in jobs)
         return
-    with _pool(processes) as pool:
-        waiting = {pool.submit(attempt, function, job): job for job in jobs}
-        for future in as_completed(waiting):
-            yield _outcome(future, waiting[future])
+    waiting, suspects = deque(jobs), deque[Job]()
+    while waiting:
+        with _pool(processes) as pool:
+            yield from _until_broken(pool, function, waiting, suspects, processes)
+    while suspects:  # each alone, so that the one that kills its worker is known from those beside it
+        alone: deque[Job] = deque()
+        with _pool(1) as pool:
+            yield from _until_broken(pool, function, suspects, alone, 1)
+        yield from (Outcome(job, None, DIED) for job in alone)
+
+
+def _until_broken(
+    pool: ProcessPoolExecutor, function: Callable[[Job], Answer], waiting: deque[Job], lost: deque[Job], at_once: int
+) -> Iterator[Outcome[Job, Answer]]:
+    """Run what waits, so many at once, until none is left or a worker died; then ``lost`` gets those under way."""
+    running: dict[Future[Outcome[Job, Answer]], Job] = {}
+    broken = False
+    while (waiting and not broken) or running:
+        while waiting and not broken and len(running) < at_once:
+            try:
+                running[pool.submit(attempt, function, waiting[0])] = waiting[0]
+                waiting.popleft()
+            except BrokenProcessPool:
+                broken = True
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            job = running.pop(future)
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken = True
+                lost.append(job)
+            else:
+                yield outcome
 
 
 def attempt(function: Callable[[Job], Answer], job: Job) -> Outcome[Job, Answer]:
@@ -85,18 +118,11 @@ def attempt(function: Callable[[Job], Answer], job: Job) -> Outcome[Job, Answer]
         return Outcome(job, None, f"{type(error).__name__}: {error}")
 
 
-def _outcome(future: Future[Outcome[Job, Answer]], job: Job) -> Outcome[Job, Answer]:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        return Outcome(job, None, "a worker process died (out of memory?); try fewer --jobs, then --resume")
-
-
 @contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     others = set(multiprocessing.active_children())
     with _environment(_ONE_THREAD):
-        pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _ignore_interrupts)
+        pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin_worker)
         try:
             yield pool
         except BaseException:  # interrupted, or the loop was left: what still runs is not wanted any more
@@ -113,8 +139,35 @@ def _end(workers: set[multiprocessing.process.BaseProcess]) -> None:
         worker.join()
 
 
-def _ignore_interrupts() -> None:
+def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; only the parent answers
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that started it is gone, however it ended."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+@contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end what is inside as Ctrl-C does: what is finished is kept, and no worker is left."""
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():  # signals are the main thread's
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
 
 
 @contextmanager

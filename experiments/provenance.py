@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,22 @@ from typing import Any
 from .pool import available_cores
 
 PACKAGES = ("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch")
+
+NO_GAME = ("shield/bridge", "env/render", "experiments/boats", "experiments/commands", "experiments/deploy")
+"""Folders whose code changes no result that is kept on disk."""
+
+
+@cache
+def code_digest() -> str:
+    """Digest of what results depend on beside their settings: our sources and tables, versions of the packages."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256(str(sorted(versions().items())).encode())
+    for folder in ("shield", "env", "policies", "experiments"):
+        for path in sorted((*(root / folder).rglob("*.py"), *(root / folder).rglob("*.npz"))):
+            name = path.relative_to(root).as_posix()
+            if not name.startswith(NO_GAME):
+                digest.update(name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def package_version(name: str = "steerclear") -> str | None:

@@ -17,6 +17,8 @@ from .store import key_of
 from .tally import RADII_M
 
 SIDES = ("blue", "red")
+ANSWER_S, MOST_ANSWER_S = 10.0, 86_400.0
+"""Time a policy from a file has for the actions of a step, and the longest that can be given, s."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class MatchSpec:
         judge: whose breaches the oracle judges, see `judging.JUDGE`.
         conditions: delay, position noise and current, the same with a shield and without.
         files: digests of both policies' files (`policies.fingerprint`), own and opponent; empty where there are none.
+        trust: also load models that lie among entries of others, see `policies.load_sb3`.
+        answer_s: time a policy from a file has for the actions of a step, s.
     """
 
     preset: str
@@ -58,11 +62,15 @@ class MatchSpec:
     judge: str = "shielded"
     conditions: Conditions = CALM
     files: tuple[str, str] = ("", "")
+    trust: bool = False
+    answer_s: float = ANSWER_S
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
         check_side(self.side)
         check_judge(self.judge)
+        if not 0.0 < self.answer_s <= MOST_ANSWER_S:
+            raise ConfigError(f"--answer-time must be above 0 and at most {MOST_ANSWER_S:g} s; got {self.answer_s:g}")
 
     @property
     def pairing(self) -> str:

@@ -6,6 +6,7 @@ import contextlib
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,35 @@ from .actions import HOLD, ActionReader
 from .protocol import Action
 from .report import PolicyReport, Reporter
 from .scripted.team import boat_numbers, game_core
+from .words import plain_text
 
 Answer = Callable[[str], Any]
 """``answer(agent_id) -> action``."""
+
+
+@dataclass(frozen=True)
+class GameFacts:
+    """What foreign code in another process may know of a game; stands for its env there.
+
+    Attributes:
+        n_obs: length of an observation.
+        top_speed_mps: top speed of each boat by agent id, m/s.
+    """
+
+    n_obs: int
+    top_speed_mps: Mapping[str, float]
+
+
+def game_facts(env: Any) -> GameFacts:
+    """The facts of an `MctfEnv`, or of a wrapper round one; facts are answered as they are.
+
+    Raises:
+        PolicyError: it is neither.
+    """
+    if isinstance(env, GameFacts):
+        return env
+    core = game_core(env)
+    return GameFacts(core.n_obs, dict(zip(core.config.agent_ids, core.max_speed_mps.tolist(), strict=True)))
 
 
 class ForeignCode(ABC):
@@ -25,7 +52,10 @@ class ForeignCode(ABC):
 
     @abstractmethod
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """A game begins; what is raised here ends it, since no boat could play."""
+        """A game begins; what is raised here ends it, since no boat could play.
+
+        Code that comes from a file may be given `GameFacts` for ``env``: it then runs in a process of its own.
+        """
 
     @abstractmethod
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
@@ -122,10 +152,13 @@ class GuardedTeam:
 
 
 def describe_error(error: BaseException) -> str:
-    """Type, text and place of an error raised by foreign code, in one line."""
-    text = " ".join(str(error).split())
+    """Type, text and place of an error raised by foreign code, in one line that a terminal can be shown."""
+    try:
+        text = plain_text(error)
+    except Exception:  # its own __str__ may raise, too
+        text = "(no text)"
     where = error.__traceback__
     while where is not None and where.tb_next is not None:
         where = where.tb_next
     place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
-    return f"{type(error).__name__}: {text[:300]}{place}"
+    return plain_text(f"{type(error).__name__}: {text}{place}", 900)

@@ -6,6 +6,8 @@ import logging
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from .words import plain_text
+
 logger = logging.getLogger(__name__)
 
 
@@ -74,7 +76,7 @@ class Reporter:
     """
 
     def __init__(self, policy: str) -> None:
-        self._policy = policy
+        self._policy = plain_text(policy, 80)
         self._first: dict[str, tuple[str, int, int, str]] = {}
         self._counts: dict[str, int] = {}
         self._games = self._calls = self._late = self._step = 0
@@ -103,6 +105,7 @@ class Reporter:
 
     def failed(self, agent_id: str, kind: str, message: str) -> None:
         """A call gave nothing usable."""
+        kind, message = plain_text(kind, 80), plain_text(message, 900)
         self._counts[kind] = self._counts.get(kind, 0) + 1
         if kind not in self._first:
             self._first[kind] = (agent_id, self._games - 1, self._step, message)

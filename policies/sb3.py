@@ -1,10 +1,16 @@
-"""Models saved by Stable-Baselines3, as a team policy: ``sb3:PATH.zip``."""
+"""Models saved by Stable-Baselines3, as a team policy: ``sb3:PATH.zip``.
+
+Such a file holds pickled objects: loading it runs code of whoever made it.
+"""
 
 from __future__ import annotations
 
 import importlib
+import io
 import json
+import logging
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,11 +18,28 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
-from .guard import Answer, ForeignCode, GuardedTeam
-from .scripted.team import game_core
+from .guard import Answer, ForeignCode, GuardedTeam, game_facts
+from .submissions.stage import ENTRY_FILE, check_members
 
 ALGORITHMS = ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG")
 _MARKS = (("clip_range", "PPO"), ("exploration_fraction", "DQN"), ("target_entropy", "SAC"), ("policy_delay", "TD3"))
+MAX_BYTES, MAX_DATA_BYTES = 1024**3, 64 * 1024**2
+"""Largest size of a model, unpacked, and of the settings in it, bytes."""
+ENTRIES = frozenset({"entries", "entry", "submissions", "submission", "tournament", "tournaments"})
+"""Names of folders that hold what others handed in."""
+UNREADABLE = (
+    zipfile.BadZipFile,
+    KeyError,
+    ValueError,
+    RecursionError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    zlib.error,
+)
+"""What reading a damaged or hostile zip raises."""
+logger = logging.getLogger(__name__)
+_SAID: set[Path] = set()
 
 
 class Sb3Code(ForeignCode):
@@ -28,22 +51,33 @@ class Sb3Code(ForeignCode):
     Args:
         path: the saved model.
         algorithm: one of ``ALGORITHMS``; None tells it from the file.
+        allow_code: see `load_sb3`.
+        max_bytes: largest unpacked size.
 
     Raises:
-        PolicyError: the extra ``[train]`` is missing, or the file is no model this can play.
+        PolicyError: the extra ``[train]`` is missing, the file is no model this can play, or not to be loaded.
     """
 
-    def __init__(self, path: str | Path, algorithm: str | None = None) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        algorithm: str | None = None,
+        allow_code: bool | None = None,
+        max_bytes: int = MAX_BYTES,
+    ) -> None:
         self._path = Path(path).expanduser()
         if not self._path.is_file():
             raise PolicyError(f"there is no model at {self._path}; give the zip that model.save wrote")
-        name = algorithm or saved_algorithm(self._path)
-        if name not in ALGORITHMS:
-            raise PolicyError(f"unknown algorithm {name!r}; choose one of {', '.join(ALGORITHMS)}")
+        if algorithm is not None and algorithm not in ALGORITHMS:
+            raise PolicyError(f"unknown algorithm {algorithm!r}; choose one of {', '.join(ALGORITHMS)}")
+        check_origin(self._path, allow_code)
+        saved = saved_settings(self._path, max_bytes)
+        name = algorithm or algorithm_of(saved)
         try:
             library = importlib.import_module("stable_baselines3")
         except ImportError as error:
             raise PolicyError("sb3 models need the extra: pip install 'steerclear[train]'") from error
+        say_it_runs_code(self._path)
         try:
             self._model = getattr(library, name).load(self._path, device="cpu")
         except Exception as error:  # whatever the unpickler meets, it is this file that cannot be used
@@ -52,13 +86,13 @@ class Sb3Code(ForeignCode):
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Check that the model was made for these observations."""
-        core = game_core(env)
+        facts = game_facts(env)
         shape = tuple(self._model.observation_space.shape or ())
-        if shape != (core.n_obs,):
+        if shape != (facts.n_obs,):
             raise PolicyError(
-                f"{self._path} takes observations {shape}, this game makes ({core.n_obs},): other team_size?"
+                f"{self._path} takes observations {shape}, this game makes ({facts.n_obs},): other team_size?"
             )
-        self._top_speed = dict(zip(core.config.agent_ids, core.max_speed_mps.tolist(), strict=True))
+        self._top_speed = facts.top_speed_mps
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """Predict one boat's action."""
@@ -77,17 +111,92 @@ def saved_algorithm(path: Path) -> str:
     """Which algorithm wrote a model, told from the settings it saved.
 
     Raises:
-        PolicyError: the file is not a saved model.
+        PolicyError: the file is not a saved model, or too large.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            saved = json.loads(archive.read("data"))
-    except (zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise PolicyError(f"{path} is not a Stable-Baselines3 model: {error}; give the zip model.save wrote") from error
+    return algorithm_of(saved_settings(path))
+
+
+def algorithm_of(saved: Mapping[str, Any]) -> str:
+    """Which algorithm saved such settings."""
     for mark, algorithm in _MARKS:
         if mark in saved:
             return algorithm
     return "A2C"
+
+
+def saved_settings(path: Path, max_bytes: int = MAX_BYTES) -> Mapping[str, Any]:
+    """The settings in a saved model, after a look at its sizes; nothing in it is run.
+
+    Raises:
+        PolicyError: the file is not a saved model, or too large.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+            check_members(path, members, max_bytes)
+            weights = [member for member in members if member.filename.endswith(".pth")]
+            for member in weights:
+                _check_weights(path, archive.open(member).read(member.file_size), max_bytes)
+            data = archive.getinfo("data")
+            if data.file_size > MAX_DATA_BYTES:
+                raise PolicyError(f"{path}: its settings have {data.file_size} bytes, more than {MAX_DATA_BYTES}")
+            saved = json.loads(archive.read(data))
+    except UNREADABLE as error:
+        raise PolicyError(f"{path} is not a Stable-Baselines3 model: {error}; give the zip model.save wrote") from error
+    if not isinstance(saved, Mapping):
+        raise PolicyError(f"{path} is not a Stable-Baselines3 model: no settings in it; give the zip model.save wrote")
+    return saved
+
+
+def _check_weights(path: Path, content: bytes, max_bytes: int) -> None:
+    """Refuse a file of weights, itself a zip, that unpacks to too much."""
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        return
+    with zipfile.ZipFile(io.BytesIO(content)) as inner:
+        total = sum(member.file_size for member in inner.infolist())
+    if total > max_bytes:
+        raise PolicyError(f"{path}: its weights unpack to {total} bytes, more than {max_bytes}; raise max_bytes")
+
+
+def check_origin(path: Path, allow_code: bool | None) -> None:
+    """Refuse a model of others: one in a submission, or in a folder named like those of entries.
+
+    Args:
+        path: the model.
+        allow_code: None looks where it lies; True allows any, False none.
+
+    Raises:
+        PolicyError: it is refused.
+    """
+    among = entries_around(path)
+    if allow_code or (allow_code is None and among is None):
+        return
+    where = "and allow_code is False" if among is None else f"and it lies among entries of others ({among})"
+    raise PolicyError(
+        f"loading {path} runs code of whoever made it, {where}; if you trust them, give allow_code=True "
+        "(--trust of the commands)"
+    )
+
+
+def entries_around(path: Path) -> Path | None:
+    """The folder that tells a model is somebody's entry: with a ``solution.py``, or so named; None: nothing does."""
+    for place in (path.absolute(), path.resolve()):
+        for folder in place.parents:
+            if folder.name.lower() in ENTRIES or (folder / ENTRY_FILE).is_file():
+                return folder
+    return None
+
+
+def say_it_runs_code(path: Path) -> None:
+    """Say once in this process, before it is loaded, what loading a model means."""
+    if path.resolve() not in _SAID:
+        _SAID.add(path.resolve())
+        logger.warning("%s", code_warning(path))
+
+
+def code_warning(path: str | Path) -> str:
+    """What loading a model means."""
+    return f"loading the model {path} runs code of whoever made it"
 
 
 def _is_unit_box(space: Any) -> bool:
@@ -95,15 +204,24 @@ def _is_unit_box(space: Any) -> bool:
     return low is not None and high is not None and bool(np.all(low == -1.0) and np.all(high == 1.0))
 
 
-def load_sb3(path: str | Path, algorithm: str | None = None, name: str | None = None) -> GuardedTeam:
-    """A saved Stable-Baselines3 model as a team policy.
+def load_sb3(
+    path: str | Path,
+    algorithm: str | None = None,
+    name: str | None = None,
+    allow_code: bool | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> GuardedTeam:
+    """A saved Stable-Baselines3 model as a team policy. Loading runs code of whoever made it; that is logged before.
 
     Args:
         path: the zip ``model.save`` wrote.
         algorithm: one of ``ALGORITHMS``; None tells it from the file.
         name: name for records and reports; None takes the file's.
+        allow_code: None refuses models that lie among entries of others (in a folder with a ``solution.py``, or named
+            entries, submissions or the like); True allows them, False refuses all.
+        max_bytes: largest unpacked size.
 
     Raises:
-        PolicyError: the extra ``[train]`` is missing, or the file is no such model.
+        PolicyError: the extra ``[train]`` is missing, the file is no such model, too large, or refused.
     """
-    return GuardedTeam(name or Path(path).stem, Sb3Code(path, algorithm))
+    return GuardedTeam(name or Path(path).stem, Sb3Code(path, algorithm, allow_code, max_bytes))

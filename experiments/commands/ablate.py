@@ -9,6 +9,7 @@ from ..ablation import AblationSettings
 from ..ablation import quick as small_version
 from ..conditions import Conditions
 from ..score import DEFAULT_PENALTY
+from ..spec import ANSWER_S
 from ..store import write_json
 from . import options as o
 from .console import command, finish
@@ -43,6 +44,8 @@ def ablate(
     noise: o.Noise = 0.0,
     current: o.Current = 0.0,
     judge: o.Judge = "shielded",
+    trust: o.Trust = False,
+    answer_time: o.AnswerTime = ANSWER_S,
     check: o.Check = False,
     json_file: o.JsonFile = None,
 ) -> None:
@@ -62,6 +65,8 @@ def ablate(
         penalty=penalty,
         judge=judge,
         conditions=Conditions(delay, noise, current),
+        trust=trust,
+        answer_s=answer_time,
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from steerclear.shield.exceptions import SteerclearError
 
+from ..pool import interrupted_by_sigterm
 from .files import check_files
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -32,7 +33,7 @@ class ExitCode(IntEnum):
 
 
 class Interrupted(Exception):
-    """The user pressed Ctrl-C; the text says what is kept and how to go on."""
+    """The user pressed Ctrl-C, or SIGTERM came; the text says what is kept and how to go on."""
 
 
 def out() -> Console:
@@ -47,14 +48,15 @@ def err() -> Console:
 
 
 def command(function: Command) -> Command:
-    """Give a command the exit codes of `ExitCode`: one line instead of a traceback for bad input."""
+    """Give a command the exit codes of `ExitCode`: one line instead of a traceback for bad input; SIGTERM is Ctrl-C."""
 
     @functools.wraps(function)
     def guarded(*args: Any, **kwargs: Any) -> Any:
         logging.captureWarnings(True)
         try:
             check_files(function, kwargs)
-            return function(*args, **kwargs)
+            with interrupted_by_sigterm():
+                return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
         except Interrupted as error:

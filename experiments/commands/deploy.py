@@ -27,6 +27,7 @@ from ..store import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out
+from .policies_tried import say_what_runs
 
 Fleet = Annotated[
     Path | None, typer.Argument(metavar="FLEET.yaml", help="Boats, links, geofence, limits.", show_default=False)
@@ -57,6 +58,7 @@ def deploy(
     seed: o.Seed = 0,
     plain: Plain = False,
     no_tlog: d.NoTlog = False,
+    trust: o.Trust = False,
     json_file: o.JsonFile = None,
 ) -> None:
     """Steer the boats of a FLEET.yaml by a policy, every command through the shield; boats are left stopped.
@@ -65,7 +67,8 @@ def deploy(
     """
     if demo:
         policies.check(opponents)
-    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog))
+    say_what_runs((policy,), trust)
+    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog, trust))
     file = load_fleet(orders.fleet_file)
     dashboard = d.on_terminal() and not plain
     operator, console, started = Operator(), out(), time.perf_counter()
@@ -101,14 +104,13 @@ def _orders(
     minutes: float | None,
     accept: Sequence[str],
     demo: bool,
-    more: tuple[float, float, int, bool],
+    more: tuple[float, float, int, bool, bool],
 ) -> Orders:
-    speed, wait_s, seed, tlog = more
+    speed, wait_s, seed, tlog, trust = more
     if fleet is None and not demo:
         raise ConfigError("give a FLEET.yaml, or --demo for boats that come with the package")
     if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
-    policies.check(policy)
     orders = Orders(
         fleet_file=fleet or Path(),
         policy=policy,
@@ -119,6 +121,7 @@ def _orders(
         tlog=tlog,
         speed=speed,
         connect_s=max(wait_s, 60.0) if demo and wait_s > 0.0 else wait_s,
+        trust=trust,
     )
     return orders if fleet is not None else replace(orders, fleet_file=demo_file())  # a folder, once all else is sound
 

@@ -12,6 +12,7 @@ from ..ablation import AblationSettings
 from ..ablation import quick as small_version
 from ..conditions import Conditions
 from ..score import DEFAULT_PENALTY
+from ..spec import ANSWER_S
 from . import options as o
 from .ablate import QUICK_GAMES, QUICK_TIME_S, end_run
 from .console import command
@@ -47,6 +48,8 @@ def evaluate(
     noise: o.Noise = 0.0,
     current: o.Current = 0.0,
     judge: o.Judge = "shielded",
+    trust: o.Trust = False,
+    answer_time: o.AnswerTime = ANSWER_S,
     json_file: o.JsonFile = None,
 ) -> None:
     """Play a policy or submission against opponents and report how it did.
@@ -70,6 +73,8 @@ def evaluate(
         penalty=penalty,
         judge=judge,
         conditions=Conditions(delay, noise, current),
+        trust=trust,
+        answer_s=answer_time,
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from steerclear import policies
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..ablation import AblationSettings
@@ -24,6 +23,7 @@ from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table, verdict_table
 from ..warming import warm_up
 from .console import Interrupted, err, out, progress
+from .policies_tried import try_policies
 
 KEYBOARD = "keyboard"
 
@@ -45,7 +45,7 @@ def check_settings(settings: AblationSettings) -> None:
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
-        policies.make(name)
+    try_policies((settings.own, *settings.opponents), settings.trust)
     check_current(settings.conditions, settings.specs()[0].config())
 
 

@@ -52,6 +52,12 @@ Current = Annotated[
     float,
     typer.Option(metavar="M/S", help="Speed of a current on all boats; the shield is told it, not where to."),
 ]
+Trust = Annotated[
+    bool, typer.Option("--trust", help="Also load sb3: models that lie among entries of others: that runs their code.")
+]
+AnswerTime = Annotated[
+    float, typer.Option(metavar="S", help="Time a submission or model has for the actions of a step, s.")
+]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]

@@ -21,11 +21,12 @@ from ..provenance import machine, versions
 from ..score import DEFAULT_PENALTY, check_penalty
 from ..sea import check_current
 from ..shielding import check_shield
-from ..spec import MatchSpec
+from ..spec import ANSWER_S, MatchSpec
 from ..store import write_json
 from ..tables import game_table
 from . import options as o
 from .console import command, out, progress
+from .policies_tried import try_policies
 from .saving import check_endings, save_record
 
 Opponent = Annotated[str, typer.Option(metavar="NAME", help="Policy of the other team.")]
@@ -69,6 +70,8 @@ def play(
     delay: o.Delay = 0.0,
     noise: o.Noise = 0.0,
     current: o.Current = 0.0,
+    trust: o.Trust = False,
+    answer_time: o.AnswerTime = ANSWER_S,
     json_file: o.JsonFile = None,
 ) -> None:
     """Play one game and show what happened.
@@ -90,6 +93,8 @@ def play(
         fixed_start=fixed_start,
         penalty=check_penalty(penalty),
         conditions=Conditions(delay, noise, current),
+        trust=trust,
+        answer_s=answer_time,
         files=(policies.fingerprint(own), policies.fingerprint(opponent)),
     )
     if not 0.0 < speed < math.inf:
@@ -114,8 +119,7 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
     check_current(spec.conditions, spec.config())
     if spec.shield is not None:
         check_shield(spec.shield)
-    for name in (spec.own, spec.opponent):
-        policies.make(name)
+    try_policies((spec.own, spec.opponent), spec.trust)
     if window:
         return play_match(spec, _until_closed, "human", speed)
     total = round(spec.config().max_time_s / spec.config().dt_s)

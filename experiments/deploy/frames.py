@@ -53,6 +53,11 @@ class FrameReader:
             raise Broken(GONE)
         return messages
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether no part of a message is waiting for its rest."""
+        return not self._buffer
+
     def close(self) -> None:
         """Give the pipe's end back."""
         os.close(self._descriptor)

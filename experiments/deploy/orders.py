@@ -47,6 +47,7 @@ class Orders:
         tlog: whether raw packets are kept as well.
         speed: times faster than real time, for simulated boats that live so.
         connect_s: how long boats are waited for, s.
+        trust: also load a model that lies among entries of others.
 
     Raises:
         ConfigError: the speed is not above 0 or the wait is out of range.
@@ -61,6 +62,7 @@ class Orders:
     tlog: bool = True
     speed: float = 1.0
     connect_s: float = CONNECT_S
+    trust: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.connect_s <= LONGEST_WAIT_S:

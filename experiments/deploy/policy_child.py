@@ -1,7 +1,6 @@
-"""The policy's own process: ``python -m steerclear.experiments.deploy.policy_child READ_FD WRITE_FD FOLDER``.
+"""The policy's own process, forked by `entries.keeper`, which ends it when the runner is gone.
 
-Reads pickled `Orders`, then snapshots; answers JSON. It ends when the runner does, also while the policy is busy, and
-takes FOLDER, in which its temporary files are, with it.
+Reads pickled `Orders`, then snapshots; answers JSON.
 """
 
 from __future__ import annotations
@@ -11,9 +10,8 @@ import json
 import math
 import os
 import pickle
-import shutil
-import sys
 import threading
+import time
 from typing import Any
 
 from .frames import read_message, write_message
@@ -21,12 +19,15 @@ from .frames import read_message, write_message
 FAILED = 3
 """Exit status when the policy could not be loaded; the answer before it says why."""
 
+GRACE_S = 5.0
+"""Time the keeper has to end this process once the runner is gone, s."""
+
 
 class Slot:
     """Holds the latest snapshot, filled by a thread, so that a slow policy skips those it was too late for."""
 
-    def __init__(self, descriptor: int, folder: str) -> None:
-        self._descriptor, self._folder = descriptor, folder
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
         self._ready = threading.Condition()
         self._message: bytes | None = None
         threading.Thread(target=self._fill, name="snapshots", daemon=True).start()
@@ -44,16 +45,15 @@ class Slot:
             with contextlib.suppress(OSError):
                 message = read_message(self._descriptor)
             if message is None:
-                shutil.rmtree(self._folder, ignore_errors=True)
-                os._exit(0)  # the runner is gone; the policy may be in the middle of anything
+                time.sleep(GRACE_S)  # the runner is gone, and the keeper ends all this, whatever the policy is at
+                os._exit(0)
             with self._ready:
                 self._message = message
                 self._ready.notify()
 
 
-def main(read_fd: int, write_fd: int, folder: str) -> int:
+def serve(read_fd: int, write_fd: int, folder: str) -> int:
     """Load the policy the first message names and answer snapshots until the runner is gone."""
-    _give_way()
     orders = read_message(read_fd)
     if orders is None:
         return 0
@@ -67,7 +67,7 @@ def main(read_fd: int, write_fd: int, folder: str) -> int:
         _answer(write_fd, {"failed": str(error)})
         return FAILED
     _answer(write_fd, {"ready": True})
-    slot = Slot(read_fd, folder)
+    slot = Slot(read_fd)
     while True:
         snapshot = pickle.loads(slot.take())
         try:
@@ -79,21 +79,9 @@ def main(read_fd: int, write_fd: int, folder: str) -> int:
         _answer(write_fd, {"number": snapshot.number, "commands": rows, "problems": list(play.problems)})
 
 
-def _give_way() -> None:
-    """Let the runner go first on a busy machine, and be the one to go when memory runs out."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.nice(5)
-    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
-        file.write("1000")
-
-
 def _answer(write_fd: int, content: dict[str, Any]) -> None:
     write_message(write_fd, json.dumps(content, allow_nan=False).encode())
 
 
 def _line(error: BaseException) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
-
-
-if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 
+from steerclear.policies.registry import SB3_PREFIX
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
@@ -50,7 +51,8 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
     clock, outcome = MonotonicClock(orders.speed), Outcome()
     boats = tuple(entry.name for entry in fleet.commanded(orders.boat))
     with contextlib.ExitStack() as stack:
-        policy = PolicyProcess(fleet, orders.policy, clock=clock, boats=boats, seed=orders.seed)
+        options = {"allow_code": True} if orders.trust and orders.policy.startswith(SB3_PREFIX) else {}
+        policy = PolicyProcess(fleet, orders.policy, clock=clock, boats=boats, options=options, seed=orders.seed)
         stack.callback(policy.close)
         warm_up(fleet)
         policy.start()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
+import select
 import shutil
 import signal
 import subprocess
@@ -11,65 +13,89 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import asdict
 
+from steerclear.policies.words import plain_text
+
+from ..entries.keeper import OVER, READY
+from ..entries.limits import Limits
+from ..entries.system import end_group
 from .frames import GONE, Broken, FrameReader, FrameWriter
 
-MODULE = "steerclear.experiments.deploy.policy_child"
+KEEPER = "steerclear.experiments.entries.keeper"
+PART = "steerclear.experiments.deploy.policy_child"
+DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True)
+"""Limits of a policy that may play for days."""
 TAIL_BYTES = 4096
 """How much of what the policy prints is kept."""
 FOLDER = "steerclear-policy-"
 """First part of the name of a process's folder for temporary files."""
-GONE_S = 10.0
+KEEPER_S, GONE_S = 5.0, 10.0
+"""How long a keeper may take to end what it keeps, and any process to be gone once it was ended."""
 SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Worker:
-    """A started process, in a session of its own: keys for the runner do not reach it, and its children end with it.
+    """A started process, in a session of its own: keys for the runner do not reach it.
 
-    Its temporary files, such as an unpacked submission, have a folder of their own that goes with it.
-    What the policy prints is read a little at each turn, so that one that floods only slows itself.
+    What runs in it is forked, watched and limited by `entries.keeper`, and ends with all it started. Its temporary
+    files, such as an unpacked submission, have a folder of their own that goes with it. What the policy prints is read
+    a little at each turn, so that one that floods only slows itself.
 
     Args:
-        orders: its first message.
+        orders: its first message; empty: none yet.
+        part: module whose ``serve`` runs there.
+        limits: of what runs there.
+        preload: modules to import beforehand.
 
     Raises:
         OSError: the system cannot start it.
     """
 
-    def __init__(self, orders: bytes) -> None:
+    def __init__(
+        self, orders: bytes, part: str = PART, limits: Limits = DEPLOY_LIMITS, preload: Sequence[str] = ()
+    ) -> None:
+        self.limits, self.preload = limits, tuple(preload)
         self._folder = tempfile.mkdtemp(prefix=FOLDER)
         ours_r, theirs_w = os.pipe()
         theirs_r, ours_w = os.pipe()
+        self._notes, notes_w = os.pipe()
+        os.set_blocking(self._notes, False)
         self._reader, self._writer = FrameReader(ours_r), FrameWriter(ours_w)
+        self._answers = ours_r
         self._tail = b""
+        self._printed = 0
         self._ended = False
         self._cleaner: threading.Thread | None = None
         try:
-            command = [sys.executable, "-P", "-m", MODULE, str(theirs_r), str(theirs_w), self._folder]
+            fds = (theirs_r, theirs_w, notes_w)
+            what = (*map(str, fds), self._folder, json.dumps(asdict(limits)), part, *preload)
             self._process = subprocess.Popen(
-                command,
+                [sys.executable, "-P", "-m", KEEPER, *what],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                pass_fds=(theirs_r, theirs_w),
+                pass_fds=fds,
                 start_new_session=True,
                 env={**dict.fromkeys(SINGLE_THREAD, "1"), **os.environ, "TMPDIR": self._folder},
             )
         except OSError:
             shutil.rmtree(self._folder, ignore_errors=True)
-            self._reader.close()
-            self._writer.close()
+            self._close_pipes()
             raise
         finally:
             os.close(theirs_r)
             os.close(theirs_w)
+            os.close(notes_w)
         if self._process.stdout is not None:
             os.set_blocking(self._process.stdout.fileno(), False)
-        self._writer.write(orders)
+        if orders:
+            self._writer.write(orders)
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Number of the keeper's process."""
         return self._process.pid
 
     def messages(self) -> list[bytes]:
@@ -101,13 +127,35 @@ class Worker:
         """
         self._writer.flush()
 
+    def await_turn(self, timeout_s: float) -> None:
+        """Wait until there is something to read, or the time is over."""
+        printed = self._process.stdout
+        sources = [self._answers] if printed is None or printed.closed else [self._answers, printed.fileno()]
+        poll = select.poll()
+        for descriptor in sources:
+            poll.register(descriptor, select.POLLIN)
+        poll.poll(max(1000.0 * timeout_s, 0.0))
+
+    def is_fresh(self, patience_s: float) -> bool:
+        """Wait until what ran there is gone and the process is ready for the next; False: it is of no more use."""
+        end_s = time.monotonic() + patience_s
+        poll = select.poll()
+        poll.register(self._notes, select.POLLIN)
+        while not poll.poll(20) and time.monotonic() < end_s:
+            self._read_output()  # what it printed last must not keep it
+        self._read_output()
+        self._tail, self._printed = b"", 0
+        with contextlib.suppress(Broken):
+            return self._note() == READY and not self._reader.read() and self._reader.is_clear
+        return False
+
     def output(self) -> str:
         """The end of what the process printed."""
-        return self._tail.decode(errors="replace")
+        return plain_text(self._tail.decode(errors="replace"), TAIL_BYTES, lines=True)
 
     def epitaph(self, otherwise: str) -> str:
         """How the process ended, with its last words; ``otherwise`` when it has not."""
-        for _ in range(3):  # its pipes close a moment before it is gone
+        for _ in range(200 if otherwise == GONE else 3):  # its pipes close a moment before it is gone
             if self.is_gone:
                 break
             time.sleep(0.001)
@@ -116,27 +164,42 @@ class Worker:
         if status is None or otherwise != GONE:
             return f"failed: {'it gave its pipes away' if otherwise == GONE else otherwise}"
         how = f"was ended by {_signal_name(-status)}" if status < 0 else f"ended itself with exit status {status}"
+        if status == OVER and (limit := plain_text(self._note(), 200)):
+            how = f"was ended: {limit}"
         last = self.output().strip().splitlines()[-1:]
         return how + (f', its last words: "{last[0][:160]}"' if last else "")
 
     def end(self) -> None:
-        """End the process and all it started, at once; give everything back. May be called again."""
+        """End the process and all it started; give everything back. May be called again.
+
+        The closed pipes tell the keeper to end what it keeps; one that does not is ended after a while.
+        """
         if self._ended:
             return
         self._ended = True
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._reader.close()
-        self._writer.close()
+        self._close_pipes()
         if self._process.stdout is not None:
             self._process.stdout.close()
         self._cleaner = threading.Thread(target=self._clean, name="policy's folder", daemon=True)
         self._cleaner.start()
 
+    def _close_pipes(self) -> None:
+        self._reader.close()
+        self._writer.close()
+        os.close(self._notes)
+
     def _clean(self) -> None:
         """Remove its folder once it is gone; that may take long, and the loop must not."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=KEEPER_S)
+        end_group(self._process.pid)
         self.wait(GONE_S)
         shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _note(self) -> str:
+        with contextlib.suppress(OSError):
+            return os.read(self._notes, 4096).decode(errors="replace")
+        return ""
 
     @property
     def is_gone(self) -> bool:
@@ -156,6 +219,12 @@ class Worker:
         with contextlib.suppress(BlockingIOError):
             data = os.read(self._process.stdout.fileno(), 1 << 16)
             self._tail = (self._tail + data)[-TAIL_BYTES:]
+            self._printed += len(data)
+
+    @property
+    def prints_too_much(self) -> bool:
+        """Whether more was printed than the limits allow."""
+        return self.limits.output_bytes is not None and self._printed > self.limits.output_bytes
 
 
 def _signal_name(number: int) -> str:

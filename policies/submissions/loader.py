@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import random
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,8 @@ from .interface import METHOD_NAME, check_interface
 from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
 
+ALONE = "STEERCLEAR_ENTRY_ALONE"
+"""Environment variable of processes that run one submission only: what it sets there concerns nobody else."""
 CLASS_NAME = "solution"
 
 
@@ -54,7 +57,7 @@ class SubmissionCode(ForeignCode):
 
     def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
         self.stage = Stage(source, max_bytes)
-        self._sandbox = Sandbox(self.stage.folder)
+        self._sandbox = Sandbox(self.stage.folder, ALONE in os.environ)
         try:
             self._class, settings = self._load()
             instance = self._build()
@@ -67,8 +70,7 @@ class SubmissionCode(ForeignCode):
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """A fresh instance for each game, built and run from the game's seed."""
-        seed_libraries(seed)
-        self._instance = self._build()
+        self._instance = self._build(seed)
         self._history.clear()
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
@@ -109,8 +111,10 @@ class SubmissionCode(ForeignCode):
         except (Exception, SystemExit) as error:
             raise self._unusable(f"{file} cannot be imported", error) from error
 
-    def _build(self) -> Any:
+    def _build(self, seed: int | None = None) -> Any:
         with self._sandbox.active():
+            if seed is not None:
+                seed_libraries(seed)
             try:
                 return self._class()
             except (Exception, SystemExit) as error:

@@ -1,6 +1,7 @@
 """`Sandbox`: while a submission's code runs, its folder is the working directory and its modules are importable.
 
-This keeps submissions from meeting each other's files and modules. It is no protection against hostile code.
+Settings of the whole process that it changes are put back when its code returns, see `settings`. This keeps submissions
+from meeting each other's files, modules and settings. It is no protection against hostile code.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from .settings import Settings
+
 
 class Sandbox:
     """Working directory, import path and private modules of one submission.
@@ -24,9 +27,11 @@ class Sandbox:
 
     Args:
         folder: where the submission's files are.
+        alone: whether the process is the submission's, so that its settings are nobody else's.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, alone: bool = False) -> None:
+        self._settings = None if alone else Settings()
         self.folder = str(folder)
         self._real = os.path.realpath(folder)
         self._own: dict[str, ModuleType] = {}
@@ -36,10 +41,13 @@ class Sandbox:
     def active(self) -> Iterator[None]:
         """Run code as the submission expects to be run."""
         before = working_directory()
+        if self._settings is not None:
+            self._settings.enter()
         displaced = self._displace()
         sys.modules.update(self._own)
         n_modules = len(sys.modules)
-        sys.path.insert(0, self.folder)
+        if self.folder not in sys.path[:1]:
+            sys.path.insert(0, self.folder)
         try:
             os.chdir(self.folder)
             yield
@@ -48,6 +56,8 @@ class Sandbox:
                 os.chdir(before)
             with contextlib.suppress(ValueError):
                 sys.path.remove(self.folder)
+            if self._settings is not None:
+                self._settings.leave()
             if len(sys.modules) != n_modules:
                 self._collect()
             for name in self._own:

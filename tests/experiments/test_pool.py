@@ -1,5 +1,7 @@
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -9,13 +11,15 @@ from steerclear.shield.exceptions import ConfigError, GameError
 
 
 def work(job):
-    """Importable by spawned workers: negative numbers go wrong, 99 kills the worker, 50 takes for ever."""
+    """Importable by spawned workers: negatives go wrong, 99 kills the worker, 50 takes for ever, 20 and 21 a while."""
     if job == -1:
         raise GameError("a game setting is wrong; change it")
     if job < 0:
         raise RuntimeError("went wrong")
     if job == 99:
         os._exit(3)
+    if job in (20, 21):
+        time.sleep(0.3)
     if job == 50:
         time.sleep(600.0)
     return job * job, os.getpid()
@@ -40,6 +44,57 @@ def test_a_dead_worker_is_reported_with_a_remedy():
     outcomes = list(run_all(work, [99, 99], processes=2))
     assert len(outcomes) == 2
     assert all("--resume" in outcome.error for outcome in outcomes)
+
+
+def test_a_job_that_kills_its_worker_costs_no_other_job():
+    jobs = [1, 99, 20, 21, 4, 5]
+    outcomes = list(run_all(work, jobs, processes=2))
+    assert sorted(outcome.job for outcome in outcomes) == sorted(jobs)
+    assert [outcome.job for outcome in outcomes if outcome.answer is None] == [99]
+
+
+SCRIPT = """
+import os, sys
+from steerclear.experiments.pool import interrupted_by_sigterm, run_all
+from test_pool import work
+if __name__ == "__main__":
+    try:
+        with interrupted_by_sigterm():
+            for outcome in run_all(work, [20, 50, 50], processes=2):
+                print(outcome.answer[1], flush=True)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 130), (signal.SIGKILL, -9)])
+def test_no_worker_outlives_the_run_however_it_ends(tmp_path, number, status):
+    script = tmp_path / "run.py"
+    script.write_text(SCRIPT)
+    here = os.path.dirname(os.path.abspath(__file__))
+    run = subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": here}, text=True
+    )
+    try:
+        worker = int(run.stdout.readline())
+        run.send_signal(number)
+        assert run.wait(60) == status
+        end_s = time.monotonic() + 30.0
+        while is_running(worker):
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+    finally:
+        run.kill()
+        run.communicate()
+
+
+def is_running(pid):
+    try:
+        os.kill(pid, 0)
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -1,5 +1,8 @@
+import base64
 import importlib
+import io
 import json
+import os
 import zipfile
 
 import gymnasium
@@ -111,3 +114,100 @@ def test_the_algorithm_is_told_from_the_file(tmp_path, mark, algorithm):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("data", json.dumps({mark: 1}))
     assert saved_algorithm(path) == algorithm
+
+
+class Bomb:
+    """Pickles to a call that leaves a folder."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.makedirs, (str(self.path), 0o777, True)
+
+
+@pytest.fixture
+def bomb(tmp_path):
+    """Writes a model whose loading leaves a folder; answers the model's path and the folder's."""
+
+    def write(folder):
+        cloudpickle = pytest.importorskip("cloudpickle")
+        (tmp_path / folder).mkdir(parents=True)
+        path, left = tmp_path / folder / "model.zip", tmp_path / "left"
+        packed = base64.b64encode(cloudpickle.dumps(Bomb(left))).decode()
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("data", json.dumps({"clip_range": {":type:": "x", ":serialized:": packed}}))
+        return path, left
+
+    return write
+
+
+def test_that_a_model_runs_code_is_said_once_before_it_does(bomb, caplog):
+    path, left = bomb("mine")
+    seen = []
+    caplog.handler.emit = lambda record: seen.append((record.getMessage(), left.exists()))
+    for _ in range(2):
+        with pytest.raises(PolicyError, match="cannot be loaded as PPO"):
+            policies.make(f"sb3:{path}")
+    assert left.exists(), "it does"
+    said = [entry for entry in seen if "runs code of whoever made it" in entry[0]]
+    assert said == [(f"loading the model {path} runs code of whoever made it", False)]
+
+
+@pytest.mark.parametrize("folder", ["Entries/ours", "x/submissions", "cup/tournament/a/b"])
+def test_a_model_among_entries_is_refused_unless_allowed(bomb, folder):
+    path, left = bomb(folder)
+    with pytest.raises(PolicyError, match=r"runs code .* among entries of others .*allow_code=True"):
+        policies.make(f"sb3:{path}")
+    assert not left.exists()
+    with pytest.raises(PolicyError, match="cannot be loaded as PPO"):
+        policies.make(f"sb3:{path}", allow_code=True)
+    assert left.exists()
+
+
+def test_a_model_in_a_submission_or_behind_a_link_into_one_is_refused_and_any_may_be(bomb, tmp_path):
+    path, left = bomb("ours/weights")
+    (tmp_path / "ours" / "solution.py").touch()
+    (tmp_path / "link.zip").symlink_to(path)
+    for place in (path, tmp_path / "link.zip"):
+        with pytest.raises(PolicyError, match="among entries"):
+            policies.make(f"sb3:{place}")
+    (tmp_path / "ours" / "solution.py").unlink()
+    with pytest.raises(PolicyError, match="allow_code is False"):
+        policies.make(f"sb3:{path}", allow_code=False)
+    assert not left.exists()
+
+
+def zeros(path, name, size, inner=""):
+    """A zip of so many zeros; ``inner``: packed once more under that name."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("data" if inner else name, b"0" * size)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        if inner:
+            archive.writestr("data", "{}")
+            archive.writestr(inner, content.getvalue())
+        else:
+            archive.writestr(name, b"0" * size)
+
+
+@pytest.mark.parametrize(
+    ("name", "inner", "words"),
+    [
+        ("policy.pth", "", "unpacks to"),
+        ("data", "", "unpacks to"),
+        ("data", "policy.pth", "weights unpack to"),
+    ],
+)
+def test_a_model_that_unpacks_to_too_much_is_refused(tmp_path, name, inner, words):
+    zeros(tmp_path / "model.zip", name, 3_000_000, inner)
+    with pytest.raises(PolicyError, match=words):
+        policies.make(f"sb3:{tmp_path / 'model.zip'}", max_bytes=1_000_000)
+
+
+@pytest.mark.parametrize("data", ["[" * 100_000, "[]", "3", "\xff", '{"a": ' * 5000])
+def test_settings_of_a_wrong_form_are_one_clear_error(tmp_path, data):
+    with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
+        archive.writestr("data", data)
+    with pytest.raises(PolicyError, match="is not a Stable-Baselines3 model"):
+        policies.make(f"sb3:{tmp_path / 'model.zip'}")

@@ -206,6 +206,46 @@ def test_what_it_started_ends_with_it(run, ask, write_entry, tmp_path):
     wait_until(lambda: not any(is_running(pid) for pid in children))
 
 
+def test_what_left_its_session_ends_with_it_too(run, ask, write_entry, tmp_path):
+    note = tmp_path / "pid"
+    entry = write_entry(
+        "return (1.0, 0.0)",
+        start=f"""
+        import os, time
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                open({str(note)!r}, "w").write(str(os.getpid()))
+                time.sleep(600)
+            os._exit(0)
+        """,
+    )
+    process = run(entry)
+    ask(process, answered)
+    daemon = int(note.read_text())
+    assert is_running(daemon)
+    process.close()
+    wait_until(lambda: not is_running(daemon))
+
+
+def test_a_policy_that_takes_more_than_its_limits_is_ended_by_name(run, ask, write_entry):
+    entry = write_entry(
+        """
+        import os, time
+        self.calls += 1
+        if self.calls > 4:
+            for _ in range(20):
+                if os.fork() == 0:
+                    time.sleep(600)
+            time.sleep(600)
+        return (1.0, 0.0)
+        """,
+        start="self.calls = 0",
+    )
+    answer, _ = ask(run(entry, deadline_s=60.0), lambda answer: "was ended: it ran more than 16" in answer.fault)
+    assert "starting it again" in answer.fault
+
+
 def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path, fleet_of):
     """Also while the policy never answers."""
     note = tmp_path / "pid"

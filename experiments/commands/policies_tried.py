@@ -1,0 +1,40 @@
+"""Trying policies before anything long begins, and saying what loading them means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from steerclear import policies
+from steerclear.policies.registry import SB3_PREFIX
+from steerclear.policies.sb3 import check_origin, code_warning
+
+from ..entries.team import is_entry, make_team
+from .console import err
+
+
+def try_policies(names: Sequence[str], trust: bool) -> None:
+    """Load each policy once, those from files in a process of their own.
+
+    Raises:
+        PolicyError: one cannot be loaded, or is a model of others and not trusted.
+    """
+    say_what_runs(names, trust)
+    for name in dict.fromkeys(names):
+        team = make_team(name, trust=trust)
+        if hasattr(team, "close"):
+            team.close()
+
+
+def say_what_runs(names: Sequence[str], trust: bool) -> None:
+    """Say of each model, before any is loaded, that loading runs its code.
+
+    Raises:
+        PolicyError: there is no such policy, or it is a model of others and not trusted.
+    """
+    for name in dict.fromkeys(names):
+        policies.check(name)
+        if is_entry(name) and name.startswith(SB3_PREFIX):
+            path = Path(name.removeprefix(SB3_PREFIX)).expanduser()
+            check_origin(path, trust or None)
+            err().print(code_warning(path), markup=False, soft_wrap=True)

@@ -1,0 +1,174 @@
+"""`EntryTeam`: an entry in its own process as a team policy; `make_team`: any policy, isolated if it is an entry."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from steerclear import policies
+from steerclear.policies.actions import HOLD, ActionReader
+from steerclear.policies.guard import game_facts
+from steerclear.policies.protocol import Action, TeamPolicy
+from steerclear.policies.registry import SB3_PREFIX, looks_like_path
+from steerclear.policies.report import PolicyReport, Reporter
+from steerclear.policies.scripted.team import boat_numbers, game_core
+from steerclear.policies.words import plain_text
+from steerclear.shield.exceptions import PolicyError
+
+from ..spec import ANSWER_S
+from .answers import from_plain
+from .limits import Limits, unlimited
+from .packing import Packer
+from .process import EntryProcess, Lost
+
+MOST_NS = 10**15
+LIMITS = Limits()
+logger = logging.getLogger(__name__)
+
+
+class EntryTeam:
+    """A `TeamPolicy` in a process of its own. It plays as `steerclear.policies.make` of the same path does in ours.
+
+    When its process ends, hangs or exceeds a limit, its boats hold for the rest of the game, and `report` says why.
+
+    Args:
+        path: a submission, or ``sb3:PATH.zip``.
+        answer_s: time it has for a step, s.
+        limits: of its process.
+        options: of the policy.
+
+    Raises:
+        PolicyError: it cannot be loaded; the message says why.
+    """
+
+    def __init__(self, path: str, answer_s: float = ANSWER_S, limits: Limits = LIMITS, **options: Any) -> None:
+        policies.check(path)
+        self._path, self._answer_s = path, answer_s
+        self._process = EntryProcess(path, limits)
+        self._lost = ""
+        self.held: dict[str, str] = {}
+        """Boats that hold in this step, and why."""
+        self._ids: list[str] = []
+        self.name = plain_text(self._first("load", path, options).get("name"), 80)
+        self._reporter = Reporter(self.name)
+
+    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Begin a game.
+
+        Raises:
+            PolicyError: not an `MctfEnv`, unusable agent ids, or the code cannot begin.
+        """
+        core = game_core(env)
+        boat_numbers(core, agent_ids)
+        self._ids = list(agent_ids)
+        self._reader = ActionReader(env)
+        self._packer = Packer(not self._path.startswith(SB3_PREFIX))
+        self._reporter.begin(core.config.dt_s)
+        if not self._lost:
+            self._first("begin", game_facts(env), self._ids, seed)
+
+    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, Action]:
+        """The entry's own actions, unchanged; ``HOLD`` where there is no usable one.
+
+        Raises:
+            PolicyError: `reset` was not called, or observations or infos lack what the code is entitled to.
+        """
+        if not self._ids:
+            raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        self.held = {}
+        packed = self._packer.pack(observations, infos)
+        answers = {} if self._lost else self._ask(packed)
+        actions = {agent_id: self._checked(agent_id, answers.get(agent_id)) for agent_id in self._ids}
+        self._reporter.next_step()
+        return actions
+
+    def report(self) -> PolicyReport:
+        """Failures and times over all games so far."""
+        return self._reporter.report()
+
+    def close(self) -> None:
+        """End its process, with all it started; may be called again."""
+        self._process.over()
+
+    def _first(self, order: str, *arguments: Any) -> dict[str, Any]:
+        """The answer to an order without which there is no game.
+
+        Raises:
+            PolicyError: the entry raised, or its process was lost.
+        """
+        try:
+            content = self._process.ask(order, *arguments)
+        except Lost as lost:
+            raise PolicyError(f"policy {plain_text(self._path)} cannot {order}: {lost}") from None
+        if "failed" in content:
+            self._process.end()
+            raise PolicyError(plain_text(content["failed"], 600))
+        return content
+
+    def _ask(self, packed: Any) -> Mapping[str, Any]:
+        try:
+            content = self._process.ask("step", packed, timeout_s=self._answer_s)
+        except Lost as lost:
+            self._lost = str(lost)
+            return {}
+        if "failed" in content:
+            return {agent_id: {"raised": "Error", "text": content["failed"]} for agent_id in self._ids}
+        answers = content.get("answers")
+        return answers if isinstance(answers, dict) else {}
+
+    def _checked(self, agent_id: str, answer: Any) -> Action:
+        action, found = self._read(agent_id, answer if isinstance(answer, dict) else {})
+        if found is None:
+            return action
+        self.held[agent_id] = f"{found[0]}: {found[1]}"
+        self._reporter.failed(agent_id, *found)
+        return HOLD
+
+    def _read(self, agent_id: str, answer: Mapping[str, Any]) -> tuple[Action, tuple[str, str] | None]:
+        """An action, and what is wrong with it as (kind, explanation)."""
+        if self._lost:
+            return None, ("process ended", f"{self._lost}; its boats hold for the rest of the game")
+        spent_ns = answer.get("ns")
+        if isinstance(spent_ns, int) and 0 <= spent_ns < MOST_NS:
+            self._reporter.timed(agent_id, spent_ns)
+        if "raised" in answer:
+            return None, (f"raised {plain_text(answer['raised'], 60)}", plain_text(answer.get("text"), 500))
+        action = from_plain(answer.get("action"))
+        found = self._reader.problem(agent_id, action)
+        return action, found and (found[0], plain_text(found[1], 500))
+
+
+def is_entry(name: str) -> bool:
+    """Whether a policy's name is that of foreign code: a path, or ``sb3:`` and one."""
+    return name not in policies.names() and (name.startswith(SB3_PREFIX) or looks_like_path(name))
+
+
+def make_team(name: str, game: int | None = None, trust: bool = False, answer_s: float = ANSWER_S) -> TeamPolicy:
+    """A team policy by name, in a process of its own if it is foreign code.
+
+    Args:
+        name: as `steerclear.policies.make` takes it.
+        game: number of the game in its series.
+        trust: also load models that lie among entries, see `steerclear.policies.load_sb3`.
+        answer_s: time foreign code has for a step, s.
+
+    Raises:
+        PolicyError: there is no such policy, or it cannot be loaded.
+    """
+    if not is_entry(name):
+        return policies.make(name, game=game)
+    options = {"allow_code": trust or None} if name.startswith(SB3_PREFIX) else {}
+    lacking = unlimited()
+    if lacking:
+        _say_once(lacking)
+        if "this one" in lacking:
+            return policies.make(name, **options)
+    return EntryTeam(name, answer_s, **options)
+
+
+@cache
+def _say_once(words: str) -> None:
+    logger.warning("%s", words)

@@ -1,0 +1,144 @@
+"""A well-behaved entry plays in its own process what it plays in ours, to the bit."""
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from steerclear import policies
+from steerclear.experiments import match
+from steerclear.experiments.entries import limits
+from steerclear.experiments.entries import team as entry_team
+from steerclear.experiments.entries.answers import Unreadable, from_plain, to_plain
+from steerclear.experiments.entries.packing import Packer, Unpacker
+from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
+from steerclear.experiments.match import play_match
+from steerclear.experiments.spec import MatchSpec
+from steerclear.shield.exceptions import PolicyError
+
+DICE = """
+self.n += 1
+seen, place = full_obs_normalized[agent_id], global_state[(agent_id, "pos")]
+raw = full_obs[agent_id]
+r = random.random() + np.random.rand() + np.random.standard_normal() * 0.1
+kinds = (
+    int(abs(r) * 4), np.array([abs(r), float(seen[0]) * 180], dtype=np.float32), (1.0 + r / 4, float(place[0])),
+    np.int64(3), [1.5, -20.0 * r], "PC", None, (float("nan"), 0.0), np.float32([1.0, sum(raw.values()) % 90])
+)
+return kinds[self.n % len(kinds)]
+"""
+
+
+def test_games_are_the_same_to_the_bit(write_entry, monkeypatch):
+    entry = write_entry(DICE, start="self.n = 0", head="import random\nimport numpy as np")
+    spec = MatchSpec("aamas2024", entry, "medium", rules={"max_time_s": 4.0}, shield={}, seed=3)
+    apart, again = play_match(spec), play_match(spec)
+    monkeypatch.setattr(match, "make_team", lambda name, game, trust, answer_s: policies.make(name, game=game))
+    here = play_match(spec)
+    for other in (apart, again):
+        for name, array in here.record.items():
+            np.testing.assert_array_equal(array, other.record[name])
+        timed = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
+        assert {k: v for k, v in other.row.items() if k not in timed} == {
+            k: v for k, v in here.row.items() if k not in timed
+        }
+    assert here.row["policy_failures"] > 0, "the two name failures alike as well"
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        None, 3, -1, True, 2.5, float("inf"), "PC", (1.5, 20.0), [1.5, 20], (np.float32(0.1), np.int64(4)), np.int64(7),
+        np.array(4), np.array([1.5, 0.1], dtype=np.float32), np.zeros((2, 2)), np.array([True]), (), np.array([]),
+    ],
+)  # fmt: skip
+def test_actions_travel_unchanged(action):
+    again = from_plain(to_plain(action))
+    assert type(again) is type(action)
+    np.testing.assert_array_equal(again, action)
+    assert getattr(again, "dtype", None) == getattr(action, "dtype", None)
+
+
+@pytest.mark.parametrize("action", [object(), b"x", 1j, np.array([1j]), "x" * 100, [0] * 100, 10**30, {"a": 1}, {4}])
+def test_what_is_no_action_still_looks_like_itself(action):
+    again = from_plain(to_plain(action))
+    assert isinstance(again, Unreadable)
+    assert repr(again)[:5] == repr(action)[:5]
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["array", "dtype", "tuple", "list", "unreadable"]) | st.text(max_size=2), inner
+        )
+    ),
+)
+
+
+@given(JSON | st.builds(lambda a, d: {"array": a, "dtype": d}, JSON, st.sampled_from(["float64", "int8", "bool", "x"])))
+def test_whatever_an_entry_says_is_read_without_an_error(content):
+    from_plain(content)
+
+
+def test_steps_are_packed_small_and_unpacked_the_same(game):
+    _, observations, infos = game
+    packer, unpacker = Packer(), Unpacker()
+    for _ in range(2):
+        seen, told = unpacker.unpack(packer.pack(observations, infos))
+        assert list(seen) == list(observations)
+        for agent_id, row in observations.items():
+            np.testing.assert_array_equal(seen[agent_id], row)
+            assert told[agent_id]["unnorm_obs"] == infos[agent_id]["unnorm_obs"]
+            assert list(told[agent_id]["global_state"]) == list(infos[agent_id]["global_state"])
+    assert packer.pack(observations, infos)[2] is None, "keys travel once"
+    with pytest.raises(PolicyError, match="infos lack"):
+        packer.pack(observations, {})
+
+
+def test_only_foreign_code_is_put_apart(write_entry):
+    assert type(make_team("medium")) is type(policies.make("medium"))
+    assert not any(map(is_entry, ("medium", "keyboard", "nobody")))
+    assert all(map(is_entry, ("sb3:x.zip", "a/b", "x.zip", write_entry("return 4"))))
+    with pytest.raises(PolicyError, match="did you mean medium"):
+        make_team("mediun")
+    with pytest.raises(PolicyError, match="there is no policy at"):
+        make_team("nowhere/entry.zip")
+
+
+def test_a_model_plays_in_its_own_process_as_in_ours(game, tmp_path):
+    library = pytest.importorskip("stable_baselines3")
+    gymnasium = pytest.importorskip("gymnasium")
+
+    class Spaces(gymnasium.Env):
+        observation_space = gymnasium.spaces.Box(-1.0, 1.0, (game[0].core.n_obs,), np.float32)
+        action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    options = {"policy_kwargs": {"net_arch": [4]}, "seed": 0, "device": "cpu"}
+    library.SAC("MlpPolicy", Spaces(), **options).save(tmp_path / "model")
+    env, observations, infos = game
+    teams = [policies.make(f"sb3:{tmp_path / 'model.zip'}"), make_team(f"sb3:{tmp_path / 'model.zip'}")]
+    assert isinstance(teams[1], EntryTeam)
+    here, apart = [], []
+    for team, actions in zip(teams, (here, apart), strict=True):
+        team.reset(env, ["agent_0", "agent_2"], 0)
+        actions.append(team.act(observations, infos))
+        assert team.report().failures == ()
+        team.close()
+    assert here == apart
+
+
+def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_entry, monkeypatch, caplog):
+    monkeypatch.delattr(limits.os, "fork")
+    entry_team._say_once.cache_clear()
+    for _ in range(2):
+        team = make_team(write_entry("return 4"))
+        assert not isinstance(team, EntryTeam)
+        team.close()
+    assert caplog.text.count("entries cannot be run in a process of their own on this system") == 1
+    monkeypatch.undo()
+    assert limits.unlimited() == "" or sys.platform != "linux"
+    monkeypatch.setattr(limits.sys, "platform", "darwin")
+    assert "memory and number of processes of entries are not limited" in limits.unlimited()
