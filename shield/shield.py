@@ -22,6 +22,7 @@ from .jit import Array, BoolArray
 from .limiting import tell_of_limits, within_limits
 from .linearised import add_slack
 from .memory import Memory, new_memory
+from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
@@ -124,7 +125,8 @@ class Shield:
         twin.decide(*tight_spot())
         if fleet is not None:
             fleet.check()
-            twin._scene(fleet)
+            order = order_of(fleet.names)
+            twin._scene(fleet if order is None else ordered(fleet, Commands.relative_deg(fleet.state[:, :2]), order)[0])
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
@@ -136,7 +138,7 @@ class Shield:
             surroundings: fixed things now, when they differ from the ones given at construction.
 
         Returns:
-            One decision per boat, in the fleet's order.
+            One decision per boat, in the fleet's order, which decides nothing: see `ordering`.
 
         Raises:
             FleetError: fleet or commands are of another kind, shapes do not fit, a state is not finite or a track too
@@ -152,6 +154,13 @@ class Shield:
         fleet.check()
         if wanted.values.shape != (len(fleet), 2):
             raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+        order = order_of(fleet.names)
+        if order is None:
+            return self._decide(fleet, wanted, surroundings, started)
+        return as_given(self._decide(*ordered(fleet, wanted, order), surroundings, started), fleet, wanted, order)
+
+    def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
+        """`decide`, of boats in the order of their names."""
         boats = self._scene(fleet)
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)

@@ -19,6 +19,10 @@ from .rating import PAIR_SAFE, STRAIGHT_SAFE, rate_path
 
 SWEEPS = 3
 
+SAME_MERIT = 1e-9
+"""Manoeuvres whose merits differ by no more, m, are alike: rounding, which differs from place to place, decides
+nothing. Of such ones the first is taken, to starboard before to port, as the rules of the road ask."""
+
 
 @lean_kernel
 def _take(i: int, slot: int, merit: float, work: Work) -> None:
@@ -101,7 +105,7 @@ def choose_plan(
             else:
                 no_more_port = togo
         kept_merit = merit + preference(i, p, side, togo, merit, boats, tuning, memory)
-        if kept_merit > best:
+        if kept_merit > best + SAME_MERIT:
             best = kept_merit
             _take(i, trial, merit, work)
         sealed = done == 1 and work.sealed[trial] and kept_merit == merit

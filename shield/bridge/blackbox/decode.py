@@ -83,6 +83,7 @@ def _decisions(message: Mapping[str, Any], fleet: Fleet | None, wanted: Commands
         certificate_m=_column(rows, "certificate_m", from_json),
         slack_m=_column(rows, "slack_m", from_json),
         bound=_column(rows, "bound", int).astype(np.int64),
+        cut_short=_column(rows, "cut_short", bool).astype(np.bool_) if rows and "cut_short" in rows[0] else None,
         solve_time_s=from_json(message["solve_time_s"]),
     )
 

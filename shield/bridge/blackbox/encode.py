@@ -82,6 +82,8 @@ def _boats(
         _spread(rows, "certificate_m", row_to_json(decisions.certificate_m))
         _spread(rows, "slack_m", row_to_json(decisions.slack_m))
         _spread(rows, "bound", decisions.bound.tolist())
+        if decisions.cut_short is not None:
+            _spread(rows, "cut_short", decisions.cut_short.tolist())
     return rows
 
 

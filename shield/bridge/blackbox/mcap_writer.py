@@ -221,5 +221,6 @@ def _copied(tick: Tick, fleet: Fleet, wanted: Commands | None) -> Decisions | No
         reason=decisions.reason.copy(),
         certificate_m=decisions.certificate_m.copy(),
         slack_m=decisions.slack_m.copy(),
+        cut_short=None if decisions.cut_short is None else decisions.cut_short.copy(),
         bound=decisions.bound.copy(),
     )

@@ -58,6 +58,7 @@ _BOAT = record(
     certificate_m=NUMBER,
     slack_m=NUMBER,
     bound=WHOLE,
+    cut_short=FLAG,
 )
 
 _READING = record(

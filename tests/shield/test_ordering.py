@@ -1,0 +1,90 @@
+"""What is decided hangs on what is seen: not on the order boats are listed in, nor on where the field's origin lies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shield_loops import scattered
+from steerclear.shield import Commands, Fleet, Shield
+from steerclear.shield.decision import Reason
+from steerclear.shield.ordering import order_of
+from steerclear.shield.platforms import layout as L
+
+STEPS = 4
+
+
+def scene(seed, platform="heron", ours=3, others=3, side_m=14.0):
+    random = np.random.default_rng(seed)
+    n = ours + others
+    state = scattered(random, 1, [platform] * n, side_m)[0]
+    team = np.array([0] * ours + [1] * others)
+    fleet = Fleet(state, team, (platform,) * n, team == 0, tuple(f"boat_{i}" for i in range(n)))
+    turns = [np.stack([np.full(n, 2.0), random.uniform(-150.0, 150.0, n)], axis=1) for _ in range(STEPS)]
+    return fleet, turns
+
+
+def listed(fleet, rows):
+    """The same boats in another order."""
+    rows = list(rows)
+    taken = {name: getattr(fleet, name)[rows] for name in ("state", "team", "controlled")}
+    texts = {name: tuple(getattr(fleet, name)[i] for i in rows) for name in ("platforms", "names")}
+    return replace(fleet, **taken, **texts)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), rows=st.permutations(range(6)), platform=st.sampled_from(["heron", "surveyor"]))
+def test_the_order_of_a_fleet_changes_no_bit(seed, rows, platform):
+    fleet, turns = scene(seed, platform)
+    one, other = Shield(), Shield()
+    for turn in turns:
+        told = one.decide(fleet, Commands.relative_deg(turn))
+        again = other.decide(listed(fleet, rows), Commands.relative_deg(turn[list(rows)]))
+        for name in ("intervened", "reason", "certificate_m", "slack_m", "cut_short"):
+            assert (getattr(told, name)[list(rows)] == getattr(again, name)).all(), name
+        assert (told.sent.values[list(rows)] == again.sent.values).all()
+        assert [told[i].binding for i in rows] == [d.binding for d in again]
+        assert [told[i].boat for i in rows] == [d.boat for d in again]
+
+
+def moved(fleet, quarter_turns, shift_m):
+    """The same scene elsewhere: turned clockwise by right angles about the origin, then shifted."""
+    state = fleet.state.copy()
+    for _ in range(quarter_turns):
+        state[:, L.X], state[:, L.Y] = state[:, L.Y].copy(), -state[:, L.X]
+        state[:, L.HEADING] = (state[:, L.HEADING] + 90.0 + 180.0) % 360.0 - 180.0
+    state[:, [L.X, L.Y]] += shift_m
+    return replace(fleet, state=state)
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_where_a_scene_lies_and_which_way_it_faces_changes_nothing(platform):
+    changed = 0
+    for seed in range(120):
+        fleet, turns = scene(seed, platform)
+        elsewhere = moved(fleet, 1 + seed % 3, (731.3, -412.7))
+        one, other = Shield(), Shield()
+        for turn in turns:
+            told = one.decide(fleet, Commands.relative_deg(turn))
+            again = other.decide(elsewhere, Commands.relative_deg(turn))
+            assert (told.reason == again.reason).all(), seed
+            np.testing.assert_allclose(told.sent.values, again.sent.values, atol=1e-5, err_msg=str(seed))
+            changed += int((told.reason != Reason.PASSED).sum())
+    assert changed > 1000  # of 1,920: the scenes are such that there is something to decide
+
+
+@pytest.mark.parametrize(
+    ("names", "order"),
+    [
+        (("boat_0", "boat_2", "boat_10"), None),
+        (("boat_10", "boat_2", "boat_0"), [2, 1, 0]),
+        (("red", "blue"), [1, 0]),
+        (("a", "a"), None),
+        (("7", "b7", "07"), [2, 0, 1]),
+        ((), None),
+    ],
+)
+def test_names_are_ordered_by_the_numbers_in_them(names, order):
+    found = order_of(names)
+    assert found is None if order is None else found.tolist() == order
