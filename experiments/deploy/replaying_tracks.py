@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 GONE_S = 1.5
 """A boat that nothing was heard of for longer than this is not there, s."""
 _MATCH_S = 1e-6
+MOST_STEPS = 10_000_000
+"""Ten days at 10 Hz: more is damage."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,10 @@ class TrackBuilder:
         if len(self._times) < 2 or not names:
             raise LogError("the log holds no two ticks with boats; there is nothing to replay without the shield")
         dt_s = self._header.config.dt_s
-        steps = int((self._times[-1] - self._times[0]) / dt_s + 0.5)
+        span = (self._times[-1] - self._times[0]) / dt_s + 0.5
+        if not 1.0 <= span < MOST_STEPS:
+            raise LogError(f"the times of the log's ticks span {span:g} steps; there is nothing to replay")
+        steps = int(span)
         time_s = self._times[0] + dt_s * np.arange(steps + 1)
         kinds = [self._header.platforms.get(self._kind[name], self._kind[name]) for name in names]
         params = np.array([get_platform(kind).pack() for kind in kinds])

@@ -20,6 +20,8 @@ from ...exceptions import LogError
 
 GOES_ON, ENDS = "part", "log"
 """How a closing link ends its file: another part follows, or none."""
+MOST = 1 << 62
+"""No log has so many records."""
 _KEY_USE = b"steerclear black box"
 _DIGITS = 2 * hashlib.sha256().digest_size
 
@@ -52,7 +54,7 @@ class ChainHead:
         """
         try:
             found = cls(**json.loads(text))
-            sound = len(bytes.fromhex(found.head)) == _DIGITS // 2 and int(found.count) >= 0
+            sound = len(bytes.fromhex(found.head)) == _DIGITS // 2 and 0 <= int(found.count) < MOST
         except (TypeError, ValueError, RecursionError):
             sound = False
         if not sound:
@@ -86,7 +88,9 @@ class Link:
         try:
             found = cls(int(content["count"]), *(str(content[name]) for name in ("digest", "end", "code")))
             bytes.fromhex(found.digest)
-        except (KeyError, TypeError, ValueError):
+            if not 0 <= found.count < MOST:
+                raise ValueError("no number of records")
+        except (KeyError, TypeError, ValueError, OverflowError):
             raise LogError("a link of the log's chain is damaged") from None
         return found
 

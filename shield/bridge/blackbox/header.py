@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ...config import ShieldConfig
@@ -18,6 +18,8 @@ from .numbers import plain, restored
 from .origin import describe_machine, source_digest, table_digests, versions
 
 LOG_VERSION = 2
+LATEST_S = 1e12
+"""No clock of a loop tells a later time, s."""
 READ_VERSIONS = (1, 2)
 """Logs of version 1 have no chain, and texts where numbers are not finite."""
 
@@ -135,10 +137,37 @@ class LogHeader:
         try:
             return cls(**_parts(message))
         except SteerclearError as error:
-            used = json.loads(str(message.get("versions", "{}"))).get("steerclear", "unknown")
-            raise LogError(f"the log's header does not fit this version ({error}); it was written by {used}") from None
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise LogError(
+                f"the log's header does not fit this version ({error}); it was written by {_writer(message)}"
+            ) from None
+        except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise LogError(f"the log's header is damaged ({type(error).__name__}: {error})") from None
+
+
+def _writer(message: Mapping[str, Any]) -> str:
+    try:
+        return str(json.loads(str(message["versions"]))["steerclear"])
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return "an unknown version"
+
+
+def _finite(value: Any) -> float:
+    number = float(restored(value))
+    if not abs(number) < LATEST_S:
+        raise ValueError(f"{number} is no time")
+    return number
+
+
+def _texts(text: str) -> dict[str, str]:
+    """Names with texts, from JSON."""
+    return {str(name): str(value) for name, value in dict(json.loads(text)).items()}
+
+
+def _boat(row: Mapping[str, Any]) -> LoggedBoat:
+    boat = LoggedBoat(**row)
+    if boat.team not in (0, 1, 2) or not all(isinstance(text, str) for text in (boat.name, boat.agent, boat.platform)):
+        raise ValueError(f"{row} is no boat")
+    return replace(boat, team=int(boat.team), ours=bool(boat.ours))
 
 
 def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,17 +178,17 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
         "config": ShieldConfig.of(**_settings(restored(json.loads(message["shield"])))),
         "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
         "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
-        "boats": tuple(LoggedBoat(**row) for row in json.loads(message["boats"])),
+        "boats": tuple(_boat(row) for row in json.loads(message["boats"])),
         "frame": None if frame is None else FieldFrame(**frame),
         "field_size_m": None if size is None else (float(size[0]), float(size[1])),
         "fleet_text": str(message["fleet_yaml"]),
         "preset": str(message["preset"]),
         "policy": str(message["policy"]),
-        "notes": json.loads(message["notes"]),
-        "clock_s": restored(message["clock_s"]),
+        "notes": _texts(message["notes"]),
+        "clock_s": _finite(message["clock_s"]),
         "unix_ns": int(message["unix_ns"]),
-        "versions": json.loads(message["versions"]),
-        "tables": json.loads(message["tables"]),
+        "versions": _texts(message["versions"]),
+        "tables": _texts(message["tables"]),
         "sources": str(message["sources"]),
         "machine": str(message["machine"]),
         "version": message["version"],

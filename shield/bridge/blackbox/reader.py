@@ -68,8 +68,9 @@ class LogReader:
         self._topics: dict[int, str] = {}
         try:
             self._file: IO[bytes] = path.open("rb")
-        except OSError as error:
-            raise LogError(f"cannot open {path} ({error.strerror}); give a log that deploy wrote (.mcap)") from None
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise LogError(f"cannot open {path} ({why}); give a log that deploy wrote (.mcap)") from None
         try:
             self._messages = self._read()
             self.header = self._find_header()
@@ -90,8 +91,7 @@ class LogReader:
                     self.chain.deny()  # only logs with a chain have it
                 yield tick_from_json(content, self.header.platforms)
             elif topic == LOG_TOPIC:
-                row = _object(message)
-                yield LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
+                yield _line(message)
 
     def ticks(self) -> Iterator[Tick]:
         """Ticks, in order.
@@ -194,10 +194,18 @@ class LogReader:
         self.damage.append(text)
 
 
+def _line(message: Message) -> LogLine:
+    row = _object(message)
+    try:
+        return LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise LogError("the log holds a line that is none; it is damaged or of another version") from None
+
+
 def _object(message: Message) -> Mapping[str, Any]:
     try:
         found = json.loads(message.data)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise LogError(f"the log holds a message that is not JSON ({error}); it is damaged") from None
     if not isinstance(found, dict):
         raise LogError("the log holds a message that is not an object; it is damaged or of another version")

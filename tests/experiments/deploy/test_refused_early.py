@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.orders import Orders
 from steerclear.experiments.deploy.preflight_file import measured_delay_s, path_of
 from steerclear.experiments.deploy.preflighting import preflight
@@ -11,6 +12,7 @@ from steerclear.experiments.deploy.station import Station
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import SteerclearError
 from test_deploy_run import free_ports
+from typer.testing import CliRunner
 
 ACCEPTED = ("disk", "geofence", "certificate", "known", "drill", "latency", "rates", "spread", "clock", "autopilot")
 
@@ -114,3 +116,13 @@ def test_a_kept_preflight_of_a_wrong_form_counts_as_missing(write, content):
     assert measured_delay_s(fleet, None) is None
     path_of(fleet, None).write_text(json.dumps({"checks": [], "refused": [], "unix_s": 1.0}))
     assert measured_delay_s(fleet, None) is None
+
+
+@pytest.mark.parametrize("command", [["deploy", "--plain"], ["preflight"]], ids=["deploy", "preflight"])
+@pytest.mark.parametrize("name", ["log folder is a file", "log folder of the system", "too narrow", "no such rules"])
+def test_on_the_command_line_a_mistake_is_one_line_and_2(write, name, command):
+    path = write(*MISTAKES[name][0])
+    result = CliRunner().invoke(app, [command[0], str(path), *command[1:]])
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("\n") == 1
