@@ -67,6 +67,7 @@ def deploy(
     """
     if demo:
         policies.check(opponents)
+    policies.check(policy)
     say_what_runs((policy,), trust)
     orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog, trust))
     file = load_fleet(orders.fleet_file)

@@ -30,11 +30,11 @@ def say_what_runs(names: Sequence[str], trust: bool) -> None:
     """Say of each model, before any is loaded, that loading runs its code.
 
     Raises:
-        PolicyError: there is no such policy, or it is a model of others and not trusted.
+        PolicyError: there is no such model, or it is one of others and not trusted.
     """
     for name in dict.fromkeys(names):
-        policies.check(name)
         if is_entry(name) and name.startswith(SB3_PREFIX):
+            policies.check(name)
             path = Path(name.removeprefix(SB3_PREFIX)).expanduser()
             check_origin(path, trust or None)
             err().print(code_warning(path), markup=False, soft_wrap=True)

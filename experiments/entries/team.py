@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from steerclear.policies.protocol import Action, TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
 from steerclear.policies.scripted.team import boat_numbers, game_core
+from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.policies.words import plain_text
 from steerclear.shield.exceptions import PolicyError
 
@@ -45,14 +47,14 @@ class EntryTeam:
     """
 
     def __init__(self, path: str, answer_s: float = ANSWER_S, limits: Limits = LIMITS, **options: Any) -> None:
-        policies.check(path)
+        _check_exists(path)
         self._path, self._answer_s = path, answer_s
         self._process = EntryProcess(path, limits)
         self._lost = ""
         self.held: dict[str, str] = {}
         """Boats that hold in this step, and why."""
         self._ids: list[str] = []
-        self.name = plain_text(self._first("load", path, options).get("name"), 80)
+        self.name = plain_text(self._first("load", _absolute(path), options).get("name"), 80)
         self._reporter = Reporter(self.name)
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
@@ -139,6 +141,24 @@ class EntryTeam:
         action = from_plain(answer.get("action"))
         found = self._reader.problem(agent_id, action)
         return action, found and (found[0], plain_text(found[1], 500))
+
+
+def _absolute(path: str) -> str:
+    """The same entry wherever its process was started."""
+    prefix = SB3_PREFIX if path.startswith(SB3_PREFIX) else ""
+    return f"{prefix}{Path(path.removeprefix(SB3_PREFIX)).expanduser().absolute()}"
+
+
+def _check_exists(path: str) -> None:
+    """Look before a process is started, in the words of whoever would load it.
+
+    Raises:
+        PolicyError: there is nothing.
+    """
+    if path.startswith(SB3_PREFIX):
+        policies.check(path)
+    elif not Path(path).expanduser().exists():
+        raise PolicyError(f"there is no submission at {path}; give a folder or a zip with {ENTRY_FILE}")
 
 
 def is_entry(name: str) -> bool:

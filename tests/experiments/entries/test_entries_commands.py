@@ -75,9 +75,7 @@ def test_an_entry_that_cannot_be_loaded_is_bad_input(write_entry, command):
     assert not Path("results").exists()
 
 
-@pytest.mark.parametrize(
-    "command", [["evaluate"], ["ablate", "--own"], ["play", "--own"], ["deploy", "--demo", "--policy"]]
-)
+@pytest.mark.parametrize("command", ["evaluate", "ablate --own", "play --own", "deploy --demo --policy"])
 def test_a_model_among_entries_is_refused_before_it_is_loaded(command):
     Path("entries").mkdir()
     with zipfile.ZipFile("entries/model.zip", "w") as archive:

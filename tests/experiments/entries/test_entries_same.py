@@ -104,7 +104,7 @@ def test_only_foreign_code_is_put_apart(write_entry):
     assert all(map(is_entry, ("sb3:x.zip", "a/b", "x.zip", write_entry("return 4"))))
     with pytest.raises(PolicyError, match="did you mean medium"):
         make_team("mediun")
-    with pytest.raises(PolicyError, match="there is no policy at"):
+    with pytest.raises(PolicyError, match="there is no submission at"):
         make_team("nowhere/entry.zip")
 
 
