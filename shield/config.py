@@ -13,12 +13,17 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
+class _Unsaid(float):
+    """A default that a game's own distance takes the place of; any value that is given stays."""
+
+
 @dataclass(frozen=True)
 class ShieldConfig:
     """Settings of the shield.
 
     Attributes:
-        separation_m: distance to keep between boat centres, m.
+        separation_m: distance to keep between boat centres, m. Where nobody gives it, a wrapper or `games_shield` takes
+            the distance at which its game counts a collision, if that is larger.
         buffer_m: added to the separation for rounding and sampling, m.
         dt_s: step of the decision loop and of the boat model, s.
         certificate: name of the certificate, see `certificates.CERTIFICATES`.
@@ -54,13 +59,14 @@ class ShieldConfig:
         max_track_age_s: tracks older than this are refused, s.
         delay_s: time from decision to effect, s, rounded up to whole steps: boats are run on by it before deciding.
         edge_m: distance to keep from the field edge, m; None: the edge is not kept.
-        hull_m: distance to keep from walls of obstacles, m.
+        hull_m: distance to keep from walls of obstacles, m. Where nobody gives it, a wrapper or `games_shield` takes
+            the radius of its game's boats, if that is larger and there are obstacles.
 
     Raises:
         ConfigError: a value is of the wrong type, not finite or out of range.
     """
 
-    separation_m: float = 2.5
+    separation_m: float = _Unsaid(2.5)
     buffer_m: float = 0.05
     dt_s: float = 0.1
     certificate: str = "auto"
@@ -85,12 +91,14 @@ class ShieldConfig:
     max_track_age_s: float = 2.0
     delay_s: float = 0.0
     edge_m: float | None = 0.2
-    hull_m: float = 1.0
+    hull_m: float = _Unsaid(1.0)
 
     def __post_init__(self) -> None:
         from .certificates import CERTIFICATES
         from .program import check_solver
 
+        unsaid = frozenset(entry.name for entry in fields(self) if isinstance(getattr(self, entry.name), _Unsaid))
+        object.__setattr__(self, "_unsaid", unsaid)  # no field: two configs of the same numbers are equal
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)
@@ -103,6 +111,10 @@ class ShieldConfig:
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
         check_solver(self.solver)
+
+    def said(self, name: str) -> bool:
+        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
+        return name not in self.__dict__["_unsaid"]
 
     @classmethod
     def of(cls, **settings: Any) -> ShieldConfig:
