@@ -17,8 +17,26 @@ class _Unsaid(float):
     """A default that a game's own distance takes the place of; any value that is given stays."""
 
 
+class _Sayings:
+    """Which settings nobody gave, kept beside the settings: of the same numbers two configs are equal."""
+
+    __slots__ = ("_unsaid",)
+    _unsaid: frozenset[str]
+
+    def said(self, name: str) -> bool:
+        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
+        return name not in self._unsaid
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_unsaid": self._unsaid}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+
+
 @dataclass(frozen=True)
-class ShieldConfig:
+class ShieldConfig(_Sayings):
     """Settings of the shield.
 
     Attributes:
@@ -98,7 +116,7 @@ class ShieldConfig:
         from .program import check_solver
 
         unsaid = frozenset(entry.name for entry in fields(self) if isinstance(getattr(self, entry.name), _Unsaid))
-        object.__setattr__(self, "_unsaid", unsaid)  # no field: two configs of the same numbers are equal
+        object.__setattr__(self, "_unsaid", unsaid)
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)
@@ -111,10 +129,6 @@ class ShieldConfig:
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
         check_solver(self.solver)
-
-    def said(self, name: str) -> bool:
-        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
-        return name not in self.__dict__["_unsaid"]
 
     @classmethod
     def of(cls, **settings: Any) -> ShieldConfig:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from pettingzoo import AECEnv
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 
 from ..commands import Commands
 from ..decision import Decisions
+from ..exceptions import ConfigError
 from ..jit import Array
 from ..shield import Shield
 from .checks import refuse_second, shield_for
@@ -52,6 +54,11 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         keep_out: bool = True,
         reader: GameReader | None = None,
     ) -> None:
+        if isinstance(env, AECEnv):
+            raise ConfigError(
+                f"{type(env).__name__} takes one boat's action at a time; give pettingzoo.utils.aec_to_parallel(env), "
+                "or shield the parallel environment inside it"
+            )
         super().__init__(env)
         self.team = team_number(team)
         self._reader: GameReader = reader_of(env) if reader is None else reader
