@@ -110,7 +110,7 @@ class BatchedMctf:
 
         Args:
             mask: (B,) bool, which games; None for all.
-            seed: new seed for all games; None goes on with each game's random numbers.
+            seed: new seed for those games, game b the same as with all; None goes on with each game's random numbers.
 
         Returns:
             Observations (B, n, n_obs) float32, normalised, of all games.
@@ -122,15 +122,16 @@ class BatchedMctf:
         if chosen.shape != (self.n_games,) or chosen.dtype != np.bool_:
             raise GameError(f"mask is {chosen.dtype} of shape {chosen.shape}; give bool of shape ({self.n_games},)")
         if seed is not None:
-            self.seed(seed)
+            self.seed(seed, chosen)
         reset_games(self.rules, self.games, chosen, self._places, self.config)
         return self.observe()
 
-    def seed(self, seed: int | None) -> None:
-        """Seed the random numbers of all games; None takes entropy from the machine."""
+    def seed(self, seed: int | None, mask: BoolArray | None = None) -> None:
+        """Seed the random numbers of all games, or of those in ``mask`` (B,); None takes entropy from the machine."""
         if seed is not None:
             check_count("seed", seed, low=0)
-        self.games.rng[:] = seed_states(seed, self.n_games)
+        chosen = slice(None) if mask is None else mask
+        self.games.rng[chosen] = seed_states(seed, self.n_games)[chosen]
 
     def reset_game(self, game: int, init: Mapping[str, Any]) -> np.ndarray:
         """Start one game from a partial state, see `steerclear.env.initial.start_from`; the others go on.

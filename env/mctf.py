@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         self.render_mode = render_mode
         self.reward = reward
         self.command_filter = command_filter
+        self._step_filters: list[CommandFilter] = []
         self.possible_agents = list(self.config.agent_ids)
         self.agents: list[str] = []
         points = field_points(self.core.field.size)
@@ -143,7 +145,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             raise GameError("the game has not begun or is over; call reset() first")
         before = None if self.reward is None else self.view()
         commands = self._decoder.decode(actions, self.core.state[0])
-        _, rewards, terminated, truncated = self.core.step(commands[np.newaxis], self.command_filter)
+        _, rewards, terminated, truncated = self.core.step(commands[np.newaxis], self._filter_of_step())
         ids = self.agents
         outcome = (
             self._observations(),
@@ -157,6 +159,35 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         if self.render_mode == "human":
             self.render()
         return outcome
+
+    @contextmanager
+    def filtered(self, command_filter: CommandFilter) -> Iterator[None]:
+        """Steps taken inside pass this filter too: after `command_filter`, and after filters entered later.
+
+        It is how a wrapper stands between decision and motion in its own steps, and in nobody else's.
+
+        Args:
+            command_filter: as ``env.command_filter``.
+        """
+        self._step_filters.append(command_filter)
+        try:
+            yield
+        finally:
+            self._step_filters.pop()
+
+    def _filter_of_step(self) -> CommandFilter | None:
+        """All filters of this step as one; None where there is none."""
+        own = [] if self.command_filter is None else [self.command_filter]
+        filters = [*own, *reversed(self._step_filters)]
+        if len(filters) < 2:
+            return filters[0] if filters else None
+
+        def all_of_them(core: BatchedMctf, commands: Array) -> Array:
+            for one in filters:
+                commands = one(core, commands)
+            return commands
+
+        return all_of_them
 
     def decode(self, actions: Mapping[str, Any]) -> Array:
         """Commands (n, 2), speed m/s and relative heading deg, of actions of any kind; the game stays as it is.
@@ -199,6 +230,10 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         if self.renderer is not None:
             self.renderer.close()
             self.renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made of: the game, without its window; a copy opens one of its own at the first picture."""
+        return {**self.__dict__, "renderer": None}
 
     def _observations(self) -> dict[str, np.ndarray]:
         rows = self.core.observations[0].copy()

@@ -114,10 +114,10 @@ class Match:
 
     def _step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
         try:
-            return self.shielding.env.step(actions)
+            return self.shielding.step(actions)
         except GameError:  # an answer the game refuses; nothing has moved yet
             mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
-            return self.shielding.env.step(mended)
+            return self.shielding.step(mended)
 
     def _meta(self) -> dict[str, Any]:
         return meta_of(

@@ -1,4 +1,4 @@
-"""The conditions at work in one game: they stand round its command filter; the game and its rules stay as they are."""
+"""The conditions at work in one game: they stand round its shields; the game and its rules stay as they are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from zlib import crc32
 
 import numpy as np
 from steerclear.env.config import GameConfig
-from steerclear.env.core import BatchedMctf, CommandFilter
+from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import absolute_commands
 from steerclear.shield.exceptions import ConfigError
@@ -70,24 +70,19 @@ class Sea:
         """What a shield reads the game by."""
         return _Reader(self._env, self)
 
-    def surround(self) -> None:
-        """Stand round the game's command filter; call once per game, after its reset."""
-        state, inner = self._env.core.state[0], self._env.command_filter
-        held = state[self._own][:, [L.SPEED, L.HEADING]]  # until the first command arrives
+    def begin(self) -> None:
+        """Fill what is on its way; call once per game, after its reset."""
+        held = self._env.core.state[0, self._own][:, [L.SPEED, L.HEADING]]  # until the first command arrives
         self._waiting = deque([held] * self._steps)
 
-        def through(core: BatchedMctf, commands: Array) -> Array:
-            self._look(core)
-            sent = commands if inner is None else inner(core, commands)
-            arrived = self._arrived(core, sent)
-            core.state[:, :, [L.X, L.Y]] += self.current_mps * self._dt_s
-            return arrived
+    def carry(self, core: BatchedMctf, commands: Array) -> Array:
+        """Let the boats drift for a step; the commands (1, n, 2) that take effect now, when these are sent."""
+        arrived = self._arrived(core, commands)
+        core.state[:, :, [L.X, L.Y]] += self.current_mps * self._dt_s
+        return arrived
 
-        outer: CommandFilter = through
-        self._env.command_filter = outer
-
-    def _look(self, core: BatchedMctf) -> None:
-        """Move the errors on by a step."""
+    def look(self, core: BatchedMctf) -> None:
+        """Move the errors on by a step; call it before anything reads the game."""
         bound_m = self._conditions.noise_m
         observe(core.state, self._error, self._seeds, bound_m, self._first, self._dt_s, self._seen)
         self._first = False

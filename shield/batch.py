@@ -14,6 +14,7 @@ from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .flow import decide_compiled
+from .game_facts import facts_of_games, told_distances
 from .jit import Array, BoolArray, IntArray, kernel
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
@@ -204,27 +205,43 @@ class BatchedShield:
             raise ConfigError(f"no boat is of team {team!r}; give one of {sorted(set(self.team))}")
         if self.flag_of not in (None, team):
             raise ConfigError(f"this shield keeps off the flag of team {self.flag_of}; build another for team {team}")
+        return GamesFilter(self, team, shield_autopilot)
 
-        checked: Any = None
-
-        def command_filter(core: Any, commands: Array) -> Array:
-            nonlocal checked
-            if checked is not core:
-                self.check_games(core)
-                checked = core
-            ours = np.broadcast_to(core.team == team, core.driven.shape)
-            ours = ours.copy() if shield_autopilot else ours & ~core.driven
-            return self.decide(core.state, commands, ours)
-
-        return command_filter
-
-    def check_games(self, core: Any) -> None:
+    def check_games(self, core: Any, team: int | None = None) -> None:
         """Check that games are those the shield was built for: boats, teams, number and step.
+
+        The log says, once, if it keeps boats less far apart than the games count collisions.
+
+        Args:
+            core: the `BatchedMctf`.
+            team: the team it decides for; None: any.
 
         Raises:
             ConfigError: they are not.
         """
         check_same_games(core, len(self.reason), self.platforms, self.team, self.config.dt_s)
+        told_distances(self.config, facts_of_games(core), team)
+
+
+class GamesFilter:
+    """The command filter of a shield for games, see `BatchedShield.filter_for`; copies of it decide by copies of it."""
+
+    def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
+        self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
+        self._checked: Any = None
+
+    def __call__(self, core: Any, commands: Array) -> Array:
+        """Safe commands (B, n, 2) for games that the shield was built for.
+
+        Raises:
+            ConfigError: they are others.
+        """
+        if self._checked is not core:
+            self.shield.check_games(core, self.team)
+            self._checked = core
+        ours = np.broadcast_to(core.team == self.team, core.driven.shape)
+        ours = ours.copy() if self.shield_autopilot else ours & ~core.driven
+        return self.shield.decide(core.state, commands, ours)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

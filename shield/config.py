@@ -13,12 +13,35 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
+class _Unsaid(float):
+    """A default that a game's own distance takes the place of; any value that is given stays."""
+
+
+class _Sayings:
+    """Which settings nobody gave, kept beside the settings: of the same numbers two configs are equal."""
+
+    __slots__ = ("_unsaid",)
+    _unsaid: frozenset[str]
+
+    def said(self, name: str) -> bool:
+        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
+        return name not in self._unsaid
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_unsaid": self._unsaid}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+
+
 @dataclass(frozen=True)
-class ShieldConfig:
+class ShieldConfig(_Sayings):
     """Settings of the shield.
 
     Attributes:
-        separation_m: distance to keep between boat centres, m.
+        separation_m: distance to keep between boat centres, m. Where nobody gives it, a wrapper or `games_shield` takes
+            the distance at which its game counts a collision, if that is larger.
         buffer_m: added to the separation for rounding and sampling, m.
         dt_s: step of the decision loop and of the boat model, s.
         certificate: name of the certificate, see `certificates.CERTIFICATES`.
@@ -58,13 +81,14 @@ class ShieldConfig:
         max_track_age_s: tracks older than this are refused, s.
         delay_s: time from decision to effect, s, rounded up to whole steps: boats are run on by it before deciding.
         edge_m: distance to keep from the field edge, m; None: the edge is not kept.
-        hull_m: distance to keep from walls of obstacles, m.
+        hull_m: distance to keep from walls of obstacles, m. Where nobody gives it, a wrapper or `games_shield` takes
+            the radius of its game's boats, if that is larger and there are obstacles.
 
     Raises:
         ConfigError: a value is of the wrong type, not finite or out of range.
     """
 
-    separation_m: float = 2.5
+    separation_m: float = _Unsaid(2.5)
     buffer_m: float = 0.05
     dt_s: float = 0.1
     certificate: str = "auto"
@@ -90,12 +114,14 @@ class ShieldConfig:
     max_track_age_s: float = 2.0
     delay_s: float = 0.0
     edge_m: float | None = 0.2
-    hull_m: float = 1.0
+    hull_m: float = _Unsaid(1.0)
 
     def __post_init__(self) -> None:
         from .certificates import CERTIFICATES
         from .program import check_solver
 
+        unsaid = frozenset(entry.name for entry in fields(self) if isinstance(getattr(self, entry.name), _Unsaid))
+        object.__setattr__(self, "_unsaid", unsaid)
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -44,9 +44,11 @@ class Reason(IntEnum):
 FALLBACKS = {Reason.ESCAPE: "escape manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Decision:
     """One boat's decision.
+
+    Two are equal that say the same of the same boat, NaN (commands nobody gave) for NaN, however long each took.
 
     Attributes:
         boat: name of the boat.
@@ -77,9 +79,20 @@ class Decision:
     certificate_m: float
     slack_m: float
     fallback: str | None
-    solve_time_s: float
+    solve_time_s: float = field(compare=False)
     no_table: tuple[str, ...] | None = None
     cut_short: bool = False
+
+    def __eq__(self, other: object) -> bool:
+        return self._said() == other._said() if isinstance(other, Decision) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._said())
+
+    def _said(self) -> tuple[Any, ...]:
+        """All that counts for equality; NaN, which equals nothing, as None."""
+        values = (getattr(self, entry.name) for entry in fields(self) if entry.compare)
+        return tuple(None if value != value else value for value in values)
 
 
 @dataclass(frozen=True)
@@ -107,7 +120,7 @@ class Decisions(Sequence[Decision]):
     certificate_m: Array
     slack_m: Array
     bound: IntArray
-    solve_time_s: float
+    solve_time_s: float = field(compare=False)
     no_table: BoolArray | None = None
     cut_short: BoolArray | None = None
 

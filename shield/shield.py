@@ -103,6 +103,22 @@ class Shield:
         self._pending = np.zeros((0, 0, 2))
         self._autopilots: Autopilots | None = None
 
+    @classmethod
+    def for_game(cls, game: Any, **settings: Any) -> Shield:
+        """The shield for a game, with its step and its distances: where it counts collisions, and how wide boats are.
+
+        Args:
+            game: an `MctfEnv`, a ``PyQuaticusEnv``, a PettingZoo wrapper around one, or a `BatchedMctf` (of which it
+                decides for one game at a time; `games_shield` builds the shield for all).
+            **settings: settings that are to be other than the game's, or than the default.
+
+        Raises:
+            ConfigError: a game that no shield can be built for, or an unusable setting.
+        """
+        from .wrappers.checks import settings_of
+
+        return cls(**{**settings_of(game), **settings})
+
     def reset(self) -> None:
         """Forget all escapes, as before a new game."""
         self._known = None

@@ -11,6 +11,7 @@ from steerclear.shield import ShieldConfig
 
 from ..provenance import machine, versions
 from ..spec import check_seed
+from ..tally import RADII_M
 from .batch import BatchSize, batch_memory, steps_per_s
 from .decide import COUNTS, decide_times, scaling
 from .lookups import lookup_times
@@ -70,7 +71,7 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
         JSON-ready, see `keys.BENCH`.
     """
     started = time.perf_counter()
-    shield = ShieldConfig()
+    shield = ShieldConfig(separation_m=RADII_M[0])  # in every game the same shield
     content: dict[str, Any] = {
         "command": "bench",
         "settings": asdict(settings),

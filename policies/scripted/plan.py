@@ -40,9 +40,66 @@ class Plan:
     reach_m: float = MEDIUM_REACH_M
 
 
+@dataclass(frozen=True)
+class Everyone:
+    """All boats do the same."""
+
+    behaviour: Behaviour
+
+    def __call__(self, team_size: int, seed: int) -> list[Behaviour]:
+        """Behaviours of a team."""
+        return [self.behaviour] * team_size
+
+
+@dataclass(frozen=True)
+class InRoles:
+    """Boats by role; without roles a third of the team (rounded) defends, last boats first."""
+
+    attack: Behaviour
+    defend: Behaviour
+    roles: tuple[str, ...] | None
+
+    def __call__(self, team_size: int, seed: int) -> list[Behaviour]:
+        """Behaviours of a team.
+
+        Raises:
+            PolicyError: the wrong number of roles.
+        """
+        chosen = default_roles(team_size) if self.roles is None else fit("roles", self.roles, team_size)
+        return [self.attack if role == "attack" else self.defend for role in chosen]
+
+
+@dataclass(frozen=True)
+class ByName:
+    """Each boat does what it is told by name."""
+
+    names: tuple[str, ...]
+
+    def __call__(self, team_size: int, seed: int) -> list[Behaviour]:
+        """Behaviours of a team.
+
+        Raises:
+            PolicyError: the wrong number of names.
+        """
+        return [Behaviour[word.upper()] for word in fit("boats", self.names, team_size)]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """The hidden opponent's team; without a composition they come in turn with the seed."""
+
+    composition: str | None
+
+    def __call__(self, team_size: int, seed: int) -> list[Behaviour]:
+        """Behaviours of a team."""
+        chosen = composition_of(seed) if self.composition is None else self.composition
+        roles = None if chosen == "mixed" else (chosen,)
+        return InRoles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles)(team_size, seed)
+
+
 def everyone(behaviour: Behaviour) -> Cast:
     """All boats do the same."""
-    return lambda team_size, seed: [behaviour] * team_size
+    return Everyone(behaviour)
 
 
 def in_roles(attack: Behaviour, defend: Behaviour, roles: str | Sequence[str] | None) -> Cast:
@@ -57,14 +114,7 @@ def in_roles(attack: Behaviour, defend: Behaviour, roles: str | Sequence[str] | 
     Raises:
         PolicyError: an unknown role; the wrong number of roles is reported once the team's size is known.
     """
-    behaviours = {"attack": attack, "defend": defend}
-    words = None if roles is None else _words("roles", roles, ROLES)
-
-    def cast(team_size: int, seed: int) -> list[Behaviour]:
-        chosen = default_roles(team_size) if words is None else fit("roles", words, team_size)
-        return [behaviours[role] for role in chosen]
-
-    return cast
+    return InRoles(attack, defend, None if roles is None else tuple(_words("roles", roles, ROLES)))
 
 
 def by_name(names: str | Sequence[str]) -> Cast:
@@ -74,8 +124,7 @@ def by_name(names: str | Sequence[str]) -> Cast:
         PolicyError: an unknown behaviour.
     """
     known = tuple(behaviour.name.lower() for behaviour in Behaviour)
-    words = _words("boats", names, known)
-    return lambda team_size, seed: [Behaviour[word.upper()] for word in fit("boats", words, team_size)]
+    return ByName(tuple(_words("boats", names, known)))
 
 
 def hidden(composition: str | int | None) -> Cast:
@@ -88,14 +137,7 @@ def hidden(composition: str | int | None) -> Cast:
         composition = COMPOSITIONS[composition]
     if composition is not None and composition not in COMPOSITIONS:
         raise PolicyError(f"composition is {composition!r}; give one of {', '.join(COMPOSITIONS)}, 0..2, or nothing")
-    fixed = composition
-
-    def cast(team_size: int, seed: int) -> Sequence[Behaviour]:
-        chosen = composition_of(seed) if fixed is None else fixed
-        roles = None if chosen == "mixed" else chosen
-        return in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles)(team_size, seed)
-
-    return cast
+    return Hidden(composition)
 
 
 def composition_of(game: int) -> str:

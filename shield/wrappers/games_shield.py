@@ -6,6 +6,7 @@ from typing import Any
 
 from ..batch import BatchedShield
 from ..config import ShieldConfig
+from ..game_facts import check_step, facts_of_games, told_distances, with_distances
 from ..same_games import platforms_of
 from .mctf import surroundings_of
 from .reading import team_number
@@ -18,14 +19,17 @@ def games_shield(
 
     Args:
         core: the games.
-        config: settings; None takes the defaults, with the games' step.
+        config: settings; None takes the defaults, with the games' step and distances. Distances that nobody chose in
+            it are the games', where those are larger.
         team: "blue" or "red", the team that will be shielded, see `BatchedShield.filter_for`.
         keep_out: keep clear of the own flag's circle; boats that enter it while the flag is home are stopped.
 
     Raises:
-        ConfigError: unknown team, or a setting that a batch cannot honour.
+        ConfigError: unknown team, another step than the games', or a setting that a batch cannot honour.
     """
-    number = team_number(team)
-    settings = ShieldConfig(dt_s=core.config.dt_s) if config is None else config
+    number, facts = team_number(team), facts_of_games(core)
+    settings = ShieldConfig.of(**facts.settings()) if config is None else with_distances(config, facts, number)
+    check_step(settings, facts)
+    told_distances(settings, facts, number)
     around = surroundings_of(core, number, keep_out)
     return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number)

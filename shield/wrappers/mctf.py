@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
+from ..exceptions import FleetError
 from ..fleet import Fleet
+from ..game_facts import GameFacts, facts_of_games
 from ..jit import Array
 from ..surroundings import Surroundings
 from .reading import KEEP_OUT_MARGIN_M, obstacles_of
@@ -15,7 +20,7 @@ from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 class MctfReader:
     """Reads an `MctfEnv`: exact state with the autopilots' memory, commands inside its step."""
 
-    filters_inside = True
+    takes_pairs_only = False
 
     def __init__(self, env: Any) -> None:
         self.env = env
@@ -23,6 +28,25 @@ class MctfReader:
         config = env.config
         kinds = config.platforms
         self._platforms = tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * len(self.agent_ids)
+
+    def facts(self) -> GameFacts:
+        """Step and sizes."""
+        return facts_of_games(self.env.core)
+
+    @contextmanager
+    def filtering(self, safe: Callable[[Array], Array]) -> Iterator[None]:
+        """While inside, commands (n, 2) pass ``safe`` after the last decider; afterwards the game is as it was."""
+
+        def command_filter(core: Any, commands: Array) -> Array:
+            if len(commands) != 1:
+                raise FleetError("this wrapper shields one game; use BatchedShield for a batch")
+            return safe(commands[0])[np.newaxis]
+
+        with self.env.filtered(command_filter):
+            yield
+
+    def check_answers(self, agent_ids: Sequence[str]) -> None:
+        """The game plays one command a step, of any kind."""
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now; boats the game drives are controlled only with ``shield_autopilot``."""
@@ -51,8 +75,10 @@ def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings
     """Fixed things of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle.
 
     It counts while the flag is away as well: the game throws out who is inside when the flag comes home, at any time.
+    A game with ``flag_keepout_m`` 0 throws nobody out, and has no circle.
     """
-    return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), keep_out)
+    kept = keep_out and core.config.flag_keepout_m > 0.0
+    return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), kept)
 
 
 @lru_cache(maxsize=64)

@@ -13,6 +13,7 @@ from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
+from .checks import shield_for
 from .reading import GameReader, one_game_shield, reader_of
 
 logger = logging.getLogger(__name__)
@@ -22,15 +23,21 @@ class ShieldedTeamPolicy:
     """A team policy (``reset(env, agent_ids, seed)``, ``act(observations, infos)``) whose commands pass the shield.
 
     Only the policy's own commands do: boats the game drives itself are out of its reach. `ShieldedParallelEnv` on our
-    env covers those too.
+    env covers those too. In a Pyquaticus env all its answers are (speed m/s, relative heading deg) pairs, since that
+    env takes actions of one kind only from a boat.
 
     Attributes:
         policy: the policy inside.
-        shield: its shield.
+        shield: its shield: the one given, or one with the game's distances, see `ShieldedParallelEnv`.
         decisions: the last decisions, or None.
+
+    Raises:
+        ConfigError: the shield is none, or the policy has one already.
     """
 
     def __init__(self, policy: Any, shield: Shield, keep_out: bool = True) -> None:
+        if isinstance(policy, ShieldedTeamPolicy):
+            raise ConfigError("this policy has a shield already; wrap its .policy instead")
         self.policy = policy
         self.shield: Shield = one_game_shield(shield)
         self.keep_out = keep_out
@@ -44,10 +51,13 @@ class ShieldedTeamPolicy:
         """Begin a game.
 
         Raises:
-            ConfigError: the env cannot be read, or the boats are none, not in the game, or of two teams.
+            ConfigError: the env cannot be read, has settings that no shield can be built for, or takes no answers of
+                ours; the shield is for another step; or the boats are none, not in the game, or of two teams.
         """
         reader = reader_of(env)
         self._team = _team_of(reader, agent_ids)
+        reader.check_answers(agent_ids)
+        self.shield = shield_for(self.shield, reader, self._team)
         self._reader, self._agent_ids = reader, tuple(agent_ids)
         self.shield.reset()
         self.policy.reset(env, agent_ids, seed)
@@ -65,6 +75,7 @@ class ShieldedTeamPolicy:
             raise PolicyError(
                 f"the policy answered {type(answer).__name__}; let act return a mapping of boat to action"
             )
+        self._reader.check_answers(self._agent_ids)
         actions = dict(answer)
         fleet = self._reader.fleet(self._team, False)
         around = self._reader.surroundings(self._team, self.keep_out)
@@ -73,12 +84,14 @@ class ShieldedTeamPolicy:
         actions = self._reader.playable(actions)
         for agent in self._agent_ids:
             i = self._reader.agent_ids.index(agent)
-            if self.decisions.intervened[i]:
-                actions[agent] = self.decisions.sent.values[i].copy()
+            sent = self.decisions.sent.values[i]
+            if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
+                actions[agent] = sent.copy()
         return actions
 
     def __getattr__(self, name: str) -> Any:
-        if name == "policy":  # not set yet: do not look it up on itself
+        # "policy" is not set yet: no looking it up on itself; and the policy's own way of copying knows no shield
+        if name == "policy" or name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.policy, name)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Real
 from typing import Any
 
@@ -11,37 +12,87 @@ import numpy as np
 
 from ..actions import DISCRETE, Command, Seat, check_agents, plain_action, read_action
 from ..fleet import Fleet
-from ..jit import Array
-from ..platforms import get_platform
+from ..game_facts import GameFacts
+from ..jit import Array, IntArray
 from ..platforms import layout as L
 from ..surroundings import Surroundings
-from .reading import KEEP_OUT_MARGIN_M, obstacles_of
+from .pyquaticus_checks import check_env, check_pairs, platforms_of_players, step_of
+from .reading import KEEP_OUT_MARGIN_M
 
 
 class PyquaticusReader:
     """Reads a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
 
-    The environment drives tagged and out-of-bounds boats itself, after the policy's action: those are not ours to
-    decide for and are treated as boats that hold their course.
+    The environment drives tagged and out-of-bounds boats itself, after the policy's action, and stops disabled ones:
+    those are not ours to decide for and are treated as boats that hold their course.
+
+    Raises:
+        ConfigError: the environment has settings that a shield would misread.
+        PlatformError: it has boats that nobody knows here.
     """
 
-    filters_inside = False
+    takes_pairs_only = True
 
     def __init__(self, env: Any) -> None:
+        check_env(env)
         self.env = env
         self.agent_ids: tuple[str, ...] = tuple(str(agent) for agent in env.players)
-        self._platforms = tuple(get_platform(name).name for name in env.dynamics)
-        for agent in self.agent_ids:  # lets the env take a discrete action and a corrected pair alike
-            env.act_space_checked[agent] = True
-            env.act_space_match[agent] = False
+        self._platforms = platforms_of_players(env)
+
+    def facts(self) -> GameFacts:
+        """Step and sizes, as the environment has them now.
+
+        Raises:
+            ConfigError: it has settings by now that a shield would misread.
+        """
+        check_env(self.env)
+        self._platforms = platforms_of_players(self.env)
+        radius_m = np.broadcast_to(np.asarray(self.env.agent_radius, np.float64), len(self.agent_ids))
+        return GameFacts(step_of(self.env), radius_m, self._teams(), bool(getattr(self.env, "obstacles", ())))
+
+    @contextmanager
+    def filtering(self, safe: Callable[[Array], Array]) -> Iterator[None]:
+        """While inside, what the environment read from the actions passes ``safe`` each time before its boats move.
+
+        Actions are looked at first, so that those which are none are refused in the same words everywhere.
+        """
+        env = self.env
+        step, move = env.step, env._move_agents
+
+        def stepping(actions: Any, *more: Any, **named: Any) -> Any:
+            self.commands(actions)
+            return step(self.playable(actions), *more, **named)
+
+        def moving(commands: Mapping[str, Any], *more: Any, **named: Any) -> Any:
+            wanted = np.array([commands[agent] for agent in self.agent_ids], dtype=np.float64)
+            changed = {
+                agent: sent.copy()
+                for agent, asked, sent in zip(self.agent_ids, wanted, safe(wanted), strict=True)
+                if not np.array_equal(sent, asked, equal_nan=True)
+            }
+            return move({**commands, **changed}, *more, **named)
+
+        with _standing_in(env, "step", stepping), _standing_in(env, "_move_agents", moving):
+            yield
+
+    def check_answers(self, agent_ids: Sequence[str]) -> None:
+        """Check that the environment plays pairs, and each for one move.
+
+        Raises:
+            ConfigError: it does not.
+        """
+        check_pairs(self.env, agent_ids)
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now."""
         players = list(self.env.players.values())
         state = np.array([_row(player) for player in players])
-        teams = np.array([_team(player) for player in players], dtype=np.int64)
-        driven = np.array([bool(player.is_tagged) or bool(player.oob) for player in players])
+        teams = self._teams()
+        driven = np.array([_driven(player) for player in players])
         return Fleet(state, teams, self._platforms, (teams == team) & ~driven, self.agent_ids)
+
+    def _teams(self) -> IntArray:
+        return np.array([_team(player) for player in self.env.players.values()], dtype=np.int64)
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind; boats without one stop, as in the env."""
@@ -85,14 +136,41 @@ class PyquaticusReader:
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge and obstacles; the own flag's circle, see `mctf.surroundings_of`."""
         env = self.env
-        circles, polygons = obstacles_of(getattr(env, "config_dict", {}).get("obstacles"))
+        circles, polygons = _obstacles(getattr(env, "obstacles", ()))
         size = np.asarray(env.env_size, dtype=np.float64)
-        flag = env.flags[team]
+        flag, keepout_m = env.flags[team], float(env.flag_keepout_radius)
         circle: tuple[tuple[float, float, float], ...] = ()
-        if keep_out:
-            radius = float(env.flag_keepout_radius) + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
+        if keep_out and keepout_m > 0.0:
+            radius = keepout_m + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
             circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
-        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), tuple(circles), tuple(polygons), stops=circle)
+        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), circles, polygons, stops=circle)
+
+
+@contextmanager
+def _standing_in(thing: Any, name: str, value: Any) -> Iterator[None]:
+    """The object's attribute is this while inside, and afterwards what it was."""
+    before = vars(thing).get(name)
+    setattr(thing, name, value)
+    try:
+        yield
+    finally:
+        if before is None:
+            delattr(thing, name)
+        else:
+            setattr(thing, name, before)
+
+
+def _obstacles(obstacles: Sequence[Any]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Circles (x, y, radius) and polygons of corners, of Pyquaticus' objects."""
+    circles = [(*map(float, one.center_point), float(one.radius)) for one in obstacles if hasattr(one, "radius")]
+    corners = [one.anchor_points for one in obstacles if hasattr(one, "anchor_points")]
+    polygons = [tuple((float(x), float(y)) for x, y in points) for points in corners]
+    return tuple(circles), tuple(polygons)
+
+
+def _driven(player: Any) -> bool:
+    """Whether the environment decides for this boat."""
+    return bool(player.is_tagged or player.oob or getattr(player, "is_disabled", False))
 
 
 def _is_pair(action: Any) -> bool:

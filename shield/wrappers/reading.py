@@ -5,11 +5,13 @@ Positions come from the environment itself, never from observations: those are r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from ..exceptions import ConfigError
 from ..fleet import Fleet
+from ..game_facts import GameFacts
 from ..jit import Array
 from ..surroundings import Surroundings
 
@@ -23,7 +25,25 @@ class GameReader(Protocol):
     """What the wrappers need to know of an environment."""
 
     agent_ids: tuple[str, ...]
-    filters_inside: bool
+    takes_pairs_only: bool
+    """Whether, once a boat has had a (speed, relative heading) pair, all its actions must be pairs."""
+
+    def facts(self) -> GameFacts:
+        """Step and sizes.
+
+        Raises:
+            ConfigError: the game has settings that no shield can be built for.
+        """
+
+    def filtering(self, safe: Callable[[Array], Array]) -> AbstractContextManager[None]:
+        """While inside, commands (n, 2) pass ``safe`` before the boats move; afterwards the game is as it was."""
+
+    def check_answers(self, agent_ids: Sequence[str]) -> None:
+        """Check that the game plays what a shield around a policy answers, one command a step.
+
+        Raises:
+            ConfigError: it does not.
+        """
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now; controlled are those of ``team`` that the shield can decide for."""
@@ -63,7 +83,7 @@ def one_game_shield(shield: Any) -> Any:
     """
     if isinstance(shield, type) or not callable(getattr(shield, "decide", None)) or hasattr(shield, "filter_for"):
         found = shield.__name__ if isinstance(shield, type) else type(shield).__name__
-        raise ConfigError(f"{found} is no shield of one game; give steerclear.shield.Shield()")
+        raise ConfigError(f"{found} is no shield of one game; give steerclear.shield.Shield.for_game(game)")
     return shield
 
 

@@ -69,15 +69,31 @@ class TeamBatch:
         self._filter = None if shield is None else _filter_of(shield, core, self.team)
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
+        self._begun = False
 
     @property
     def top_speed_mps(self) -> float:
         """Highest top speed of the learners' boats, m/s."""
         return float(np.max(self.core.max_speed_mps[self.boats]))
 
-    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start all games; returns observations (L, n_obs)."""
-        self._seed = self._seed if seed is None else seed
+    def reset(self, seed: int | None = None, learners: Any = None) -> NDArray[np.float32]:
+        """Start games; returns observations (L, n_obs).
+
+        Args:
+            seed: seed of games and opponent; None: the last one for all games, else each goes on with its numbers.
+            learners: (L,) bool, which learners' games to start, all boats of a game alike; None for all.
+
+        Raises:
+            ConfigError: no such choice of games, or no seed.
+        """
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
+            raise ConfigError(f"seed is {seed!r}; give one whole number from 0 for all games, or None")
+        if learners is not None:
+            if not self._begun:
+                raise ConfigError("no game has begun; reset all games first, without a mask")
+            return self._begin_anew(self._games_of(learners), self._flat(self.core.observations), seed)
+        self._begun = True
+        self._seed = self._seed if seed is None else int(seed)
         observations = self.core.reset(seed=self._seed)
         if self.opponent is not None:
             self.opponent.reset(self.core, 1 - self.team, self._seed)
@@ -101,13 +117,26 @@ class TeamBatch:
         flat_rewards = rewards[:, self.boats].reshape(-1).copy()
         return Stepped(self._begin_anew(ended.copy(), final), flat_rewards, *outcome, final)
 
-    def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _games_of(self, learners: Any) -> BoolArray:
+        """(B,) bool, the games of learners (L,)."""
+        chosen = np.asarray(learners)
+        if chosen.shape != (self.learners,) or chosen.dtype != np.bool_:
+            raise ConfigError(
+                f"the mask is {chosen.dtype} of shape {chosen.shape}; give bool of shape ({self.learners},), one a boat"
+            )
+        by_game = chosen.reshape(self.core.n_games, -1)
+        if not chosen.any() or (by_game.any(axis=1) != by_game.all(axis=1)).any():
+            raise ConfigError("the mask must choose one game at least, and of each game all boats of the team or none")
+        return np.array(by_game[:, 0])
+
+    def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32], seed: int | None = None) -> NDArray[np.float32]:
+        """Start the games in ``ended`` (B,); with a seed from it, as `reset` starts all."""
         if not ended.any():
             return final
-        observations = self.core.reset(mask=ended)
+        observations = self.core.reset(mask=ended, seed=seed)
         if self.opponent is not None:
             self._seed += self.core.n_games
-            self.opponent.restart(ended, self._seed)
+            self.opponent.restart(ended, self._seed if seed is None else int(seed))
         if self.shield is not None:
             self.shield.reset(ended)
         return self._flat(observations)

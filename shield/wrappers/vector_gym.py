@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from gymnasium.spaces import Box, Discrete, Space
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from ..exceptions import ConfigError
 from .team_batch import TeamBatch
 
 
@@ -19,6 +21,20 @@ def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
         return observation, Discrete(17)
     high = np.array([batch.top_speed_mps, 180.0], np.float32)
     return observation, Box(np.array([0.0, -180.0], np.float32), high, dtype=np.float32)
+
+
+def mask_of(options: Mapping[str, Any] | None) -> Any:
+    """The ``reset_mask`` among reset's options, or None.
+
+    Raises:
+        ConfigError: there are others.
+    """
+    for name in options or {}:
+        if name != "reset_mask":
+            raise ConfigError(
+                f"unknown reset option {name!r}; known: reset_mask. How games start is in their GameConfig"
+            )
+    return (options or {}).get("reset_mask")
 
 
 class MctfVectorEnv(VectorEnv[Any, Any, Any]):
@@ -38,8 +54,17 @@ class MctfVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Start all games."""
-        return self.batch.reset(seed), {}
+        """Start all games, or those of some sub-environments.
+
+        Args:
+            seed: one seed for all games; game b draws the same numbers however many there are.
+            options: {"reset_mask": (num_envs,) bool} starts only those games, all boats of a game alike; the others go
+                on, and their observations are those of the last step.
+
+        Raises:
+            ConfigError: another option, a mask that is none, or a list of seeds.
+        """
+        return self.batch.reset(seed, mask_of(options)), {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all games; the last observations of ended games are in ``infos["final_obs"]``."""

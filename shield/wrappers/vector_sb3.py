@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
+from ..exceptions import ConfigError
 from .team_batch import Stepped, TeamBatch
 from .vector_gym import spaces_of
 
@@ -26,9 +27,17 @@ class MctfVecEnv(VecEnv):
         super().__init__(batch.learners, *spaces_of(batch))
 
     def reset(self) -> Any:
-        """Start all games; observations (L, n_obs)."""
+        """Start all games; observations (L, n_obs).
+
+        Raises:
+            ConfigError: options were set, of which these games have none.
+        """
         seed = next((seed for seed in self._seeds if seed is not None), None)
+        given = sorted({str(name) for options in self._options for name in options})
         self._reset_seeds()
+        self._reset_options()
+        if given:
+            raise ConfigError(f"unknown reset options {', '.join(given)}; how games start is in their GameConfig")
         return self.batch.reset(seed)
 
     def step_async(self, actions: Any) -> None:

@@ -125,3 +125,21 @@ def test_a_picture_is_an_array_and_close_can_be_called_twice(monkeypatch):
     assert picture.ndim == 3
     env.close()
     env.close()
+
+
+def test_filters_of_a_step_come_after_the_own_one_last_entered_first_and_are_gone_after_it():
+    env, asked = MctfEnv("aamas2024"), []
+
+    def named(name):
+        return lambda core, commands: asked.append(name) or commands * 0.5
+
+    env.command_filter = named("own")
+    env.reset(seed=0)
+    with env.filtered(named("outer")):
+        with pytest.raises(GameError), env.filtered(named("inner")):
+            env.step({"agent_99": 4})
+        with env.filtered(named("inner")):
+            env.step({})
+        env.step({})
+    env.step({})
+    assert asked == ["own", "inner", "outer", "own", "outer", "own"]

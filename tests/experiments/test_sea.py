@@ -103,7 +103,8 @@ def test_a_boat_carried_over_the_edge_is_out_of_bounds_and_comes_back():
     sea.current_mps[:] = -0.4, 0.0
     env.reset(seed=0)
     env.core.state[0, 0, [L.X, L.Y]] = 0.1, 5.0
-    sea.surround()
+    sea.begin()
+    env.command_filter = sea.carry
     out = []
     for _ in range(400):
         env.step({})

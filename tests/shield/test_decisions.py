@@ -1,5 +1,7 @@
 """Contracts of one decision: what is safe passes bit for bit, what is not usable never comes out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -136,3 +138,16 @@ def test_bad_surroundings_are_refused():
 def test_a_batch_refuses_what_it_cannot_honour():
     with pytest.raises(ConfigError, match="coordination='team'"):
         BatchedShield(ShieldConfig(coordination="per_boat"), 1, ("heron",), (0,))
+
+
+def test_decisions_that_say_the_same_are_equal_however_long_they_took():
+    one, other = (Shield().decide(head_on(5.5), relative((2, 0), (2, 0)))[0] for _ in range(2))
+    slow = replace(other, solve_time_s=9.0)
+    assert one == slow
+    assert hash(one) == hash(slow)
+    assert one != replace(other, slack_m=0.5)
+    assert one != "decision"
+    nobody = replace(one, wanted_heading_rad=float("nan"))
+    assert nobody == replace(one, wanted_heading_rad=float("inf") - float("inf"))
+    assert hash(nobody) == hash(replace(nobody, solve_time_s=1.0))
+    assert nobody != one

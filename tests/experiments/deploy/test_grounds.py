@@ -45,17 +45,14 @@ class Played:
         self.names = [boat.name for boat in fleet.boats if boat.agent is not None]
         self.reader = MctfReader(env)
         self.fleet, self.beside = fleet, None
-        env.command_filter = self._both(env.command_filter)
+        env.command_filter = self._beside  # asked before the wrapper
 
-    def _both(self, wrapped):
-        def command_filter(core, commands):
-            seen = self.reader.fleet(self.fleet.team_number, shield_autopilot=True)
-            told = json.loads(json.dumps(state_of(core, self.names).as_dict()))
-            around = self.water.around(seen, game_state(told), 0.1)
-            self.beside = self.shield.decide(seen, Commands.relative_deg(commands[0]), around), around
-            return wrapped(core, commands)
-
-        return command_filter
+    def _beside(self, core, commands):
+        seen = self.reader.fleet(self.fleet.team_number, shield_autopilot=True)
+        told = json.loads(json.dumps(state_of(core, self.names).as_dict()))
+        around = self.water.around(seen, game_state(told), 0.1)
+        self.beside = self.shield.decide(seen, Commands.relative_deg(commands[0]), around), around
+        return commands
 
 
 @pytest.mark.parametrize("team", ["blue", "red"])

@@ -217,6 +217,70 @@ def test_gymnasium_gets_spaces_steps_and_the_last_observations():
     env.close()
 
 
+def masked(games, *chosen):
+    """A mask of learners: all boats of the chosen games."""
+    return np.repeat(np.isin(np.arange(GAMES), chosen), games.learners // GAMES)
+
+
+@pytest.mark.parametrize("seed", [None, 7])
+def test_a_masked_reset_starts_the_chosen_games_and_leaves_the_others(seed):
+    drawn = {"max_time_s": 60.0, "default_start": False}
+    env, other = (MctfVectorEnv(batch(True, "medium", **drawn)) for _ in range(2))
+    for one in (env, other):
+        one.reset(seed=1)
+        for _ in range(12):
+            seen = one.step(np.full(12, 4))[0]
+    mask = masked(env.batch, 1, 3)
+    started, infos = env.reset(seed=seed, options={"reset_mask": mask})
+    assert infos == {}
+    assert started[~mask].tobytes() == seen[~mask].tobytes()
+    assert env.batch.core.time_s.tolist() == pytest.approx([1.2, 0.0, 1.2, 0.0])
+    if seed is not None:
+        assert started[mask].tobytes() == MctfVectorEnv(batch(**drawn)).reset(seed=seed)[0][mask].tobytes()
+    for _ in range(10):
+        mine, theirs = (one.step(np.full(12, 4))[0] for one in (env, other))
+        assert mine[~mask].tobytes() == theirs[~mask].tobytes()
+        assert (mine[mask] != theirs[mask]).any(axis=1).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"reset_mask": np.zeros(12, bool)}, "must choose one game at least"),
+        ({"reset_mask": np.arange(12) == 0}, "of each game all boats of the team or none"),
+        ({"reset_mask": np.ones(12)}, r"mask is float64 of shape \(12,\); give bool of shape \(12,\)"),
+        ({"reset_mask": np.ones(4, bool)}, r"mask is bool of shape \(4,\); give bool of shape \(12,\)"),
+        ({"init_dict": {}}, "unknown reset option 'init_dict'; known: reset_mask"),
+    ],
+)
+def test_options_of_a_reset_that_cannot_be_had_are_refused(options, words):
+    env = MctfVectorEnv(batch())
+    env.reset(seed=0)
+    with pytest.raises(ConfigError, match=words):
+        env.reset(options=options)
+    env.reset(options={})
+
+
+def test_resets_without_a_beginning_or_with_many_seeds_are_refused():
+    env = MctfVectorEnv(batch(opponent="medium"))
+    with pytest.raises(ConfigError, match="no game has begun; reset all games first"):
+        env.reset(options={"reset_mask": np.ones(12, bool)})
+    for seed in ([1] * 12, -1, True, 1.5):
+        with pytest.raises(ConfigError, match="give one whole number from 0 for all games, or None"):
+            env.reset(seed=seed)
+
+
+def test_options_set_by_stable_baselines_are_refused_once():
+    pytest.importorskip("stable_baselines3")
+    from steerclear.shield.wrappers import MctfVecEnv
+
+    env = MctfVecEnv(batch())
+    env.set_options({"init_dict": {}})
+    with pytest.raises(ConfigError, match="unknown reset options init_dict"):
+        env.reset()
+    assert env.reset().shape == (12, env.observation_space.shape[0])
+
+
 def test_without_stable_baselines_the_remedy_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
     monkeypatch.delitem(sys.modules, "steerclear.shield.wrappers.vector_sb3", raising=False)

@@ -11,6 +11,7 @@ from steerclear.shield import Reason, Shield
 from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import ShieldedParallelEnv
+from steerclear.shield.wrappers.pyquaticus import PyquaticusReader
 
 STRAIGHT, STOP = 4, 16
 
@@ -121,7 +122,9 @@ class Player:
 
 
 class Quaticus:
-    """As much of a Pyquaticus environment as the wrapper reads; steps are noted, not sailed."""
+    """As much of a Pyquaticus environment as the wrapper reads; actions and commands are noted, not sailed."""
+
+    dt = 0.1
 
     def __init__(self, gap_m):
         self.players = {
@@ -133,7 +136,7 @@ class Quaticus:
         self.flags = [SimpleNamespace(home=home, taken=False) for home in self.flag_homes]
         self.act_space_checked, self.act_space_match = {}, {}
         self.env_size, self.flag_keepout_radius, self.agent_radius = (160.0, 80.0), 3.0, [2.0, 2.0]
-        self.metadata, self.stepped = {}, []
+        self.metadata, self.stepped, self.moved = {}, [], []
         self.aquaticus_field_points = {"HOME": (20.0, 40.0)}
         self._walls = [[1], [2]]
 
@@ -149,7 +152,12 @@ class Quaticus:
 
     def step(self, actions):
         self.stepped.append(actions)
+        asked = PyquaticusReader(self).commands(actions)
+        self._move_agents({agent: np.nan_to_num(asked[i]) for i, agent in enumerate(self.agents)})
         return {}, {}, {}, {}, {agent: {} for agent in self.agents}
+
+    def _move_agents(self, commands):
+        self.moved.append(commands)
 
 
 def test_pyquaticus_gets_the_corrected_pair_and_everything_else_as_it_was():
@@ -158,16 +166,14 @@ def test_pyquaticus_gets_the_corrected_pair_and_everything_else_as_it_was():
     env.reset(seed=0)
     actions = {"agent_0": STRAIGHT, "agent_1": STRAIGHT}
     *_, infos = env.step(actions)
-    assert actions == {"agent_0": STRAIGHT, "agent_1": STRAIGHT}
-    sent, decision = game.stepped[0], infos["agent_0"]["shield"]
-    assert sent["agent_1"] == STRAIGHT
+    assert game.stepped == [actions] == [{"agent_0": STRAIGHT, "agent_1": STRAIGHT}]
+    sent, decision = game.moved[0], infos["agent_0"]["shield"]
+    assert sent["agent_1"].tolist() == [1.5, 0.0]
     assert decision.intervened
     assert decision.wanted_speed_mps == 1.5
     assert sent["agent_0"][0] == decision.sent_speed_mps
     turn_deg = math.degrees(decision.sent_heading_rad - decision.wanted_heading_rad)
     assert (sent["agent_0"][1] - turn_deg + 180.0) % 360.0 == pytest.approx(180.0)
-    assert game.act_space_checked["agent_0"]
-    assert not game.act_space_match["agent_0"]
 
 
 @pytest.mark.parametrize("action", [STRAIGHT, STOP, np.array([0.7, 20.0]), "HOME"])
@@ -190,7 +196,7 @@ def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():
     env.reset(seed=0)
     env.step({"agent_0": STRAIGHT})
     assert env.decisions[0].reason == Reason.NOT_COVERED
-    assert game.stepped[0] == {"agent_0": STRAIGHT}
+    assert game.moved[0]["agent_0"].tolist() == [1.5, 0.0]
 
 
 @pytest.mark.parametrize("action", [17, -18, [[1, 2, 3]], 2.5, math.nan])

@@ -1,0 +1,175 @@
+"""Wrapping changes nothing outside: what is wrapped stays as it was, and wrappers do not get in each other's way."""
+
+import numpy as np
+import pytest
+from pettingzoo.utils.conversions import aec_to_parallel, parallel_to_aec
+from pettingzoo.utils.wrappers import AssertOutOfBoundsWrapper, BaseParallelWrapper, OrderEnforcingWrapper
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.shield import Shield
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.wrappers import ShieldedParallelEnv
+from test_wrappers_parallel import STRAIGHT, Quaticus
+from wrapped_games import SMALL
+
+STEPS = 40
+
+
+def play(env, steps=STEPS, turns=None):
+    """States after every step of a game of random actions, held for a second each."""
+    env.reset(seed=3)
+    random, track = np.random.default_rng(7), []
+    for step in range(steps):
+        if step % 10 == 0:
+            actions = {agent: int(random.integers(0, 16)) for agent in env.possible_agents}
+        env.step(actions if turns is None else {agent: turns(action) for agent, action in actions.items()})
+        track.append(env.unwrapped.core.state[0].copy())
+    return np.array(track)
+
+
+def same(one, other):
+    return np.array_equal(one, other, equal_nan=True)
+
+
+@pytest.fixture(scope="module")
+def off():
+    return play(MctfEnv(SMALL))
+
+
+@pytest.fixture(scope="module")
+def on():
+    return play(ShieldedParallelEnv(MctfEnv(SMALL), Shield()))
+
+
+def test_the_bare_game_stays_bare_before_between_and_after_shielded_steps(off, on):
+    game = MctfEnv(SMALL)
+    wrapped = ShieldedParallelEnv(game, Shield())
+    assert not same(off, on)
+    assert same(play(game), off)
+    assert same(play(wrapped), on)
+    assert same(play(game), off)
+    del wrapped
+    assert same(play(game), off)
+    assert game.command_filter is None
+
+
+def test_a_second_wrapper_of_the_same_game_is_alone_in_effect(on):
+    game = MctfEnv(SMALL)
+    first = ShieldedParallelEnv(game, Shield(separation_m=6.0))
+    assert same(play(ShieldedParallelEnv(game, Shield())), on)
+    assert not same(play(first), on)
+
+
+def test_a_second_wrapper_round_the_first_is_refused_for_the_same_team():
+    inner = ShieldedParallelEnv(MctfEnv(SMALL), Shield())
+    words = "the blue team of this environment has a shield already; wrap env.unwrapped, or shield the other team"
+    for env in (inner, BaseParallelWrapper(inner), aec_to_parallel(parallel_to_aec(inner))):
+        with pytest.raises(ConfigError, match=words):
+            ShieldedParallelEnv(env, Shield(), "blue")
+        ShieldedParallelEnv(env, Shield(), "red")
+    team = Shield().wrap(policies.make("medium"))
+    with pytest.raises(ConfigError, match=r"has a shield already; wrap its \.policy instead"):
+        Shield().wrap(team)
+
+
+def test_a_step_that_fails_leaves_no_shield_behind(off):
+    game = MctfEnv(SMALL)
+    wrapped = ShieldedParallelEnv(game, Shield())
+    wrapped.reset(seed=3)
+    with pytest.raises(Exception, match="agent_99"):
+        wrapped.step({"agent_99": 4})
+    assert same(play(game), off)
+
+
+def test_a_filter_of_the_users_own_is_asked_first_and_stays():
+    seen = []
+
+    def half(core, commands):
+        seen.append(commands.copy())
+        return commands * [0.5, 1.0]
+
+    game = MctfEnv(SMALL, command_filter=half)
+    wrapped = ShieldedParallelEnv(game, Shield())
+    wrapped.reset(seed=3)
+    wrapped.step(dict.fromkeys(game.possible_agents, STRAIGHT))
+    np.testing.assert_array_equal(wrapped.decisions.wanted.values[:, 0], 0.5 * seen[0][0, :, 0])
+    assert game.command_filter is half
+
+
+class Mirrored(BaseParallelWrapper):
+    """As SuperSuit's action lambdas: what is played is not what is given."""
+
+    def step(self, actions):
+        return super().step({agent: 15 - action for agent, action in actions.items()})
+
+
+class Twice(BaseParallelWrapper):
+    """As SuperSuit's frame skip."""
+
+    def step(self, actions):
+        super().step(actions)
+        return super().step(actions)
+
+
+def between(env):
+    """What PettingZoo puts round its own environments."""
+    return aec_to_parallel(OrderEnforcingWrapper(AssertOutOfBoundsWrapper(parallel_to_aec(env))))
+
+
+def test_other_wrappers_may_stand_in_between(on):
+    assert same(play(ShieldedParallelEnv(between(MctfEnv(SMALL)), Shield())), on)
+    assert same(play(between(ShieldedParallelEnv(MctfEnv(SMALL), Shield()))), on)
+    assert same(play(ShieldedParallelEnv(Mirrored(MctfEnv(SMALL)), Shield()), turns=lambda action: 15 - action), on)
+    twice = ShieldedParallelEnv(Twice(MctfEnv(SMALL)), Shield())
+    twice.reset(seed=3)
+    twice.step(dict.fromkeys(twice.possible_agents, STRAIGHT))
+    core = twice.unwrapped.core
+    assert core.time_s[0] == pytest.approx(0.2)
+    np.testing.assert_array_equal(twice.decisions.fleet.state[:, :2], core.previous_position[0])
+
+
+def test_an_environment_of_turns_is_refused():
+    with pytest.raises(ConfigError, match=r"one boat's action at a time; give pettingzoo\.utils\.aec_to_parallel"):
+        ShieldedParallelEnv(parallel_to_aec(MctfEnv(SMALL)), Shield())
+
+
+def test_both_teams_are_shielded_in_either_order_and_through_other_wrappers():
+    def both(first, second, wrap=lambda env: env):
+        return play(ShieldedParallelEnv(wrap(ShieldedParallelEnv(MctfEnv(SMALL), Shield(), first)), Shield(), second))
+
+    expected = both("blue", "red")
+    assert same(both("red", "blue"), expected)
+    assert same(both("blue", "red", between), expected)
+
+
+def attributes(game):
+    return {name: value for name, value in vars(game).items() if name not in ("stepped", "moved")}
+
+
+def test_a_pyquaticus_environment_is_as_it_was_after_wrapping_and_after_a_step():
+    game = Quaticus(gap_m=6.0)
+    before = dict(attributes(game))
+    env = ShieldedParallelEnv(ShieldedParallelEnv(game, Shield(), "red"), Shield(), "blue")
+    env.reset(seed=0)
+    assert attributes(game) == before
+    env.step({"agent_0": STRAIGHT, "agent_1": STRAIGHT})
+    assert attributes(game) == before
+    assert game.act_space_checked == game.act_space_match == {}
+    assert env.decisions.intervened[0]
+    assert env.env.decisions.intervened[1]
+    assert [tuple(game.moved[0][agent]) for agent in game.agents] == [
+        tuple(env.decisions.sent.values[0]),
+        tuple(env.env.decisions.sent.values[1]),
+    ]
+    game.step({"agent_0": STRAIGHT, "agent_1": STRAIGHT})
+    assert game.moved[1]["agent_0"].tolist() == [1.5, 0.0], "stepped itself it is bare"
+
+
+def test_a_pyquaticus_step_that_fails_leaves_no_shield_behind():
+    game = Quaticus(gap_m=6.0)
+    env = ShieldedParallelEnv(game, Shield())
+    before = dict(attributes(game))
+    game.players["agent_0"].heading = np.nan
+    with pytest.raises(Exception, match="heading of boat 'agent_0' is not finite"):
+        env.step({"agent_0": STRAIGHT})
+    assert attributes(game) == before
