@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shield_loops import scattered
+from shield_loops import sail, scattered
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.decision import Reason
 from steerclear.shield.ordering import order_of
@@ -61,17 +61,16 @@ def moved(fleet, quarter_turns, shift_m):
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
 def test_where_a_scene_lies_and_which_way_it_faces_changes_nothing(platform):
     changed = 0
-    for seed in range(120):
+    for seed in range(100):
         fleet, turns = scene(seed, platform)
         elsewhere = moved(fleet, 1 + seed % 3, (731.3, -412.7))
-        one, other = Shield(), Shield()
-        for turn in turns:
-            told = one.decide(fleet, Commands.relative_deg(turn))
-            again = other.decide(elsewhere, Commands.relative_deg(turn))
-            assert (told.reason == again.reason).all(), seed
-            np.testing.assert_allclose(told.sent.values, again.sent.values, atol=1e-5, err_msg=str(seed))
-            changed += int((told.reason != Reason.PASSED).sum())
-    assert changed > 1000  # of 1,920: the scenes are such that there is something to decide
+        one, other = (
+            sail(Shield(), boats, lambda step, _, turns=turns: turns[step], STEPS) for boats in (fleet, elsewhere)
+        )
+        assert (one.reason == other.reason).all(), seed
+        np.testing.assert_allclose(one.sent, other.sent, atol=1e-5, err_msg=str(seed))
+        changed += int((one.reason[:, :3] != Reason.PASSED).sum())
+    assert changed > 600  # of 1,200: the scenes are such that there is something to decide
 
 
 @pytest.mark.parametrize(
