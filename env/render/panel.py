@@ -7,8 +7,11 @@ from steerclear.env.render.arena import Arena
 from steerclear.env.render.canvas import font
 from steerclear.env.render.scene import Scene, closest_pair
 from steerclear.env.render.theme import Colour, Theme
+from steerclear.shield.visible import visible
 
 HEADER_PX = 62
+MOST_LETTERS = 200
+"""Of a line; what is longer fits in no picture."""
 FOOTER_PX = 40
 TEAM_NAMES = ("BLUE", "RED")
 
@@ -36,7 +39,7 @@ def draw_text(
     Returns:
         The rectangle written to.
     """
-    image = font(size_px, bold).render(text, True, colour)
+    image = font(size_px, bold).render(visible(text)[:MOST_LETTERS], True, colour)
     box = image.get_rect()
     setattr(box, anchor, (round(at_px[0]), round(at_px[1])))
     surface.blit(image, box)
