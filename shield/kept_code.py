@@ -223,7 +223,7 @@ def _cache_beside(function: Callable[..., Any], own: Any) -> Any:
 
 
 def _sealed_cache(function: Callable[..., Any], *locators: type) -> Any:
-    """What numba has as the cache of a function, with sealed files; in the place of a locator, or else where numba would.
+    """The cache numba has of a function, with sealed files: in the place of a locator, or else where numba would.
 
     Raises:
         RuntimeError: there is no such place.
