@@ -146,10 +146,9 @@ def _check_shapes(source: Path, arrays: dict[str, np.ndarray], config: GameConfi
     for name in names:
         if arrays[name].dtype.kind not in "fiub":
             raise TraceError(f"{source}: {name} holds {arrays[name].dtype}, expected numbers. {_REMEDY}")
-    width = len(meta["global_state_keys"])
-    if arrays["global_state"].shape != (steps + 1, width):
-        shape = arrays["global_state"].shape
-        raise TraceError(f"{source}: global_state has shape {shape}, expected {(steps + 1, width)}. {_REMEDY}")
+    shape = arrays["global_state"].shape
+    if len(shape) != 2 or shape[0] != steps + 1:
+        raise TraceError(f"{source}: global_state has shape {shape}, expected {steps + 1} rows. {_REMEDY}")
     for name in ("position", "heading", "speed"):
         if not np.isfinite(arrays[name]).all():
             raise TraceError(f"{source}: {name} holds NaN or infinity. {_REMEDY}")

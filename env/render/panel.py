@@ -10,6 +10,9 @@ from steerclear.env.render.theme import Colour, Theme
 from steerclear.shield.visible import visible
 
 HEADER_PX = 62
+STEERING = "you: ringed   ahead ↑ W   turn ← → A D   back ↓ S   half speed Shift   stop: no key"
+"""What the keys do, as `steerclear.policies` reads them."""
+
 MOST_LETTERS = 200
 """Of a line; what is longer fits in no picture."""
 FOOTER_PX = 40
@@ -77,6 +80,8 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme, margin_px: 
     """Explain the marks below the field."""
     y = surface.get_height() - FOOTER_PX / 2
     x = float(margin_px)
+    if arena.steered:
+        x = draw_text(surface, STEERING, (x, y), theme.ink, 14, True).right + 26
     entries = (
         ("arrow", theme.wanted, 2, "wanted by the policy"),
         ("arrow", theme.changed, 5, "sent by the shield instead"),
