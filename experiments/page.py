@@ -68,7 +68,7 @@ def as_text(content: Any) -> str:
 
 def _visible_in(content: Any) -> Any:
     if isinstance(content, str):
-        return visible(content, keep="\n\t")
+        return visible(content, keep="\n\t\u2028\u2029")
     if isinstance(content, Mapping):
         return {visible(key): _visible_in(value) for key, value in content.items()}
     return [_visible_in(value) for value in content] if isinstance(content, list | tuple) else content
