@@ -11,6 +11,7 @@ from typing import Any, TextIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
+from rich.text import Text
 from steerclear.shield.visible import visible
 
 ERRORS = "steerclear-plain"
@@ -31,6 +32,10 @@ class SafeConsole(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"highlight": False, "markup": False, "emoji": False, **options})
+
+    def render_str(self, text: str, **options: Any) -> Text:  # type: ignore[override]
+        """Make text of a string, whose codes then have room where it stands; see rich."""
+        return super().render_str(visible(text, keep="\n"), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Yield the segments of what is drawn; see rich."""
@@ -81,6 +86,7 @@ def _plain_letter(letter: str) -> str:
         return " " if count == 0 else "." if count < 4 else "#"
     if "\u2500" <= letter <= "\u259f":  # boxes and blocks
         name = unicodedata.name(letter, "")
-        return next((line for word, line in _LINES.items() if name.endswith(word)), "#" if "BLOCK" in name else "+")
+        line = next((line for word, line in _LINES.items() if name.endswith(word) and " AND " not in name), "+")
+        return "#" if "BLOCK" in name else line
     base = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
     return base or "?"
