@@ -57,11 +57,11 @@ class Compiling:
         self._made.add(name)
         if name in self._open:
             del self._open[self._open.index(name) :]
-        self._tell()
         if not self._open:
             self._spent_s += time.monotonic() - self._started_s
-            if self.listener is not None and self._said:
-                self.listener.ends()
+        self._tell()
+        if not self._open and self.listener is not None and self._said:
+            self.listener.ends()
 
     @property
     def count(self) -> int:

@@ -129,8 +129,10 @@ def finish(passed: bool) -> None:
 
 @contextmanager
 def progress(words: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on stderr; call what it yields with the number of finished jobs."""
+    """Show a progress bar on stderr where that is a terminal; call what it yields with the number of finished jobs."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=err(), transient=True) as bar:
+    columns += (TextColumn("left"), TimeRemainingColumn())
+    console = err()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(words, total=total)
         yield lambda done: bar.update(task, completed=done, refresh=True)

@@ -25,14 +25,16 @@ def warm_up() -> None:
     if not place:
         raise ConfigError("compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written to")
     columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=err(), transient=True) as bar:
+    console = err()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         shown = _Shown(bar)
         with told_to(shown):
             for name, compile_it in parts_of_all():
                 shown.begin(name)
                 compile_it()
     seconds = time.perf_counter() - started
-    words = f"{COMPILING.count} functions are ready, {COMPILING.compiled} of them compiled now ({seconds:.0f} s)"
+    done = COMPILING.compiled
+    words = f"{done} functions were compiled ({seconds:.0f} s)" if done else "everything had been compiled before"
     out().print(f"{words}; kept in {place}", soft_wrap=True)
 
 
