@@ -80,7 +80,7 @@ def compare(trace: Trace) -> ParityReport:
             mismatches += _compare_events(trace, core, step)
             if step < trace.steps:
                 core.step(_commands(trace, core, step)[np.newaxis])
-    except GameError as error:
+    except (GameError, ValueError, OverflowError) as error:  # a state or an action that no game has
         raise TraceError(f"{trace.path}: {error}") from error
     return ParityReport(str(trace.path), trace.steps, mismatches=tuple(mismatches), **vars(deviations))
 

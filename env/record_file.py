@@ -33,6 +33,7 @@ import numpy as np
 from steerclear.shield.exceptions import TraceError
 
 from .npz_file import read_arrays
+from .record_check import check_kinds, check_meta, check_places
 from .whole_file import whole_file
 
 Record = dict[str, np.ndarray]
@@ -102,7 +103,7 @@ def read_meta(record: Mapping[str, np.ndarray]) -> dict[str, Any]:
         raise TraceError(f"the record has no 'meta'. {_AGAIN}")
     try:
         meta = json.loads(str(record["meta"]))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise TraceError(f"the record's meta is not JSON ({error}). {_AGAIN}") from None
     missing = [key for key in META_KEYS if not isinstance(meta, dict) or key not in meta]
     if missing:
@@ -123,6 +124,10 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
     missing = [name for name in ARRAYS if name not in record]
     if missing:
         raise TraceError(f"the record lacks {', '.join(missing)}. {_AGAIN}")
+    check_meta(meta)
+    if not all(record[name].ndim == len(axes) for name, (axes, _) in LAYOUT.items()):
+        raise TraceError(f"the record's arrays have other shapes than a record's. {_AGAIN}")
+    check_kinds(record, {name: kind for name, (_, kind) in LAYOUT.items()})
     n, steps = len(meta["agent_ids"]), len(record["wanted"])
     sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(record["breaches"])}
     for name, (axes, _) in LAYOUT.items():
@@ -132,6 +137,7 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
     for name in _MUST_BE_FINITE:
         if not np.isfinite(record[name]).all():
             raise TraceError(f"the record's {name} holds NaN or infinity. {_AGAIN}")
+    check_places(record)
     _check_breaches(record["breaches"], steps, n)
     if len(meta["team"]) != n or len(meta["platforms"]) != n:
         raise TraceError(f"meta's team and platforms must have one entry for each of the {n} boats. {_AGAIN}")

@@ -32,6 +32,8 @@ PER_BOAT = (
     "agent_collisions",
 )
 PER_TEAM = ("flag_taken", "captures", "tags", "grabs")
+MOST_BOATS = 100
+"""Of a team."""
 META_KEYS = ("config", "team_size", "agent_ids", "dt", "obs_keys", "global_state_keys", "agent_radius")
 
 _REMEDY = "Record or copy it again."
@@ -93,12 +95,16 @@ def load_trace(path: str | os.PathLike[str]) -> Trace:
     """
     source = Path(path)
     arrays = read_arrays(source, "trace", _REMEDY)
-    meta = _read_meta(source, arrays)
     try:
-        config = from_pyquaticus(meta["config"], team_size=meta["team_size"], dt_s=meta["dt"])
+        meta = _read_meta(source, arrays)
+        config = from_pyquaticus(meta["config"], team_size=_team_size(meta), dt_s=meta["dt"])
+        _check_shapes(source, arrays, config, meta)
+    except TraceError:
+        raise
     except ConfigError as error:
         raise TraceError(f"{source}: its settings fit no game: {error}") from error
-    _check_shapes(source, arrays, config, meta)
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:  # whatever the file held
+        raise TraceError(f"{source} is no trace ({type(error).__name__}: {error}). {_REMEDY}") from error
     return Trace(source, meta, config, arrays)
 
 
@@ -107,7 +113,7 @@ def _read_meta(source: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         raise TraceError(f"{source} lacks meta. {_REMEDY}")
     try:
         meta = json.loads(str(arrays.pop("meta")))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise TraceError(f"{source}: meta is not JSON ({error}). {_REMEDY}") from error
     missing = [key for key in META_KEYS if not isinstance(meta, dict) or key not in meta]
     if missing:
@@ -115,6 +121,13 @@ def _read_meta(source: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     for name in ("obs_keys", "global_state_keys"):
         meta[name] = [tuple(key) if isinstance(key, list) else key for key in meta[name]]
     return meta
+
+
+def _team_size(meta: dict[str, Any]) -> int:
+    size = meta["team_size"]
+    if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= MOST_BOATS:
+        raise TraceError(f"team_size in meta is {size!r}; a trace has 1 to {MOST_BOATS} boats in a team. {_REMEDY}")
+    return size
 
 
 def _check_shapes(source: Path, arrays: dict[str, np.ndarray], config: GameConfig, meta: dict[str, Any]) -> None:
@@ -130,6 +143,12 @@ def _check_shapes(source: Path, arrays: dict[str, np.ndarray], config: GameConfi
     for name, shape in expected.items():
         if arrays[name].shape != shape or steps == 0:
             raise TraceError(f"{source}: {name} has shape {arrays[name].shape}, expected {shape}. {_REMEDY}")
+    for name in names:
+        if arrays[name].dtype.kind not in "fiub":
+            raise TraceError(f"{source}: {name} holds {arrays[name].dtype}, expected numbers. {_REMEDY}")
+    shape = arrays["global_state"].shape
+    if len(shape) != 2 or shape[0] != steps + 1:
+        raise TraceError(f"{source}: global_state has shape {shape}, expected {steps + 1} rows. {_REMEDY}")
     for name in ("position", "heading", "speed"):
         if not np.isfinite(arrays[name]).all():
             raise TraceError(f"{source}: {name} holds NaN or infinity. {_REMEDY}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
@@ -9,6 +10,7 @@ import typer
 from .commands.ablate import ablate
 from .commands.attack import attack
 from .commands.bench import bench
+from .commands.console import leave_failed
 from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
@@ -21,7 +23,9 @@ from .commands.referee import referee
 from .commands.render import render
 from .commands.replay import replay
 from .commands.sim_boats import sim_boats
+from .commands.warm_up import warm_up
 from .provenance import package_version
+from .terminal import prepare
 
 app = typer.Typer(
     name="steerclear",
@@ -48,6 +52,7 @@ for function in (
 ):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
+app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
 
 
@@ -65,13 +70,22 @@ def options(
 ) -> None:
     """A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.
 
-    Exit status of every command: 0 done, 1 a bar is not met, 2 bad input, 130 interrupted.
+    Exit status of every command: 0 done, 1 a bar is not met, 2 bad input, 70 a fault of steerclear, 130 interrupted.
     """
 
 
 def main() -> None:
-    """Run the command line."""
-    app(prog_name="steerclear")
+    """Run the command line; whatever happens ends in words, not in a traceback."""
+    prepare()
+    try:
+        app(prog_name="steerclear")
+    except BrokenPipeError:
+        raise  # Python ends quietly
+    except Exception as error:
+        try:
+            leave_failed(error)
+        except typer.Exit as leaving:
+            sys.exit(leaving.exit_code)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from .comparison import Cell, Contest, cells_of, contests_of, pool
 from .comparison_plot import plot_contests
 from .encounters.summary import upper_bound
-from .markdown import MADE, table
+from .markdown import MADE, line, table
 from .tables import number_text
 
 STEM = "comparison"
@@ -58,7 +58,7 @@ def _heading(contests: Sequence[Contest]) -> str:
 
 def _intro(versions: Sequence[str]) -> str:
     return (
-        f"Results of `steerclear encounters`, steerclear {', '.join(versions)}. "
+        f"Results of `steerclear encounters`, steerclear {line(', '.join(versions))}. "
         "All guards of a section met the same encounters. "
         "*Breached* counts encounters in which an own boat came within the radius of another boat, *avoidable* "
         "those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % upper limit "
@@ -72,13 +72,13 @@ def _intro(versions: Sequence[str]) -> str:
 
 
 def _winner_line(contest: Contest) -> str:
-    families = f"Families: {', '.join(contest.families)}; seed {contest.seed}."
+    families = line(f"Families: {', '.join(contest.families)}; seed {contest.seed}.")
     if contest.left_out:
-        families += f" Not met equally by all guards and left out: {', '.join(contest.left_out)}."
+        families += line(f" Not met equally by all guards and left out: {', '.join(contest.left_out)}.")
     if contest.winner is None or len(contest.cells) == 1:
         return families
     rule = "fewest avoidable or unjudged, then fewest breached, then fewest commands changed"
-    return f"Best ({rule}): **{contest.winner}**. {families}"
+    return f"Best ({rule}): **{line(contest.winner)}**. {families}"
 
 
 def _totals_table(contest: Contest) -> list[str]:

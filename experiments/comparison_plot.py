@@ -9,6 +9,7 @@ from typing import Any
 
 from .comparison import NO_GUARD, Contest
 from .encounters.summary import upper_bound
+from .plot_text import plot_text
 
 COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
 MARKS = ("o", "s", "^", "D")
@@ -74,7 +75,7 @@ def _draw_guards(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, str
         # the default smaller and on top: a guard that does the same shows around it
         size, order = (4, 4) if guard == "shield" else (6, 3)
         axis.errorbar(one["changed_percent"], share, [[0.0], [above]], fmt=mark, markersize=size, zorder=order,
-                      capsize=3, color=colour, label=guard)  # fmt: skip
+                      capsize=3, color=colour, label=plot_text(guard))  # fmt: skip
     axis.set_yscale("symlog", linthresh=LINEAR_PERCENT)
     axis.set_ylim(bottom=-0.02)
     axis.set_xlabel("commands changed, %", fontsize=8)
@@ -85,12 +86,14 @@ def _draw_families(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, s
     ((guard, cells),) = contest.cells.items()
     colour, mark = looks[guard]
     every = [(cells[family]["breached"], cells[family]["encounters"]) for family in contest.families]
-    _draw_shares(axis, every, -0.15, fmt=mark, color=colour, label=guard)
+    _draw_shares(axis, every, -0.15, fmt=mark, color=colour, label=plot_text(guard))
     outside = [
         (cells[family].get("breaches_outside"), cells[family].get("started_outside")) for family in contest.families
     ]
-    _draw_shares(axis, outside, 0.15, fmt="x", color=OUTSIDE, label=f"{guard}, started outside the unavoidable set")
-    axis.set_yticks(range(len(contest.families)), contest.families)
+    _draw_shares(
+        axis, outside, 0.15, fmt="x", color=OUTSIDE, label=f"{plot_text(guard)}, started outside the unavoidable set"
+    )
+    axis.set_yticks(range(len(contest.families)), [plot_text(family) for family in contest.families])
     axis.set_xscale("symlog", linthresh=LINEAR_PERCENT)
     axis.set_xlim(left=-0.02)
     axis.set_xlabel("encounters breached, %", fontsize=8)
@@ -118,7 +121,7 @@ def _share(part: int, whole: int) -> tuple[float, float]:
 
 
 def _dress(axis: Any, title: str) -> None:
-    axis.set_title(title, fontsize=9)
+    axis.set_title(plot_text(title), fontsize=9)
     axis.tick_params(labelsize=8)
     axis.spines[["top", "right"]].set_visible(False)
 

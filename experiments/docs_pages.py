@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.visible import visible
 
 from .bench.report import bench_tables
 from .comparison_page import STEM, write_comparison
 from .conditions import words_of
 from .docs_plots import plot_off_on
 from .keys import KEYS
-from .markdown import MADE, bars_table, table
+from .markdown import MADE, bars_table, line, table
 from .played_sets_page import played_page
 from .reach_show import tables_page
 from .tables import interval_text
@@ -41,18 +43,32 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
     Raises:
         ConfigError: results of another command or cut short, or the folder cannot be written to.
     """
+    for content in results:
+        check_source(content)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         pages, pictures = _pages_of(results, folder)
         for name, text in pages.items():
-            (folder / name).write_text(text)
+            (folder / name).write_text(text, encoding="utf-8")
+    except ConfigError:
+        raise
     except OSError as error:
         raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
-    except (KeyError, TypeError, AttributeError, IndexError) as error:  # content is whatever a file held
-        raise ConfigError(
-            f"results are cut short or of another version ({type(error).__name__}: {error}); make them again"
-        ) from error
+    except Exception as error:  # content is whatever a file held
+        why = visible(f"{type(error).__name__}: {error}")[:200]
+        raise ConfigError(f"results are cut short or of another version ({why}); make them again") from error
     return [*(folder / name for name in pages), *pictures]
+
+
+def check_source(content: Mapping[str, Any]) -> None:
+    """Refuse results that no page is made of.
+
+    Raises:
+        ConfigError: they are of another command.
+    """
+    command = content.get("command")
+    if not isinstance(command, str) or command not in (*POOLED, "bench", "ablate", "evaluate"):
+        raise ConfigError(f"no page can be made of results of {command!r}; give results of {SOURCES}")
 
 
 def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[str, str], list[Path]]:
@@ -90,10 +106,10 @@ def _page_of(content: Mapping[str, Any], folder: Path) -> Page:
     command = content.get("command")
     if command == "bench":
         return "bench.md", bench_page(content), []
-    if command not in ("ablate", "evaluate"):
-        raise ConfigError(f"no page can be made of results of {command!r}; give results of {SOURCES}")
     stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
     stem += _apart(content["settings"].get("conditions") or {})
+    if re.fullmatch(r"[\w.+-]{1,200}", stem) is None:  # it becomes the name of a file
+        raise ConfigError(f"results of a game {content['settings']['preset']!r} that there is not; make them again")
     plots = _plots(content, folder, stem) if command == "ablate" and content["pairings"] else []
     return f"{stem}.md", runs_page(content, plots), plots
 
@@ -116,10 +132,10 @@ def _plots(content: Mapping[str, Any], folder: Path, stem: str) -> list[Path]:
 def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     """Write the page of an ablation or evaluation."""
     settings = content["settings"]
-    lines = [f"# {settings['own']} on {settings['preset']}", "", MADE, "", _what_was_played(content), ""]
+    lines = [f"# {line(settings['own'])} on {line(settings['preset'])}", "", MADE, "", _what_was_played(content), ""]
     lines += [f"![off and on]({path.name})\n" for path in plots]
     for summary in content["pairings"]:
-        lines += [f"## {summary['pairing']}", "", *_metrics_table(summary), ""]
+        lines += [f"## {line(summary['pairing'])}", "", *_metrics_table(summary), ""]
         if summary.get("verdicts"):
             lines += ["Breaches judged in hindsight:", "", *table(HEADS, _verdicts(summary)), ""]
         if summary["reasons"]:
@@ -133,7 +149,7 @@ def bench_page(content: Mapping[str, Any]) -> str:
     """Write the page of a benchmark."""
     lines = ["# Speed and memory", "", MADE, "", _machine_line(content), ""]
     for one in bench_tables(content):
-        lines += [f"## {one.title}", "", *table(one.heads, one.rows), ""]
+        lines += [f"## {line(one.title)}", "", *table(one.heads, one.rows), ""]
     return "\n".join([*lines, "## Bars", "", *bars_table(content["bars"]), ""])
 
 
@@ -155,7 +171,8 @@ def _what_was_played(content: Mapping[str, Any]) -> str:
         f"{size}{settings['games']} games per pairing and shield state"
         + (f" of {length:g} s" if length else "")
         + (f" under {conditions}" if conditions else "")
-        + f", seeds {content['seeds'][0]} to {content['seeds'][-1]}, steerclear {content['versions']['steerclear']}. "
+        + f", seeds {content['seeds'][0]} to {content['seeds'][-1]}, "
+        f"steerclear {line(content['versions']['steerclear'])}. "
         "Means per game with 95 % intervals (Poisson for counts, Wilson for shares, bootstrap for means)."
     )
 
@@ -164,7 +181,7 @@ def _machine_line(content: Mapping[str, Any]) -> str:
     machine, versions = content["machine"], content["versions"]
     packages = ", ".join(f"{name} {version}" for name, version in versions.items() if version)
     hardware = f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gib']} GiB, {machine['system']}"
-    return f"{hardware}. {packages}."
+    return line(f"{hardware}. {packages}.")
 
 
 def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
@@ -183,4 +200,4 @@ def _verdicts(summary: Mapping[str, Any]) -> list[list[str]]:
 def _reasons_line(reasons: Mapping[str, int]) -> str:
     total = sum(reasons.values()) or 1
     parts = [f"{name} {100 * count / total:.2f} %" for name, count in reasons.items() if count]
-    return f"Decisions: {', '.join(parts)} of {total:,} boat-steps."
+    return line(f"Decisions: {', '.join(parts)} of {total:,} boat-steps.")

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .plot_text import plot_text
+
 COLOURS = {"off": "#b5532a", "on": "#1f6f8b"}
 
 
@@ -25,7 +27,8 @@ def plot_off_on(pairings: Sequence[Mapping[str, Any]], figures: Sequence[tuple[s
     axes = canvas.subplots(1, len(figures), squeeze=False)[0]
     for axis, (name, title) in zip(axes, figures, strict=True):
         _draw(axis, [pairing["metrics"][name] for pairing in pairings], title)
-        axis.set_xticks(np.arange(len(pairings)), [pairing["pairing"].replace(" vs ", "\nvs ") for pairing in pairings])
+        names = [plot_text(pairing["pairing"].replace(" vs ", "\nvs ")) for pairing in pairings]
+        axis.set_xticks(np.arange(len(pairings)), names)
     axes[0].legend(frameon=False)
     canvas.savefig(path)
     return path

@@ -31,8 +31,6 @@ def _digest_beside(folder: Path) -> str:
 def kernel(function: F) -> F:
     """Compile as `steerclear.shield.jit.kernel` does; a changed callee beside it or in `FOLDERS` is never run stale."""
     compiled = jit.kernel(function)
-    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if cache_file is not None and hasattr(cache_file, "_source_stamp"):
-        beside = _digest_beside(Path(function.__code__.co_filename).parent)
-        cache_file._source_stamp = (*cache_file._source_stamp, beside)
+    kept = compiled._cache
+    kept.stamp = (*kept.stamp, _digest_beside(Path(function.__code__.co_filename).parent))
     return compiled

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from steerclear.shield.visible import visible
 
 from .tables import measured_text, number_text
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 
 
+def line(content: object) -> str:
+    """Text of one line that a page shows as it is: no HTML, no link, nothing that turns letters round."""
+    text = re.sub(r"<(?=[a-zA-Z/!?])", "&lt;", visible(content))
+    return text.replace("](", "]\\(").replace("`", "\\`")
+
+
+def cell(content: object) -> str:
+    """Text of a table's cell: as `line`, and no bar ends it. Code in backticks is for our own words."""
+    text = str(content)
+    ours = text.startswith("`") and text.endswith("`") and text.count("`") == 2
+    return (visible(text) if ours else line(text)).replace("|", "\\|")
+
+
 def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
     """Lines of a table: the first column words, the others numbers."""
     ruler = ["---", *("---:" for _ in heads[1:])]
-    return [f"| {' | '.join(str(cell) for cell in row)} |" for row in (heads, ruler, *rows)]
+    body = [[cell(one) for one in row] for row in (heads, *rows)]
+    return [f"| {' | '.join(row)} |" for row in (body[0], ruler, *body[1:])]
 
 
 def bars_table(bars: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches
 from steerclear.env.record_meta import meta_of
+from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
@@ -108,7 +109,9 @@ class Match:
         if self._log is not None:
             self._log.start(self.env.core)
         if self.env.renderer is not None:
-            self.env.renderer.describe(meta)
+            from steerclear.env.render import Arena  # draws with pygame: only where there is a window
+
+            self.env.renderer.describe(replace(Arena.from_meta(meta), steered=self._steered()))
             self.env.renderer.speedup = self.speedup
         return answer
 
@@ -129,6 +132,12 @@ class Match:
             reason_names=self.shielding.reason_names,
             title=self._title(),
         )
+
+    def _steered(self) -> frozenset[str]:
+        """Boats that a human steers: the first of a team whose policy is the keyboard."""
+        size = self.env.config.team_size
+        first = zip(self.names.values(), self.env.possible_agents[::size], strict=True)
+        return frozenset(agent for name, agent in first if name == KEYBOARD)
 
     def _title(self) -> str:
         """Who plays, under which conditions; the usual title where there are none."""

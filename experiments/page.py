@@ -12,6 +12,7 @@ from typing import Any
 
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.visible import visible
 
 
 def template(name: str) -> str:
@@ -55,14 +56,22 @@ def report_page(name: str, parts: Mapping[str, str]) -> str:
 
 
 def as_json(content: Any) -> str:
-    """Return JSON that may stand inside a script element whatever texts it holds."""
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    """Return JSON that may stand inside a script element whatever texts it holds; they are as `as_text` shows them."""
+    text = json.dumps(_visible_in(content), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def as_text(content: Any) -> str:
-    """Return text that may stand inside an element or an attribute."""
-    return html.escape(str(content))
+    """Return text that may stand inside an element or an attribute: no mark-up, nothing that turns letters round."""
+    return html.escape(visible(content, keep="\n\t"))
+
+
+def _visible_in(content: Any) -> Any:
+    if isinstance(content, str):
+        return visible(content, keep="\n\t\u2028\u2029")
+    if isinstance(content, Mapping):
+        return {visible(key): _visible_in(value) for key, value in content.items()}
+    return [_visible_in(value) for value in content] if isinstance(content, list | tuple) else content
 
 
 def write_page(path: str | os.PathLike[str], page: str) -> Path:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from .markdown import MADE, bars_table, table
+from .markdown import MADE, bars_table, line, table
 from .played_sets import BAND_M, BEYOND, LONGEST_S, PlayedSet
 from .provenance import machine, versions
 from .unsafe_sets import RATIO_BAR
@@ -74,9 +74,9 @@ def played_page(contents: Sequence[Mapping[str, Any]]) -> str:
     for content in contents:
         settings = content["settings"]
         sets = [PlayedSet(**{name: one[name] for name in one if name != "ratio"}) for one in content["sets"]]
-        lines += [f"## {settings['own']} meets {settings['other']}, {settings['radius_m']:g} m", ""]
+        lines += [f"## {line(settings['own'])} meets {line(settings['other'])}, {settings['radius_m']:g} m", ""]
         if settings["shield"]:
-            lines += [f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}.", ""]
+            lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
         lines += [*table(HEADS, rows_of(sets)), "", *bars_table(content["bars"]), ""]
-        lines += [f"steerclear {content['versions']['steerclear']}.", ""]
+        lines += [f"steerclear {line(content['versions']['steerclear'])}.", ""]
     return "\n".join(lines)

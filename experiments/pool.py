@@ -27,6 +27,10 @@ DIED = "its worker process died, also when it ran alone (out of memory?); mend t
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
+MOST_JOBS = 1024
+"""More processes than any machine has cores fill its memory before the first has begun."""
+
+
 @dataclass(frozen=True)
 class Outcome(Generic[Job, Answer]):
     """What became of one job: an answer, or the one-line reason why there is none."""
@@ -45,10 +49,12 @@ def check_jobs(jobs: int | None) -> int:
     """Return the number of processes to use; all cores when not given.
 
     Raises:
-        ConfigError: less than one.
+        ConfigError: less than one, or more than `MOST_JOBS`.
     """
-    if jobs is not None and jobs < 1:
-        raise ConfigError(f"--jobs must be at least 1; got {jobs}; leave it out to use all cores")
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise ConfigError(
+            f"--jobs must be at least 1 and at most {MOST_JOBS:,}; got {jobs:,}; leave it out to use all cores"
+        )
     return jobs or available_cores()
 
 

@@ -15,7 +15,8 @@ from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.files import ValueTable
 from steerclear.shield.tables.make import COARSER
 
-from .markdown import MADE, table
+from .markdown import MADE, line, table
+from .plot_text import plot_text
 from .tables import titled
 
 COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
@@ -73,7 +74,7 @@ def tables_page(cards: Sequence[str]) -> str:
     lines = ["# Value tables: figures", "", MADE, "", "What the words mean: [tables.md](tables.md).", ""]
     for card in map(Card.of_json, cards):
         radii = [f"{radius:g}" for radius in card.checked_radii_m]
-        lines += [f"## {card.own} with {card.other}, {card.other_may}", "", _made_how(card), ""]
+        lines += [f"## {line(f'{card.own} with {card.other}, {card.other_may}')}", "", _made_how(card), ""]
         lines += [*table(["", *(f"{radius} m" for radius in radii)], worth(card)), "", _model_errors(card), ""]
         for radius in radii:
             lines += [f"Areas, m², from which {radius} m cannot be kept, by speeds and relative heading:", ""]
@@ -130,12 +131,22 @@ def draw_sets(values: ValueTable, radii_m: tuple[float, ...], path: Path) -> Pat
         axis.set(xlim=(-1.1 * farthest, 1.1 * farthest), ylim=(-1.1 * farthest, 1.1 * farthest))
     panels.flat[0].legend(fontsize=6, loc="upper left")
     title = f"{values.card.own} (bow up) with {values.card.other}, {values.card.other_may}"
-    canvas.suptitle(f"{title}: where the other boat must not be, m")
+    canvas.suptitle(f"{plot_text(title)}: where the other boat must not be, m")
     try:
         canvas.savefig(path)
     except (OSError, ValueError) as error:
         raise TableError(f"picture {path} cannot be written ({error}); give a .png or .svg file") from error
     return path
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse a picture of a kind that cannot be drawn, before anything is.
+
+    Raises:
+        TableError: its ending is another than .png or .svg.
+    """
+    if path is not None and path.suffix.lower() not in (".png", ".svg"):
+        raise TableError(f"--picture {path} does not end in .png or .svg; give a name that does")
 
 
 def _draw_panel(

@@ -10,9 +10,19 @@ from typing import Any
 from steerclear.shield.exceptions import ConfigError
 
 from .conditions import words_of
+from .meanings import reasons_told
 from .page import as_text, report_page, template, write_page
-from .report_parts import bars_table, games_table, headlines, legend, pairing_tables, replay_links, values_table
-from .report_plots import closest_plot, figure_plot, reason_plot
+from .report_parts import (
+    bars_table,
+    games_table,
+    headlines,
+    legend,
+    meanings,
+    pairing_tables,
+    replay_links,
+    values_table,
+)
+from .report_plots import closest_plot, figure_plot, reason_plot, reasons_of, words
 from .report_verdicts import breaches_table, verdict_tables
 from .tally import RADII_M, breach_column
 
@@ -125,6 +135,7 @@ def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
 def _plots(results: Mapping[str, Any], separation_m: float) -> str:
     pairings = results["pairings"]
     reasons, names = reason_plot(pairings)
+    told = meanings([(words(name), meaning) for name, meaning in reasons_told(reasons_of(pairings))])
     off_on = legend([("off", "shield off"), ("on", "shield on")])
     hits = "hits with {} per game, centres within " + f"{separation_m:g} m"
     figures = [
@@ -133,7 +144,7 @@ def _plots(results: Mapping[str, Any], separation_m: float) -> str:
         ("Captures", off_on, figure_plot(pairings, "captures", "captures per game")),
         ("Closest distance", off_on, closest_plot(pairings, results["games"], separation_m)),
         ("Steps changed", "", figure_plot(pairings, "changed_share", "steps changed, %", CHANGED_SHARE_GOAL)),
-        ("Why commands were changed", legend(names), reasons),
+        ("Why commands were changed", legend(names), reasons + told),
     ]
     return "".join(f'<figure class="card"><h3>{title}</h3>{key}{plot}</figure>' for title, key, plot in figures)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .meanings import FIGURES
 from .page import as_text
 from .report_plots import number
 from .tables import interval_text, limits_text, measured_text, number_text
@@ -73,6 +74,12 @@ def legend(entries: Sequence[tuple[str, str]]) -> str:
     return f'<p class="legend">{keys}</p>' if entries else ""
 
 
+def meanings(entries: Sequence[tuple[str, str]]) -> str:
+    """Write words with what they mean."""
+    lines = "".join(f"<dt>{as_text(name)}</dt><dd>{as_text(meaning)}</dd>" for name, meaning in entries)
+    return f'<dl class="note">{lines}</dl>' if entries else ""
+
+
 def pairing_tables(pairings: Sequence[Summary]) -> str:
     """Write a table of all figures of each pairing."""
     return "".join(_pairing_table(pairing) for pairing in pairings)
@@ -84,7 +91,8 @@ def _pairing_table(pairing: Summary) -> str:
     rows = []
     for name, figures in pairing["metrics"].items():
         cells = "".join(f'<td class="number">{as_text(interval_text(figures.get(key)))}</td>' for key, _ in heads)
-        rows.append(f"<tr><td>{as_text(figures.get('label', name))}</td>{cells}</tr>")
+        meaning = f'<p class="note">{as_text(FIGURES[name])}</p>' if name in FIGURES else ""
+        rows.append(f"<tr><td>{as_text(figures.get('label', name))}{meaning}</td>{cells}</tr>")
     played = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield"
     title = f"<h3>{as_text(pairing['pairing'])}</h3><p class='note'>{played}; per game [95 % interval]</p>"
     return f'<section class="card wide">{title}<table><tr>{head}</tr>{"".join(rows)}</table></section>'

@@ -62,7 +62,7 @@ def reason_plot(pairings: Sequence[Summary]) -> tuple[str, list[tuple[str, str]]
     Returns:
         An ``svg`` element and its legend: class and name of each reason.
     """
-    names = [name for name in dict.fromkeys(n for p in pairings for n in p["reasons"]) if name.lower() != PASSED]
+    names = reasons_of(pairings)
     styles = {name: f"reason-{k}" for k, name in enumerate(names)}
     groups = []
     for pairing in pairings:
@@ -74,6 +74,11 @@ def reason_plot(pairings: Sequence[Summary]) -> tuple[str, list[tuple[str, str]]
     return share_plot(groups, "commands the shield changed, % of all it decided"), [
         (styles[name], words(name)) for name in names
     ]
+
+
+def reasons_of(pairings: Sequence[Summary]) -> list[str]:
+    """Names of the reasons for which commands were changed."""
+    return [name for name in dict.fromkeys(n for p in pairings for n in p["reasons"]) if name.lower() != PASSED]
 
 
 def words(name: str) -> str:

@@ -2,7 +2,9 @@
 
 Wilson for shares (Wilson 1927), exact Poisson limits for counts (Garwood 1936), the percentile bootstrap
 for means and ratios (Efron 1979). A count of zero still has an upper limit: ``-ln(0.05) = 3.0`` events over
-all games, the rule of three (Hanley and Lippman-Hand 1983).
+all games, the rule of three (Hanley and Lippman-Hand 1983). Resampling games that are all alike gives the same
+number again and again, which is no interval: ratios and differences of counts then have exact limits
+(Clopper and Pearson 1934), means none.
 """
 
 from __future__ import annotations
@@ -109,18 +111,71 @@ def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: 
 
 
 def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
-    """Bootstrap interval of ``sum(on) / sum(off)``, pairs resampled together; NaN where nothing happened off.
+    """Interval of a ratio of counts, ``sum(on) / sum(off)``: bootstrap, pairs resampled together.
+
+    Where one of them never happened, or every resample gives the same ratio, the limits are those of
+    `count_ratio_interval`.
 
     Raises:
         ConfigError: the two differ in length, so that they cannot be pairs.
     """
-    return bootstrap_interval(np.column_stack(_pair(off, on)), _ratio_of_totals, seed, confidence)
+    rows = np.column_stack(_pair(off, on))
+    if len(rows) == 0:
+        return Interval(float("nan"), float("nan"), float("nan"))
+    totals = rows.sum(axis=0)
+    found = bootstrap_interval(rows, _ratio_of_totals, seed, confidence) if totals.all() else None
+    if found is not None and (len(rows) < 2 or not np.isnan(found.low)):
+        return found
+    return count_ratio_interval(int(totals[0]), int(totals[1]), confidence)
+
+
+def count_ratio_interval(off: int, on: int, confidence: float = CONFIDENCE) -> Interval:
+    """Exact limits of the ratio of two rates, ``on / off``, counted over the same exposure.
+
+    Of all events, those counted ``on`` are a binomial share p, and the ratio is p / (1 - p). With no event on one side
+    all of the error probability goes to the limit on the other; with none at all the ratio may be anything.
+
+    Args:
+        off: events in the denominator.
+        on: events in the numerator.
+        confidence: probability that the interval covers the true ratio, at least.
+
+    Raises:
+        ConfigError: a negative count, or a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    if min(off, on) < 0:
+        raise ConfigError(f"a ratio of counts needs counts >= 0; got {on} over {off}")
+    infinite = float("inf")
+    if off == on == 0:
+        return Interval(float("nan"), 0.0, infinite)
+    tail = (1.0 - confidence) / (2.0 if off and on else 1.0)
+    low = float(stats.beta.ppf(tail, on, off + 1)) if on else 0.0
+    high = float(stats.beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
+    low, high = (share / (1.0 - share) if share < 1.0 else infinite for share in (low, high))
+    return Interval(on / off if off else infinite, low, high)
+
+
+def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+    """Interval of the mean of ``on - off`` of counts, games paired by position.
+
+    As `paired_difference`; where the games are all alike, the limits are those that the two rates by themselves leave.
+
+    Raises:
+        ConfigError: the two differ in length, so that they cannot be pairs.
+    """
+    off_values, on_values = _pair(off, on)
+    found = paired_difference(off_values, on_values, seed, confidence)
+    if len(off_values) < 2 or not np.isnan(found.low):
+        return found
+    before, after = (count_interval(int(v.sum()), len(v), confidence) for v in (off_values, on_values))
+    return Interval(found.value, after.low - before.high, after.high - before.low)
 
 
 def bootstrap_interval(
     rows: NDArray[np.float64], statistic: Statistic, seed: int = 0, confidence: float = CONFIDENCE
 ) -> Interval:
-    """Percentile bootstrap of any statistic of games.
+    """Percentile bootstrap of any statistic of games; limits are NaN where every resample gives the same number.
 
     Args:
         rows: (n, k), one row per game, resampled as a whole.
@@ -141,7 +196,7 @@ def bootstrap_interval(
     picks = np.random.default_rng(seed).integers(0, len(rows), size=(RESAMPLES, len(rows)))
     resampled = statistic(rows[picks])
     resampled = resampled[np.isfinite(resampled)]
-    if len(resampled) == 0:
+    if len(resampled) == 0 or np.ptp(resampled) == 0.0:
         return Interval(value, nan, nan)
     tail = (1.0 - confidence) / 2.0
     low, high = np.quantile(resampled, [tail, 1.0 - tail])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .statistics import (
     Interval,
     bootstrap_interval,
+    count_difference,
     count_interval,
     mean_interval,
     paired_difference,
@@ -34,6 +35,7 @@ class Metric:
         interval: from the rows of games to the figure.
         per_game: from one row to the number whose paired difference is meaningful; None where there is none.
         only_on: it describes the shield, so that there is nothing to show for games without.
+        counted: it is a number of events per game.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Metric:
     interval: Callable[[Sequence[Row]], Interval]
     per_game: Callable[[Row], float | None] | None = None
     only_on: bool = False
+    counted: bool = False
 
 
 def summarise(rows: Sequence[Row], radii_m: Sequence[float], seed: int = 0) -> dict[str, Any]:
@@ -87,13 +90,13 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
         *((breach_column("opponent", r), f"hits opp. {r:g} m") for r in radii_m),
     ]
     return [
-        *(Metric(name, label, partial(_count, name), partial(_number, name)) for name, label in counts),
+        *(_counted(name, label) for name, label in counts),
         Metric("clean_games", "games without hit", partial(_clean_games, min(radii_m))),
         Metric("closest_m", "closest, mean m", partial(_mean, "closest_m", seed), partial(_number, "closest_m")),
         Metric("closest_of_all_m", "closest of all, m", _closest_of_all),
         Metric("changed_share", "steps changed, %", partial(_changed_percent, seed), only_on=True),
         *_shield_means(seed),
-        Metric("deadlocks", "deadlocks", partial(_count, "deadlocks"), partial(_number, "deadlocks")),
+        _counted("deadlocks", "deadlocks"),
         *(
             Metric(name, label, partial(_mean, name, seed), partial(_number, name))
             for name, label in (
@@ -103,6 +106,10 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
             )
         ),
     ]
+
+
+def _counted(name: str, label: str) -> Metric:
+    return Metric(name, label, partial(_count, name), partial(_number, name), counted=True)
 
 
 def _shield_means(seed: int) -> list[Metric]:
@@ -127,7 +134,8 @@ def _figures(metric: Metric, off: Mapping[int, Row], on: Mapping[int, Row], seed
     if metric.per_game is not None and both:
         pairs = [(metric.per_game(off[game]), metric.per_game(on[game])) for game in both]
         values = np.array([pair for pair in pairs if None not in pair], dtype=np.float64).reshape(-1, 2)
-        figures["difference"] = asdict(paired_difference(values[:, 0], values[:, 1], seed))
+        difference = count_difference if metric.counted else paired_difference
+        figures["difference"] = asdict(difference(values[:, 0], values[:, 1], seed))
     return figures
 
 

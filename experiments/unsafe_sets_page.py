@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from .markdown import MADE, bars_table, table
+from .markdown import MADE, bars_table, line, table
 from .provenance import machine, versions
 from .unsafe_sets import MISSED_PERCENT_BAR, RATIO_BAR, SetPair
 
@@ -86,12 +86,15 @@ def sets_page(contents: Sequence[Mapping[str, Any]]) -> str:
     lines = [TITLE, "", MADE, "", WORDS, ""]
     for content in contents:
         pairs, settings = [SetPair(**pair) for pair in content["pairs"]], content["settings"]
-        lines += [f"## {settings['own']} meets {settings['other']}, {settings['radius_m']:g} m", ""]
+        lines += [f"## {line(settings['own'])} meets {line(settings['other'])}, {settings['radius_m']:g} m", ""]
         if settings["shield"]:
-            lines += [f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}.", ""]
+            lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
         if content["looked_up"]:
             lines += [LOOKED_UP, ""]
         lines += [*table(HEADS, rows_of(pairs)), "", *bars_table(content["bars"]), ""]
         met = sum(all(bar["met"] is not False for bar in sets_bars([pair], content["looked_up"])) for pair in pairs)
-        lines += [f"{met} of {len(pairs)} rows within the bars. steerclear {content['versions']['steerclear']}.", ""]
+        lines += [
+            f"{met} of {len(pairs)} rows within the bars. steerclear {line(content['versions']['steerclear'])}.",
+            "",
+        ]
     return "\n".join(lines)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,8 @@ from .pool import run_all
 from .spec import MatchSpec
 
 SECONDS = 1.0
+WARMED = 3
+"""Parts that games may need: the game, the shield, the judge."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,15 @@ class WarmUp:
     judge: bool = False
 
 
-def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
+def warm_up(specs: Sequence[MatchSpec], processes: int, notice: Callable[[int], None] = lambda done: None) -> None:
     """Compile what the games need: the game and its policies in one process, the shield in another.
 
     What goes wrong here is left to the games themselves to report.
+
+    Args:
+        specs: the games.
+        processes: how many at once.
+        notice: told how many of `WARMED` parts are ready.
     """
     unshielded = {spec.opponent: replace(spec, shield=None, opponent_shield=None) for spec in specs}
     parts = [WarmUp(game=_short(spec)) for spec in list(unshielded.values())[:1]]
@@ -37,8 +44,23 @@ def warm_up(specs: Sequence[MatchSpec], processes: int) -> None:
     parts += [WarmUp(shield=dict(settings)) for settings in shields[:1]]
     if any(spec.judged for spec in specs):
         parts.append(WarmUp(judge=True))
-    for _ in run_all(compile_part, parts, processes):
-        pass
+    notice(WARMED - len(parts))
+    for done, _ in enumerate(run_all(compile_part, parts, processes), WARMED - len(parts) + 1):
+        notice(done)
+
+
+def parts_of_all() -> list[tuple[str, Callable[[], object]]]:
+    """Everything that commands compile, each part with its name; what one part compiles the next finds."""
+    from .encounters import measure
+
+    game = _short(MatchSpec(preset="aamas2024", own="medium", opponent="easy", shield={}))
+    return [
+        ("the shield", lambda: Shield().warm_up()),
+        ("the shield, each boat by itself", lambda: Shield(ShieldConfig(coordination="per_boat")).warm_up()),
+        ("the game", lambda: play_match(game)),
+        ("the judge", compile_oracle),
+        ("encounters", lambda: measure("rammer_1", n=1)),
+    ]
 
 
 def compile_part(part: WarmUp) -> None:

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .kept_code import KeptCode
+
 F = TypeVar("F", bound=Callable[..., Any])
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,12 +61,22 @@ def _compiled(function: F, counted: bool) -> F:
 
     Its stamp is therefore replaced by one over all sources, so that no stale machine code is ever run.
     """
-    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": counted}
-    compiled = njit(**options)(function)
-    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if cache_file is not None and hasattr(cache_file, "_source_stamp"):
-        cache_file._source_stamp = _tree_stamp()
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": counted}
+    compiled: Any = njit(**options)(function)
+    compiled._cache = kept = KeptCode(function)
+    kept.stamp = _tree_stamp()
     return cast(F, compiled)
+
+
+def kept_in() -> str:
+    """Where machine code is kept, in words; empty: nowhere."""
+    place = getattr(copy_row, "_cache").cache_path  # noqa: B009 (a dispatcher's; the type is the function's)
+    root = Path(__file__).parent.parent
+    if place is None:
+        return ""
+    if Path(place).is_relative_to(root):
+        return f"{root}, in the __pycache__ folders"
+    return str(Path(place).parent)
 
 
 @lean_kernel

@@ -50,6 +50,7 @@ class Arena:
         obstacles: Fixed obstacles.
         dt_s: Length of a step.
         title: Text for the header's middle.
+        steered: Names of the boats that a human steers.
     """
 
     bounds_m: tuple[float, float]
@@ -67,6 +68,7 @@ class Arena:
     obstacles: tuple[Obstacle, ...] = field(default=())
     dt_s: float = 0.1
     title: str = ""
+    steered: frozenset[str] = frozenset()
 
     @classmethod
     def from_meta(cls, meta: Mapping[str, Any]) -> Arena:

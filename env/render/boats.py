@@ -56,13 +56,20 @@ def draw_boats(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme, show_co
             _draw_command(canvas, scene, boat, arena, theme)
     for boat in boats:
         _draw_hull(canvas, scene, boat, arena, theme)
+        if arena.names[boat] in arena.steered:
+            _mark_steered(canvas, scene.position_m[boat], arena.hull_length_m(boat), theme)
     for team in (0, 1):
         draw_flag(canvas, scene.flag_position_m[team], theme.team[team], theme.ink)
 
 
 def _draw_separation(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme) -> None:
-    """Draw a disc of half the separation around each boat: two discs that touch are a breach."""
-    breached = {boat for pair in boats_in_breach(scene, arena.separation_m) for boat in pair}
+    """Draw a disc of half the separation around each boat: two discs that touch are a breach.
+
+    Where boats are shielded, a breach is one of theirs: for others among themselves no shield answers.
+    """
+    pairs = boats_in_breach(scene, arena.separation_m)
+    covered = {boat for boat, name in enumerate(arena.names) if name in arena.shielded}
+    breached = {boat for pair in pairs if not covered or covered & set(pair) for boat in pair}
     radius_m = arena.separation_m / 2
     for boat, centre in enumerate(scene.position_m):
         changed = scene.overlay is not None and bool(scene.overlay.intervened[boat])
@@ -124,6 +131,13 @@ def _draw_hull(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: The
     canvas.polygon(centre + turned(DECK * length_m, heading_deg), colour if tagged else mix(colour, theme.plate, 0.5))
     if tagged:
         _draw_cross(canvas, centre, length_m * 0.36, theme.ink)
+
+
+def _mark_steered(canvas: Canvas, centre: np.ndarray, length_m: float, theme: Theme) -> None:
+    """Two rings around the boat that a human steers."""
+    reach_m = 0.75 * max(length_m, MIN_HULL_PX / canvas.scale_px_per_m)
+    for share in (1.0, 1.25):
+        canvas.ring(centre, share * reach_m, theme.ink, 1.8, 1.0)
 
 
 def _draw_cross(canvas: Canvas, centre: np.ndarray, reach_m: float, colour: Colour) -> None:

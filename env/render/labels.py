@@ -34,13 +34,17 @@ def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Ar
     changed = np.zeros(len(spots), bool) if scene.overlay is None else np.asarray(scene.overlay.intervened)
     for boat in np.argsort(~changed, kind="stable").tolist():
         if changed[boat]:
-            text = f"{boat}  {_shield_text(scene, boat, arena)}"
+            text = f"{_name(boat, arena)}  {_shield_text(scene, boat, arena)}"
             _plate(surface, text, spots[boat], reach_px, taken, (theme.ink, theme.changed, theme.plate))
         else:
-            text = f"{boat} out" if scene.oob[boat] else str(boat)
+            text = f"{_name(boat, arena)} out" if scene.oob[boat] else _name(boat, arena)
             place = free_place(surface.get_rect(), font(NUMBER_PX, True).size(text), spots[boat], reach_px, taken)
             draw_text(surface, text, place.center, theme.team[arena.team[boat]], NUMBER_PX, True, "center")
             taken.append(place)
+
+
+def _name(boat: int, arena: Arena) -> str:
+    return f"{boat} you" if arena.names[boat] in arena.steered else str(boat)
 
 
 def _marks_to_keep_clear(canvas: Canvas, scene: Scene) -> list[pygame.Rect]:

@@ -7,8 +7,14 @@ from steerclear.env.render.arena import Arena
 from steerclear.env.render.canvas import font
 from steerclear.env.render.scene import Scene, closest_pair
 from steerclear.env.render.theme import Colour, Theme
+from steerclear.shield.visible import visible
 
 HEADER_PX = 62
+STEERING = "you: ringed   ahead ↑ W   turn ← → A D   back ↓ S   half speed Shift   stop: no key"
+"""What the keys do, as `steerclear.policies` reads them."""
+
+MOST_LETTERS = 200
+"""Of a line; what is longer fits in no picture."""
 FOOTER_PX = 40
 TEAM_NAMES = ("BLUE", "RED")
 
@@ -36,7 +42,7 @@ def draw_text(
     Returns:
         The rectangle written to.
     """
-    image = font(size_px, bold).render(text, True, colour)
+    image = font(size_px, bold).render(visible(text)[:MOST_LETTERS], True, colour)
     box = image.get_rect()
     setattr(box, anchor, (round(at_px[0]), round(at_px[1])))
     surface.blit(image, box)
@@ -74,6 +80,8 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme, margin_px: 
     """Explain the marks below the field."""
     y = surface.get_height() - FOOTER_PX / 2
     x = float(margin_px)
+    if arena.steered:
+        x = draw_text(surface, STEERING, (x, y), theme.ink, 14, True).right + 26
     entries = (
         ("arrow", theme.wanted, 2, "wanted by the policy"),
         ("arrow", theme.changed, 5, "sent by the shield instead"),

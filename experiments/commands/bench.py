@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from rich.text import Text
+
 from ..bench.report import bench_tables
 from ..bench.run import BenchSettings, run_bench
 from ..store import write_json
@@ -37,7 +39,7 @@ def bench(
 
 def _run(settings: BenchSettings) -> dict[str, Any]:
     with err().status("measuring") as status:
-        return run_bench(settings, lambda words: status.update(f"measuring: {words}"))
+        return run_bench(settings, lambda words: status.update(Text(f"measuring: {words}")))
 
 
 def _show(content: dict[str, Any]) -> None:

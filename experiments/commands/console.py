@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
 from collections.abc import Callable, Iterator
@@ -11,13 +12,18 @@ from typing import Any, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
+from rich.errors import LiveError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from steerclear.shield.compiling import told_to
 from steerclear.shield.exceptions import SteerclearError
 
+from ..faults import fault_words, machine_words
 from ..pool import interrupted_by_sigterm
+from ..terminal import SafeConsole
 from .files import check_files
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+COMPILING_WORDS = "compiling for this machine, once: a minute or two (steerclear warm-up does it beforehand)"
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
 
@@ -29,6 +35,7 @@ class ExitCode(IntEnum):
     BAR_FAILED = 1
     BAD_INPUT = 2
     NOT_PROVED = 3
+    FAULT = 70
     INTERRUPTED = 130
 
 
@@ -38,13 +45,13 @@ class Interrupted(Exception):
 
 def out() -> Console:
     """Return the console for results."""
-    console = Console(highlight=False, soft_wrap=False)
-    return console if console.width <= MAX_WIDTH else Console(highlight=False, width=MAX_WIDTH)
+    console = SafeConsole()
+    return console if console.width <= MAX_WIDTH else SafeConsole(width=MAX_WIDTH)
 
 
 def err() -> Console:
     """Return the console for everything else."""
-    return Console(stderr=True, highlight=False)
+    return SafeConsole(stderr=True)
 
 
 def command(function: Command) -> Command:
@@ -55,7 +62,7 @@ def command(function: Command) -> Command:
         logging.captureWarnings(True)
         try:
             check_files(function, kwargs)
-            with interrupted_by_sigterm():
+            with interrupted_by_sigterm(), told_to(CompilingBar()):
                 return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
@@ -63,13 +70,57 @@ def command(function: Command) -> Command:
             _leave(str(error), ExitCode.INTERRUPTED)
         except KeyboardInterrupt:
             _leave("interrupted", ExitCode.INTERRUPTED)
+        except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
+            raise  # ends in order, and a reader of a pipe that has enough
+        except Exception as error:
+            leave_failed(error)
 
     return guarded  # type: ignore[return-value]
+
+
+class CompilingBar:
+    """Shows on stderr that machine code is being made: a bar on a terminal, else one line."""
+
+    def __init__(self) -> None:
+        self._bar: Progress | None = None
+        self._said = False
+
+    def goes_on(self, done: int, of: int) -> None:
+        """See `steerclear.shield.compiling.Listener`."""
+        if not err().is_terminal:
+            self._say()
+            return
+        if self._bar is None:
+            columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
+            self._bar = Progress(*columns, console=err(), transient=True)
+            self._bar.add_task("compiling, once: a minute or two", total=of)
+            with contextlib.suppress(LiveError):  # another bar has the screen: it is enough that this was said
+                self._bar.start()
+        self._bar.update(self._bar.task_ids[0], completed=done, total=of)
+
+    def ends(self) -> None:
+        """See `steerclear.shield.compiling.Listener`."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def _say(self) -> None:
+        if not self._said:
+            err().print(COMPILING_WORDS, soft_wrap=True)
+        self._said = True
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:
     err().print(text, markup=False, soft_wrap=True)
     raise typer.Exit(int(code))
+
+
+def leave_failed(error: Exception) -> NoReturn:
+    """End with one line for what no one foresaw: the machine's doing, or a fault of steerclear kept in a file."""
+    words = machine_words(error)
+    if words:
+        _leave(f"error: {words}", ExitCode.BAD_INPUT)
+    _leave(fault_words(error), ExitCode.FAULT)
 
 
 def finish(passed: bool) -> None:
@@ -80,8 +131,10 @@ def finish(passed: bool) -> None:
 
 @contextmanager
 def progress(words: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on stderr; call what it yields with the number of finished jobs."""
-    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=err(), transient=True) as bar:
+    """Show a progress bar on stderr where that is a terminal; call what it yields with the number of finished jobs."""
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
+    columns += (TextColumn("left"), TimeRemainingColumn())
+    console = err()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(words, total=total)
         yield lambda done: bar.update(task, completed=done, refresh=True)

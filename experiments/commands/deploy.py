@@ -18,11 +18,13 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.exceptions import ConfigError
 
+from ..boats.demo import demo_fleet
 from ..deploy.dashboard import Dashboard
 from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.run import deploy as run_boats
+from ..spec import check_seed
 from ..store import write_json
 from . import deploying as d
 from . import options as o
@@ -112,6 +114,9 @@ def _orders(
         raise ConfigError("give a FLEET.yaml, or --demo for boats that come with the package")
     if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
+    check_seed(seed)
+    if boat is not None and fleet is None:
+        demo_fleet().commanded(boat)  # before its boats are simulated
     orders = Orders(
         fleet_file=fleet or Path(),
         policy=policy,

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.text import Text
 from steerclear.shield.bridge.preflight.result import CheckResult, not_passed
 
 from ..deploy.orders import Outcome
@@ -38,8 +39,10 @@ NoTlog = Annotated[bool, typer.Option("--no-tlog", help="Do not keep raw MAVLink
 def show_check(console: Console, result: CheckResult, accepted: Sequence[str] = ()) -> None:
     """One line per check; one that was accepted beforehand looks like no failure."""
     failed = bool(not_passed([result], accepted))
-    mark = "[bold red]FAIL[/]" if failed else "[green]ok  [/]" if result.passed else "[yellow]not passed, accepted:[/]"
-    console.print(mark, end=" ")
+    mark = (
+        ("FAIL", "bold red") if failed else ("ok  ", "green") if result.passed else ("not passed, accepted:", "yellow")
+    )
+    console.print(Text(*mark), end=" ")
     console.print(f"{result.name}: {result.text}", markup=False, soft_wrap=True)
 
 

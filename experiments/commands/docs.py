@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import read_table
 
 from ..docs_pages import SOURCES, write_pages
+from ..json_file import read_json
 from ..results import NAMES
 from .console import command, out
 
@@ -34,10 +34,7 @@ def _read(source: Path) -> dict[str, Any]:
     if source.suffix == ".npz":
         return {"command": "reach", "card": read_table(source).card.to_json()}
     path = source / NAMES["results"] if source.is_dir() else source
-    try:
-        content = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot read results from {path} ({error}); give a results folder or a JSON file") from error
+    content = read_json(path, "results", "give a results folder or a JSON file")
     if not isinstance(content, dict):
         raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {SOURCES}")
     return content

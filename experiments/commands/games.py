@@ -21,7 +21,7 @@ from ..sea import check_current
 from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table, verdict_table
-from ..warming import warm_up
+from ..warming import WARMED, warm_up
 from .console import Interrupted, err, out, progress
 from .policies_tried import try_policies
 
@@ -107,7 +107,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print()
     for failed in results["failed"]:
         state = "on" if failed["shielded"] else "off"
-        console.print(f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}")
+        words = f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}"
+        console.print(words)
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)
     if results["quick"]:
@@ -130,8 +131,8 @@ def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
 
 def _play(campaign: Campaign, processes: int) -> Played:
     if processes > 1 and len(campaign.specs) > 1:
-        with err().status("compiling, about half a minute the first time"):
-            warm_up(campaign.specs, processes)
+        with progress("compiling; the first time a minute or two", WARMED) as notice:
+            warm_up(campaign.specs, processes, notice)
     with progress("games", len(campaign.specs)) as notice:
         return campaign.run(notice)
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
+from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..conditions import Conditions
@@ -25,7 +26,7 @@ from ..spec import ANSWER_S, MatchSpec
 from ..store import write_json
 from ..tables import game_table
 from . import options as o
-from .console import command, out, progress
+from .console import command, err, out, progress
 from .policies_tried import try_policies
 from .saving import check_endings, save_record
 
@@ -43,6 +44,11 @@ Save = Annotated[
     list[Path] | None, typer.Option(metavar="FILE", help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")
 ]
 Speed = Annotated[float, typer.Option(metavar="X", help="Times faster than the game, in a window.")]
+
+STEERING = (
+    "you steer the ringed boat, while the window has the keyboard: up or w ahead, left and right or a and d turn, "
+    "down or s back, Shift half speed, no key stop; close the window to end"
+)
 
 
 @command
@@ -100,7 +106,7 @@ def play(
     if not 0.0 < speed < math.inf:
         raise ConfigError(f"--speed must be a number above 0; got {speed:g}")
     started = time.perf_counter()
-    result = _play(spec, save or [], window or "keyboard" in (spec.own, spec.opponent), speed)
+    result = _play(spec, save or [], window or KEYBOARD in (spec.own, spec.opponent), speed)
     out().print(game_table(result.row, result.spec.radii_m))
     if result.row["first_failure"]:
         out().print(f"first policy failure: {result.row['first_failure']}", markup=False, soft_wrap=True)
@@ -120,6 +126,8 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
     if spec.shield is not None:
         check_shield(spec.shield)
     try_policies((spec.own, spec.opponent), spec.trust)
+    if KEYBOARD in (spec.own, spec.opponent):
+        err().print(STEERING, soft_wrap=True)
     if window:
         return play_match(spec, _until_closed, "human", speed)
     total = round(spec.config().max_time_s / spec.config().dt_s)

@@ -24,7 +24,7 @@ from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_r
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
-from ..reach_show import draw_sets, show_card
+from ..reach_show import check_picture, draw_sets, show_card
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 from .reach_compare import OtherBoat, OwnBoat, compare
@@ -131,6 +131,7 @@ def show(
     picture: Picture = None,
 ) -> None:
     """Show a table's card and the sets in which a radius cannot be kept."""
+    check_picture(picture)
     radii = tuple(radius) if radius else RADII_M
     if radius and picture is None:
         raise TableError("--radius is what --picture draws; the card has its own radii: give --picture FILE as well")

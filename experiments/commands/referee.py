@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.table import Table
+from rich.text import Text
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import GameState
 from steerclear.shield.bridge.fleet_file import load_fleet
@@ -93,7 +94,7 @@ def _tell(state: GameState, happened: Sequence[str], events: list[dict[str, Any]
     for text in happened:
         out().print(f"{state.time_s:8.1f} s  {text}", markup=False, soft_wrap=True)
         events.append({"time_s": state.time_s, "text": text})
-    status.update(f"{state.time_s:.0f} s, {score}" + (f"; {state.note}" if state.note else ""))
+    status.update(Text(f"{state.time_s:.0f} s, {score}" + (f"; {state.note}" if state.note else "")))
 
 
 def _table(state: GameState) -> Table:

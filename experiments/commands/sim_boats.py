@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.text import Text
 from steerclear.env.record import save
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.exceptions import BridgeError, ConfigError
@@ -23,6 +25,7 @@ from ..store import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out
+from .files import check_ending
 
 LOOK_S = 0.1
 """How often the terminal and the plan of faults are looked at, machine's s."""
@@ -93,6 +96,9 @@ def sim_boats(
         **{"jitter": jitter, "seed": seed, "duration": duration, "boot": boot, "opponents": opponents},
         **{"no_wait": no_wait, "random_start": random_start, "fault": fault or []},
     }
+    check_ending(record, "--record", (".npz",))
+    if duration is not None and not 0.0 < duration < math.inf:
+        raise ConfigError(f"--duration is {duration:g} s; give more than 0, or leave it out to run until Ctrl-C")
     file = _file(fleet, demo)
     boats = SimFleet.from_file(
         file,
@@ -139,9 +145,9 @@ def _water(wind: str, current: str) -> Water:
 
 
 def _with_direction(text: str, option: str) -> tuple[float, float]:
-    size, _, direction = text.partition("@")
+    size, at, direction = text.partition("@")
     try:
-        return float(size), float(direction or 0.0)
+        return float(size), float(direction) if at else 0.0
     except ValueError:
         raise ConfigError(f"{option} is {text!r}; give m/s@deg, such as 5@270") from None
 
@@ -157,7 +163,7 @@ def _run(boats: SimFleet, plan: Plan, duration_s: float | None) -> bool:
                     raise BridgeError("the simulation stopped by itself; see the error above")
                 for incident in plan.look():
                     err().print(f"{boats.time_s:8.1f} s  {incident.boat}: {incident.kind}", markup=False)
-                status.update(state_line(boats))
+                status.update(Text(state_line(boats)))
     except KeyboardInterrupt:
         return True
     return False

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile
@@ -13,8 +12,6 @@ from steerclear.shield.exceptions import ConfigError
 
 STOP_KEYS = (" ", "s", "S")
 BY = "keyboard"
-REPEAT_S = 0.8
-"""Presses of the stop key closer together than this are one: a key held down must not stop boats past the shield."""
 DURATIONS_S = (10.0, 30.0, 60.0, 300.0)
 DIGITS = "123456789abcdefgh"
 
@@ -22,21 +19,20 @@ DIGITS = "123456789abcdefgh"
 class Controls:
     """Turns keys into calls of the operator. A stop key is obeyed whatever menu is open.
 
+    Once boats are told to stop through the shield, a stop key asks whether they are to stop past it. Only another key
+    answers that: no double tap and no key held down drops the shield.
+
     Args:
         fleet: the file.
         operator: gets what keys ask for.
         clock: the loop's.
-        time_s: tells repeated presses apart, s.
     """
 
-    def __init__(
-        self, fleet: FleetFile, operator: Operator, clock: Clock, time_s: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._operator, self._clock, self._time_s = operator, clock, time_s
+    def __init__(self, fleet: FleetFile, operator: Operator, clock: Clock) -> None:
+        self._operator, self._clock = operator, clock
         self._names = fleet.names
         self._ours = tuple(boat.name for boat in fleet.ours if boat.link is not None and boat.commanded)
         self._lock = threading.Lock()
-        self._stopped_s = float("-inf")
         self._open = ""
         self._condition = self._subject = ""
         self._said = ""
@@ -45,7 +41,6 @@ class Controls:
         """Act on a key; keys that mean nothing are ignored."""
         with self._lock:
             if key in STOP_KEYS:
-                self._open = ""
                 self._stop()
             elif self._open:
                 self._choose(key)
@@ -58,6 +53,7 @@ class Controls:
             if not self._open:
                 return []
             titles = {
+                "hard": "Stop past the shield, whatever is near? y: yes. Boats already stop through the shield",
                 "resume": "Take STOP ALL back? y: boats move again",
                 "take": "Take which boat back? Its pilot must have let go of it. It is logged. ESC leaves",
                 "take_sure": f"{self._subject}: GUIDED and arming are asked for, and it obeys the policy. y: yes",
@@ -69,11 +65,11 @@ class Controls:
             return [titles[self._open], *self._entries(), *([self._said] if self._said else [])]
 
     def _stop(self) -> None:
-        now_s = self._time_s()
-        held = now_s - self._stopped_s < REPEAT_S
-        self._stopped_s = now_s
-        if not (held and self._operator.stopped):
+        if not self._operator.stopped:
+            self._open = ""
             self._operator.stop_all(BY)
+        elif not self._operator.hard:
+            self._open = "hard"
 
     def _command(self, key: str) -> None:
         self._said = ""
@@ -87,6 +83,11 @@ class Controls:
             self._open = "take"
 
     def _choose(self, key: str) -> None:
+        if self._open == "hard":
+            self._open = ""
+            if key in ("y", "Y"):
+                self._operator.stop_all(BY)
+            return
         if self._open == "resume":
             self._open = ""
             if key in ("y", "Y"):
@@ -128,7 +129,7 @@ class Controls:
         return tuple(f"{seconds:g}" for seconds in DURATIONS_S)
 
     def _entries(self) -> list[str]:
-        if self._open in ("resume", "take_sure"):
+        if self._open in ("hard", "resume", "take_sure"):
             return []
         options = self._options()
         if self._open == "condition":

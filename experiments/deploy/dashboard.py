@@ -16,6 +16,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Tick
 
+from ..terminal import SafeConsole, SafeFormatter
 from .controls import Controls
 from .dashboard_view import SILENT_S, Moment, View
 from .keys import Keyboard
@@ -57,7 +58,7 @@ class Dashboard:
     ) -> None:
         self._operator, self._clock = operator, clock
         self._view = View(fleet)
-        self._console = console or Console(highlight=False)
+        self._console = console or SafeConsole()
         self._period_s = 1.0 / refresh_hz
         self._tick: Tick | None = None
         self._late_s: deque[float] = deque(maxlen=LATE_OF)
@@ -129,7 +130,7 @@ class LogLines(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
-        self.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
+        self.setFormatter(SafeFormatter("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
         self._lines: deque[str] = deque(maxlen=200)
         self._aside: list[logging.Handler] = []
 

@@ -57,6 +57,11 @@ class FieldMap:
             canvas.label((x, y), _short(name), f"bold {self._colour(name)}", above=1)
         return canvas.lines()
 
+    def columns_for(self, tick: Tick | None, rows: int) -> int:
+        """Most columns that the map fills when it has so many rows: further ones stay empty."""
+        low_x, low_y, high_x, high_y = self._window({} if tick is None else places_of(tick))
+        return math.ceil(0.5 * (4 * rows - 1) * (high_x - low_x) / max(high_y - low_y, 1e-3)) + 1
+
     def _draw_lines(self, canvas: Canvas, lines: FieldGeometry, game: Mapping[str, object]) -> None:
         canvas.line(tuple(lines.scrimmage[0]), tuple(lines.scrimmage[1]), "grey50", every=2)
         flags = game.get("flags")

@@ -20,6 +20,7 @@ from steerclear.shield.decision import Decision, Reason
 
 from .approach import Approach, approaches
 from .dashboard_map import COLOURS, Drawing, FieldMap
+from .dashboard_table import BESIDE, boats_table
 
 WIDE = 150
 """From this many columns on the table stands beside the map."""
@@ -82,12 +83,14 @@ class View:
         height = len(lower) + 1
         table_rows = len(self._fleet.boats) + 1
         screen, body = Layout(), Layout(name="body")
-        boats = Layout(self._boats(moment), name="boats")
         drawing = Layout(Drawing(self._map, moment.tick), name="map", minimum_size=4)
         if columns >= WIDE:
-            boats.size = 82
-            body.split_row(drawing, boats)
+            # the map takes what it can fill at this height, the table all the rest
+            useful = self._map.columns_for(moment.tick, max(4, rows - 2 - height))
+            drawing.size = min(useful, columns - BESIDE)
+            body.split_row(drawing, Layout(self._boats(moment, columns - drawing.size), name="boats"))
         else:
+            boats = Layout(self._boats(moment, columns), name="boats")
             boats.size = min(table_rows, max(4, rows - height - 8))
             body.split_column(drawing, boats)
         screen.split_column(
@@ -109,7 +112,7 @@ class View:
 
     def _banner(self, moment: Moment) -> Text:
         if moment.stopped:
-            how = "by their links, past the shield" if moment.hard else "through the shield (again: past the shield)"
+            how = "by their links, past the shield" if moment.hard else "through the shield (again, then y: past it)"
             return _bar(f" STOP ALL by {moment.stopped}: boats are told to stop {how}; r resumes", "bold white on red")
         if moment.ended:
             return _bar(f" The run ends ({moment.ended}): boats are left stopped", "bold black on yellow")
@@ -125,27 +128,22 @@ class View:
             return _bar(f" {count} response{'s' if count > 1 else ''} in effect, see below", "black on yellow")
         return _bar(" All within limits", "black on green")
 
-    def _boats(self, moment: Moment) -> Table:
-        table = Table(box=None, padding=(0, 1, 0, 0), expand=True, header_style="bold")
-        for title, width in (("boat", 10), ("hdg", 4), ("m/s", 5), ("age", 5), ("wanted", 8), ("sent", 8)):
-            table.add_column(title, width=width, no_wrap=True, justify="left" if title == "boat" else "right")
-        table.add_column("why", width=9, no_wrap=True)
-        table.add_column("margin", width=6, no_wrap=True, justify="right")
-        table.add_column("closest", no_wrap=True, overflow="ellipsis")
+    def _boats(self, moment: Moment, width: int) -> Table:
         tick = moment.tick
         if tick is None:
-            return table
+            return boats_table(width, [])
+        rows = []
         contacts = {contact.boat: contact for contact in reversed(tick.contacts)}  # of several the first counts
         decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
         near = {} if tick.fleet is None else approaches(tick.fleet)
         for boat in self._fleet.boats:
-            name = self._name(boat.name, tick.game)
+            name: dict[str, Any] = {"boat": self._name(boat.name, tick.game)}
             reading = tick.readings.get(boat.name)
             if reading is not None:
-                table.add_row(name, *_own(reading, decisions.get(boat.name), tick, self._near(near.get(boat.name))))
+                rows.append(name | _own(reading, decisions.get(boat.name), tick, self._near(near.get(boat.name))))
             else:
-                table.add_row(name, *_other(contacts.get(boat.name), moment.now_s, self._limit_s()))
-        return table
+                rows.append(name | _other(contacts.get(boat.name), moment.now_s, self._limit_s()))
+        return boats_table(width, rows)
 
     def _name(self, name: str, game: Mapping[str, Any]) -> Text:
         status = (game.get("boats") or {}).get(name) or {}
@@ -185,40 +183,41 @@ def _broken(text: str, style: str, columns: int) -> list[Text]:
     return [Text(piece, style, no_wrap=True, overflow="crop") for piece in pieces]
 
 
-def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> tuple[Any, ...]:
+def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> dict[str, Any]:
+    """Cells of a boat of ours, by the column's title."""
     sent = tick.sent.get(reading.boat)
-    age = _age(reading.age_s)
-    seen = (_heading(reading.heading_rad), _speed(reading.speed_mps), age)
+    seen = _seen(reading.heading_rad, reading.speed_mps, Text(_age(reading.age_s)))
     sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
     if sent is not None and not sent.delivered:
         sent_text = Text("not sent", "bold red")
+    cells = {**seen, "wanted": "-", "sent": sent_text, "margin": "-", "closest": near}
     if not reading.ready:
-        return (*seen, "-", sent_text, Text(reading.mode or "not ready", "bold red"), "-", Text(reading.why_not, "red"))
+        mode = Text(reading.mode or "not ready", "bold red")
+        return {**cells, "why": mode, "closest": Text(reading.why_not, "red")}
     if decision is None:
-        return (*seen, "-", sent_text, Text("undecided", "red"), "-", near)
+        return {**cells, "why": Text("undecided", "red")}
     if decision.intervened:
         sent_text.stylize("bold cyan")
     wanted = _command(decision.wanted_speed_mps, decision.wanted_heading_rad)
     margin = Text("free" if decision.certificate_m == math.inf else f"{decision.certificate_m:.1f}")
     if decision.certificate_m < 0.0:
         margin.stylize("bold red")
-    return (*seen, wanted, sent_text, Text(*WHY[decision.reason]), margin, near)
+    why = {"why": Text(*WHY[decision.reason]), "bound by": ", ".join(decision.binding)}
+    return {**cells, "wanted": wanted, "margin": margin, **why}
 
 
-def _other(contact: Contact | None, now_s: float, limit_s: float) -> tuple[Any, ...]:
+def _other(contact: Contact | None, now_s: float, limit_s: float) -> dict[str, Any]:
+    """Cells of another boat, by the column's title."""
     if contact is None:
-        return ("-", "-", Text("never", "red"), "", "", Text("not heard", "red"), "", "")
+        return {**_seen(math.nan, math.nan, Text("never", "red")), "why": Text("not heard", "red")}
     age_s = now_s - contact.fixed_s
     age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
-    seen = (_heading(contact.heading_rad), _speed(contact.speed_mps), age)
-    return (
-        *seen,
-        "",
-        "",
-        Text("contact", "dim"),
-        "",
-        Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim"),
-    )
+    told = Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim")
+    return {**_seen(contact.heading_rad, contact.speed_mps, age), "why": Text("contact", "dim"), "closest": told}
+
+
+def _seen(heading_rad: float, speed_mps: float, age: Text) -> dict[str, Any]:
+    return {"hdg": _heading(heading_rad), "m/s": _speed(speed_mps), "age": age}
 
 
 def _score(game: Mapping[str, Any]) -> str:

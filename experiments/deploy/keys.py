@@ -7,9 +7,13 @@ import logging
 import os
 import select
 import sys
-import termios
 import threading
 from collections.abc import Callable
+
+try:
+    import termios
+except ImportError:  # not a Unix: no key is read, Ctrl-C still ends the run
+    termios = None  # type: ignore[assignment]
 
 logger = logging.getLogger(__name__)
 
@@ -21,8 +25,8 @@ _NO_KEY = b"\x00"
 class Keyboard:
     """Calls a function for every key, from a thread of its own, until closed. Ctrl-C stays what it is.
 
-    Does nothing when the input is no terminal, and while the process is in the background: reading or setting the
-    terminal there would stop the whole process, and with it the boats.
+    Does nothing when the input is no terminal or the system has none that gives single keys, and while the process is
+    in the background: reading or setting the terminal there would stop the whole process, and with it the boats.
 
     Args:
         pressed: called with each key, one character; what it raises is logged.
@@ -34,11 +38,13 @@ class Keyboard:
         self._closing = threading.Event()
         self._descriptor = _standard_input() if descriptor is None else descriptor
         self._before: list[object] | None = None
-        self.is_terminal = self._descriptor is not None and os.isatty(self._descriptor)
+        self.is_terminal = self._descriptor is not None and os.isatty(self._descriptor) and termios is not None
         """Whether keys can come at all."""
         self._thread = threading.Thread(target=self._listen, name="keys", daemon=True)
         if self.is_terminal:
             self._thread.start()
+        elif termios is None:
+            logger.warning("this system gives no single keys to programs; stop with Ctrl-C")
 
     def close(self) -> None:
         """Leave the terminal as it was found; may be called again."""

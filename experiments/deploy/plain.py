@@ -14,6 +14,7 @@ from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.exceptions import BridgeError
 
+from ..terminal import SafeFormatter
 from .tally import closest_m
 
 MOST_LINES = 10_000
@@ -84,7 +85,7 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
     if shown:
         handlers.append(logging.StreamHandler())
     for handler in handlers:
-        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        handler.setFormatter(SafeFormatter("%(asctime)s %(levelname)s %(message)s"))
     root, line = logging.getLogger(), _Dropping(queue.Queue(MOST_LINES))
     listener = logging.handlers.QueueListener(line.queue, *handlers)
     before = root.level

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,12 +9,11 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.platforms import get_platform
-from steerclear.shield.platforms import layout as L
 
+from ..json_file import read_json
 from ..store import write_json
+from .scene_check import check_scenes
 from .scenes import Conditions, Scenes
-from .script import N_SCRIPT
 
 FORMAT = 1
 _ARRAYS = ("state", "script", "goals", "current", "noise_seed", "number")
@@ -46,16 +44,11 @@ def read_scene(path: Path) -> tuple[Scenes, Conditions]:
     Raises:
         ConfigError: the file cannot be read or is no scene; the message says what is wrong.
     """
-    try:
-        content = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise ConfigError(
-            f"cannot read {path} as a scene ({error}); give a file that `steerclear attack` wrote"
-        ) from None
+    content = read_json(path, "a scene", "give a file that `steerclear attack` wrote")
     try:
         return scenes_of(content)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        why = f"{type(error).__name__}: {error}"
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        why = str(error) if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}"
         raise ConfigError(f"{path} is no scene ({why}); give a file that `steerclear attack` wrote") from None
 
 
@@ -74,35 +67,12 @@ def scenes_of(content: Mapping[str, Any]) -> tuple[Scenes, Conditions]:
         family=str(content["family"]),
         platforms=tuple(content["platforms"]),
         team=np.array(content["team"], dtype=np.int64),
-        field=None if content["field"] is None else tuple(content["field"]),
+        field=None if content["field"] is None else tuple(map(float, content["field"])),
         length_s=float(content["length_s"]),
         **arrays,
     )
-    _check(scenes)
+    check_scenes(scenes)
     return scenes, Conditions(**content["conditions"])
-
-
-def _check(scenes: Scenes) -> None:
-    for name in scenes.platforms:
-        get_platform(name)
-    games, n = len(scenes.state), len(scenes.platforms)
-    goals = scenes.goals.shape[2] if scenes.goals.ndim == 4 else 1
-    shapes = {
-        "team": (n,),
-        "state": (games, n, L.N_STATE),
-        "script": (games, n, N_SCRIPT),
-        "goals": (games, n, goals, 2),
-        "current": (games, 2),
-        "noise_seed": (games,),
-        "number": (games,),
-    }
-    for name, shape in shapes.items():
-        if getattr(scenes, name).shape != shape or games < 1:
-            raise ConfigError(f"{name} of the scene has shape {getattr(scenes, name).shape}; expected {shape}")
-    if not (np.isfinite(scenes.state).all() and np.isfinite(scenes.goals).all()):
-        raise ConfigError("the scene holds a state or a goal that is not finite")
-    if not 0.0 < scenes.length_s <= 3600.0:
-        raise ConfigError(f"the scene lasts {scenes.length_s} s; give more than 0 and at most an hour")
 
 
 def _plain(value: Any) -> Any:

@@ -125,7 +125,7 @@ class Player {
   draw(now) {
     this.stale = false;
     const shown = this.panes.map((pane) => pane.draw(this.time, 0.5 - 0.5 * Math.cos(now / 110)));
-    this.flashing = shown.some(({ breaches }) => breaches.length > 0);
+    this.flashing = shown.some(({ breaches }) => breaches.some(({ own }) => own));
     const minutes = Math.floor((this.time + 0.05) / 60), seconds = Math.max(0, this.time - 60 * minutes);
     byId("clock").textContent = `${String(minutes).padStart(2, "0")}:${seconds.toFixed(1).padStart(4, "0")}`;
     const has = (kind) => this.panes.some((pane) => pane.game.marks[kind].length > 0);

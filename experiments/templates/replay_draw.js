@@ -203,22 +203,26 @@ function drawFlag(context, camera, x, y, colour, pole) {
   context.stroke();
 }
 
-/** Pairs of boats within the separation radius. */
+/** Pairs of boats within the separation radius, and whether one of them is of the team whose breaches count. */
 function pairsInBreach(game, poses) {
-  const pairs = [];
+  const pairs = [], isOwn = (boat) => game.meta.team[boat] === game.ownTeam;
   for (let a = 0; a < poses.length; a++) {
     for (let b = a + 1; b < poses.length; b++) {
       const gap = Math.hypot(poses[a].x - poses[b].x, poses[a].y - poses[b].y);
-      if (gap <= game.meta.separation_m) pairs.push([a, b, gap]);
+      if (gap <= game.meta.separation_m) pairs.push({ boats: [a, b], gap, own: isOwn(a) || isOwn(b) });
     }
   }
   return pairs;
 }
 
-function drawSeparation(context, game, camera, boat, step, pose, colours, teamColour, breached, pulse) {
+/** The disc of half the radius. A breach of the team that counts pulses, with a ring in the boat's own colour. */
+function drawSeparation(context, game, camera, boat, step, pose, colours, teamColour, breach, pulse) {
   const radius = game.meta.separation_m / 2;
-  if (breached) {
+  if (breach && breach.own) {
     fillAndRing(context, camera, pose.x, pose.y, radius * (1 + 0.5 * pulse), colours.breach, 0.4 - 0.25 * pulse, 2.5, []);
+    fillAndRing(context, camera, pose.x, pose.y, radius, teamColour, 0, 2.5, []);
+  } else if (breach) {
+    fillAndRing(context, camera, pose.x, pose.y, radius, teamColour, 0.12, 1.5, [3, 4]);
   } else if (game.intervened(boat, step)) {
     fillAndRing(context, camera, pose.x, pose.y, radius, colours.changed, 0.3, 1.6, []);
   } else {
@@ -231,7 +235,8 @@ function drawMoment(context, game, camera, time, colours, options, pulse) {
   const { step, share } = game.at(time);
   const poses = Array.from({ length: game.boats }, (_, boat) => game.pose(boat, step, share));
   const teamColour = (boat) => (game.meta.team[boat] === 0 ? colours.blue : colours.red);
-  const breaches = pairsInBreach(game, poses), inBreach = new Set(breaches.flatMap(([a, b]) => [a, b]));
+  const breaches = pairsInBreach(game, poses), inBreach = new Map();
+  for (const breach of [...breaches].sort((a, b) => a.own - b.own)) breach.boats.forEach((boat) => inBreach.set(boat, breach));
   context.clearRect(0, 0, camera.width, camera.height);
   drawField(context, game, camera, colours, options);
   poses.forEach((pose, boat) => {
@@ -242,7 +247,7 @@ function drawMoment(context, game, camera, time, colours, options, pulse) {
       fillAndRing(context, camera, pose.x, pose.y, game.meta.catch_radius_m, teamColour(boat), 0.05, 1, [3, 5]);
     }
     if (!options.separation && !inBreach.has(boat)) return;
-    drawSeparation(context, game, camera, boat, step, pose, colours, teamColour(boat), inBreach.has(boat), pulse);
+    drawSeparation(context, game, camera, boat, step, pose, colours, teamColour(boat), inBreach.get(boat), pulse);
   });
   if (options.commands) {
     poses.forEach((pose, boat) => drawCommand(context, game, camera, boat, step, pose, colours, teamColour(boat)));

@@ -58,25 +58,31 @@ class Pane {
     this.chooser.value = String(index);
     this.timelineKey = "";
     const { meta } = this.game;
-    const badge = (text, kind) => element("span", { className: `badge ${kind}`, textContent: text });
-    const covered = meta.shielded.length > 0;
+    const badge = (kind, ...parts) => element("span", { className: `badge ${kind}` }, ...parts);
+    const covered = meta.shielded.length > 0, breached = this.game.ownBreaches.length > 0;
     this.badges.replaceChildren(
-      badge(covered ? `shield on ${meta.shielded.length} boats` : "no shield", covered ? "on" : ""), " ",
-      badge(this.breachText(), this.game.ownBreaches.length ? "breach" : ""));
+      badge(covered ? "on" : "", this.sideText(this.game.ownTeam), covered ? ` shielded, ${meta.shielded.length} boats` : " without a shield"), " ",
+      badge(breached ? "breach" : "", ...this.breachText()));
     const word = (text, kind) => element("span", { className: kind, textContent: text });
     this.note.replaceChildren("timeline: ", word("share of boats whose command was changed", "orange"), ", ",
       word("breaches", "pink"), ", captures · table: speeds m/s, compass headings, margin = certificate in m, safe from 0 up · ",
-      `breach: centres within ${meta.separation_m} m, discs touch · `,
+      `breach: a boat of `, this.sideText(this.game.ownTeam), ` within ${meta.separation_m} m of another, discs touch; `,
+      `dashed rings: the other team among itself · `,
       `${meta.preset}, ${[...new Set(meta.platforms)].join(", ")}, seed ${meta.seed ?? "unknown"}`);
     this.rows.replaceChildren(...meta.agent_ids.map((name, boat) => this.makeRow(name, boat)));
     this.player.changed();
   }
 
+  sideText(team) {
+    const side = team === 0 ? "blue" : "red";
+    return element("b", { className: side, textContent: side });
+  }
+
   /** How often boats came too close, the other team among itself apart: no shield answers for that. */
   breachText() {
-    const own = this.game.ownBreaches.length, other = this.game.breaches.length - own;
-    const [side, rest] = this.game.ownTeam === 0 ? ["blue", "red"] : ["red", "blue"];
-    return `breaches: ${own} with ${side}` + (other ? `, ${other} ${rest} only` : "");
+    const { ownTeam, ownBreaches, breaches } = this.game, other = breaches.length - ownBreaches.length;
+    const parts = [this.sideText(ownTeam), `: ${ownBreaches.length} breach${ownBreaches.length === 1 ? "" : "es"}`];
+    return other ? [...parts, ` (and ${other} among `, this.sideText(1 - ownTeam), ")"] : parts;
   }
 
   makeRow(name, boat) {
@@ -152,12 +158,13 @@ class Pane {
     this.score.replaceChildren(element("span", { className: "blue", textContent: blue }), " : ",
       element("span", { className: "red", textContent: red }));
     const inBreach = new Map();
-    for (const [a, b, gap] of breaches) { inBreach.set(a, gap); inBreach.set(b, gap); }
+    for (const breach of [...breaches].sort((a, b) => a.own - b.own)) breach.boats.forEach((boat) => inBreach.set(boat, breach));
     [...this.rows.children].forEach((row, boat) => {
       const texts = game.steps === 0 ? ["", "–", "–", "–", "–", "–"] : this.texts(boat, step);
       const bits = [[HAS_FLAG, "flag"], [TAGGED, "tagged"], [OUT, "out"]];
       const states = bits.filter(([mask]) => game.bit(boat, step, mask)).map(([, text]) => text);
-      if (inBreach.has(boat)) states.push(`breach ${inBreach.get(boat).toFixed(2)} m`);
+      const near = inBreach.get(boat);
+      if (near) states.push(`${near.own ? "breach" : "close"} ${near.gap.toFixed(2)} m`);
       texts[6] = states.join(", ");
       for (let k = 1; k < texts.length; k++) if (row.cells[k].textContent !== texts[k]) row.cells[k].textContent = texts[k];
       row.classList.toggle("changed", game.intervened(boat, step));

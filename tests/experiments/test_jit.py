@@ -19,7 +19,7 @@ def test_a_changed_added_or_renamed_source_gives_another_digest(tmp_path):
 def test_the_stamp_of_a_kernel_holds_the_digest_of_its_folder_and_of_those_it_may_call(monkeypatch):
     def stamp():
         jit._digest_beside.cache_clear()
-        return jit.kernel(one_more)._cache._cache_file._source_stamp
+        return jit.kernel(one_more)._cache.stamp
 
     asked = []
     monkeypatch.setattr(jit, "digest_of", lambda folders: asked.append(folders) or "digest")

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from scipy import stats
 from steerclear.experiments import statistics
 from steerclear.experiments.statistics import (
+    count_difference,
     count_interval,
+    count_ratio_interval,
     mean_interval,
     paired_difference,
     paired_ratio,
@@ -80,15 +82,64 @@ def test_one_value_has_a_mean_but_no_limits_and_none_has_neither():
 
 
 def test_pairing_removes_what_the_seeds_share():
-    off = np.random.default_rng(0).normal(0.0, 100.0, 30)
-    interval = paired_difference(off, off + 1.0)
-    assert (interval.low, interval.value, interval.high) == pytest.approx((1.0, 1.0, 1.0))
+    random = np.random.default_rng(0)
+    off = random.normal(0.0, 100.0, 30)
+    interval = paired_difference(off, off + 1.0 + random.normal(0.0, 0.01, 30))
+    assert (interval.low, interval.value, interval.high) == pytest.approx((1.0, 1.0, 1.0), abs=0.01)
+    assert interval.low < interval.high
 
 
 def test_ratio_of_totals_and_its_missing_denominator():
-    interval = paired_ratio([10, 20, 30], [1, 2, 3])
-    assert (interval.low, interval.value, interval.high) == pytest.approx((0.1, 0.1, 0.1))
+    interval = paired_ratio([10, 20, 30], [1, 2, 4])
+    assert interval.value == pytest.approx(7 / 60)
+    assert 0.1 <= interval.low < interval.value < interval.high <= 4 / 30
     assert not math.isfinite(paired_ratio([0, 0], [1, 0]).value)
+
+
+def test_a_ratio_without_events_has_the_limit_that_its_other_side_allows():
+    """Resampling would say [0, 0]. Of n events none is on: p <= 1 - 0.05 ** (1 / n), and the ratio is p / (1 - p)."""
+    for off in ([3, 1, 2], [1, 0], [40, 60]):
+        share = 1.0 - 0.05 ** (1.0 / sum(off))
+        interval = paired_ratio(off, [0] * len(off))
+        assert interval.value == interval.low == 0.0
+        assert interval.high == pytest.approx(share / (1.0 - share))
+    none_off = paired_ratio([0, 0, 0], [2, 1, 0])
+    assert (none_off.value, none_off.high) == (math.inf, math.inf)
+    assert none_off.low == pytest.approx(1.0 / paired_ratio([2, 1, 0], [0, 0, 0]).high)
+    nothing = paired_ratio([0, 0], [0, 0])
+    assert math.isnan(nothing.value)
+    assert (nothing.low, nothing.high) == (0.0, math.inf)
+
+
+def test_a_ratio_of_games_that_are_all_alike_is_no_certainty():
+    interval = paired_ratio([10, 10, 10], [1, 1, 1])
+    share = stats.binomtest(3, 33).proportion_ci(0.95, method="exact")
+    assert interval.value == pytest.approx(0.1)
+    limits = (share.low / (1 - share.low), share.high / (1 - share.high))
+    assert (interval.low, interval.high) == pytest.approx(limits)
+
+
+@given(st.integers(0, 60), st.integers(0, 60))
+def test_a_ratio_of_counts_turned_round_has_its_limits_turned_round(off, on):
+    here, there = count_ratio_interval(off, on), count_ratio_interval(on, off)
+    assert here.low <= here.high
+    if here.low > 0.0:
+        assert here.low == pytest.approx(1.0 / there.high)
+    assert math.isnan(here.value) or here.low <= here.value <= here.high
+
+
+def test_means_of_games_that_are_all_alike_have_no_limits_and_differences_of_counts_those_of_their_rates():
+    alike = mean_interval([2.0] * 8)
+    assert alike.value == 2.0
+    assert math.isnan(alike.low)
+    assert math.isnan(alike.high)
+    none = count_difference([0] * 20, [0] * 20)
+    assert none.value == 0.0
+    assert (none.low, none.high) == pytest.approx((math.log(0.05) / 20, -math.log(0.05) / 20))
+    fewer = count_difference([2] * 10, [1] * 10)
+    assert fewer.value == -1.0
+    assert fewer.low < -1.0 < fewer.high
+    assert count_difference([1, 4, 2], [0, 1, 1]) == paired_difference([1, 4, 2], [0, 1, 1])
 
 
 def test_scaling_moves_all_three_numbers():
@@ -102,6 +153,8 @@ def test_scaling_moves_all_three_numbers():
         (lambda: share_interval(-1, 2), "successes <= trials"),
         (lambda: count_interval(-1), "events >= 0"),
         (lambda: count_interval(1, 0.0), "exposure > 0"),
+        (lambda: count_ratio_interval(1, -1), "counts >= 0"),
+        (lambda: count_difference([1], [1, 2]), "1 off and 2 on"),
         (lambda: count_interval(1, float("nan")), "exposure > 0"),
         (lambda: mean_interval([1.0, 2.0], confidence=1.0), "between 0 and 1"),
         (lambda: paired_difference([1.0], [1.0, 2.0]), "1 off and 2 on"),

@@ -81,6 +81,8 @@ def read_key(path: str | Path) -> bytes:
 def _check_safe(path: Path, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise ConfigError(f"the signing key {path} is no plain file; give the path of a key file")
+    if not hasattr(os, "geteuid"):  # not a Unix: modes and owners say nothing there
+        return
     if status.st_mode & 0o077:
         raise ConfigError(
             f"the signing key {path} can be read or changed by others (mode {stat.S_IMODE(status.st_mode):04o}); "

@@ -14,6 +14,7 @@ import time
 import numpy as np
 import pytest
 from deploy_ticks import Stream
+from made_ticks import made_tick
 from rich.console import Console
 from steerclear.experiments.deploy import dashboard as dashboard_module
 from steerclear.experiments.deploy.approach import approaches
@@ -21,8 +22,10 @@ from steerclear.experiments.deploy.braille import Canvas
 from steerclear.experiments.deploy.controls import Controls
 from steerclear.experiments.deploy.dashboard import Dashboard
 from steerclear.experiments.deploy.dashboard_map import FieldMap
+from steerclear.experiments.deploy.dashboard_table import fitting
 from steerclear.experiments.deploy.dashboard_view import Moment, View
 from steerclear.experiments.deploy.keys import Keyboard
+from steerclear.experiments.terminal import SafeConsole
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.link import BoatReading
 from steerclear.shield.bridge.operator import DISABLES, Operator
@@ -43,6 +46,13 @@ def stream():
     for _ in range(80):
         played.tick()
     return played
+
+
+@pytest.fixture(scope="module")
+def fleet_of_the_demo():
+    from steerclear.experiments.boats.demo import demo_fleet
+
+    return demo_fleet()
 
 
 def shown(fleet, moment, columns=100, rows=40):
@@ -186,13 +196,11 @@ def test_the_canvas_keeps_shapes_and_scale():
 @pytest.fixture
 def controls(stream):
     """Keys' meaning with an operator and a clock that both can be looked at."""
-    now = [100.0]
     operator = Operator()
-    made = Controls(stream.fleet, operator, ManualClock(7.0), lambda: now[0])
+    made = Controls(stream.fleet, operator, ManualClock(7.0))
 
-    def press(keys, wait_s=5.0):
+    def press(keys):
         for key in keys:
-            now[0] += wait_s
             made.press(key)
 
     return made, operator, press
@@ -208,19 +216,35 @@ def test_the_stop_key_stops_whatever_is_open(controls, key, before):
     assert made.menu() == []
 
 
-def test_a_stop_key_held_down_is_one_press_and_a_second_press_goes_past_the_shield(controls):
-    _, operator, press = controls
-    press(" " * 50, wait_s=0.03)
+@pytest.mark.parametrize("taps", [" " * 50, "  ", "ss", " S", "s sS  "])
+def test_no_number_of_presses_of_the_stop_key_goes_past_the_shield(controls, taps):
+    made, operator, press = controls
+    press(taps)
     assert operator.stopped
     assert not operator.hard
-    press(" ")
+    assert "past the shield" in made.menu()[0]
+    press("y")
     assert operator.hard
-
-
-def test_after_resuming_at_once_the_stop_key_stops_again(controls):
-    _, operator, press = controls
+    assert made.menu() == []
     press(" ")
-    press("ry ", wait_s=0.01)
+    assert operator.hard, "the stop key takes nothing back"
+
+
+@pytest.mark.parametrize("other", ["n", "\x1b", "r", "q"])
+def test_any_other_answer_stays_behind_the_shield(controls, other):
+    made, operator, press = controls
+    press("  " + other)
+    assert operator.stopped
+    assert not operator.hard
+    assert not operator.ended
+    assert made.menu() == []
+    press("y")
+    assert not operator.hard
+
+
+def test_after_resuming_the_stop_key_stops_again(controls):
+    _, operator, press = controls
+    press(" ry ")
     assert operator.stopped
     assert not operator.hard
 
@@ -446,3 +470,55 @@ def test_taking_a_tick_is_quick_and_waits_for_nothing(dash, stream, monkeypatch)
 
 def test_the_refresh_is_often_enough():
     assert dashboard_module.REFRESH_HZ >= 2.0
+
+
+def cell_of(lines, name, title):
+    """What stands in a boat's row under a head; the table may stand beside the map."""
+    heads = next(line for line in lines if "wanted" in line and "margin" in line)
+    end = heads.index(title) + len(title)
+    row = next(line for line in lines if line[heads.index("boat") :].startswith(name))
+    return row[end - 9 : end].strip()
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(60, 24), (80, 24), (120, 40), (160, 45), (200, 30)])
+def test_what_was_wanted_and_sent_is_shown_whole(fleet_of_the_demo, columns, rows):
+    lines = shown(fleet_of_the_demo, Moment(made_tick(fleet_of_the_demo), 5.0), columns, rows)
+    assert [cell_of(lines, f"blue_{k}", "wanted") for k in (1, 2, 3)] == ["1.5 054°", "12.5 359°", "2.0 180°"]
+    assert [cell_of(lines, f"blue_{k}", "sent") for k in (1, 2, 3)] == ["1.5 054°", "10.2 008°", "0.0 271°"]
+
+
+def test_a_wide_terminal_shows_more(fleet_of_the_demo):
+    tick = made_tick(fleet_of_the_demo)
+    narrow, wide = (shown(fleet_of_the_demo, Moment(tick, 5.0), *size) for size in ((80, 24), (160, 45)))
+    assert "bound by" not in "".join(narrow)
+    heads = next(line for line in wide if "bound by" in line)
+    assert len(heads.rstrip()) > 150, "to the right edge"
+    row = next(line for line in wide if "12.5 359°" in line)
+    assert row.rstrip().endswith("red_3"), "what binds"
+    assert "…" not in row[heads.index("boat") :]
+    assert any("error 0.3 m" in line for line in wide)
+
+
+@pytest.mark.parametrize("width", [1, 10, 30, 45, 60, 80, 99, 160, 400])
+def test_the_table_is_as_wide_as_it_may_be(width):
+    widths = fitting(width)
+    assert {"wanted", "sent"} <= set(widths)
+    if width >= 34:
+        assert sum(widths.values()) + len(widths) <= width
+        assert widths["wanted"] == widths["sent"] == 9
+
+
+def test_names_from_outside_are_shown_and_not_obeyed(fleet_of_the_demo):
+    hostile = ["\x1b[2Jblue", "[bold]b[/]", "\u202eeulb", "red\x07", "[/red]", "r\nd"]
+    named = zip(fleet_of_the_demo.boats, hostile, strict=True)
+    boats = [boat.model_copy(update={"name": name}) for boat, name in named]
+    fleet = fleet_of_the_demo.model_copy(update={"boats": boats})
+    console = SafeConsole(file=io.StringIO(), width=160, height=45, force_terminal=True, color_system=None)
+    moment = Moment(made_tick(fleet, names=hostile), 5.0, log=["\x1b]0;title\x07 said"])
+    view = View(fleet_of_the_demo)
+    view._fleet = fleet  # files with such names are refused; the view does not rely on that
+    console.print(view.of(moment, 160, 45), height=45)
+    drawn = console.file.getvalue()
+    assert not {"\x1b", "\x07", "\u202e"} & set(drawn)
+    assert "[bold]b[/]" in drawn
+    assert "[/red]" in drawn

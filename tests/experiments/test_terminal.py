@@ -1,0 +1,203 @@
+"""What goes to a terminal: nothing from outside is obeyed by it, and what it cannot show stops nothing."""
+
+import io
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.table import Table
+from rich.text import Text
+from steerclear.experiments import cli, markdown, page, plot_text
+from steerclear.experiments.commands.console import ExitCode, err, out
+from steerclear.experiments.faults import fault_words, machine_words
+from steerclear.experiments.tables import titled
+from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
+from steerclear.shield.visible import is_drawn, visible
+from typer.testing import CliRunner
+
+HOSTILE = [
+    "\x1b[31mred\x1b[0m", "\x1b]0;title\x07", "\x9b2J", "[bold]b[/bold]", "[/red]", ":smile:", "\u202eevil", "\u2066x",
+    "a\rb", "\x00", "\x08\x08", "<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "$\\frac{", "a|b",
+    "[x](javascript:alert(1))", "`rm`", "\ud800", "\u2028", "👩‍🚀",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("how", ["text", "Text", "cell", "head", "title"])
+def test_a_terminal_only_shows_names(name, how):
+    console = SafeConsole(file=io.StringIO(), width=120, force_terminal=True, color_system=None)
+    table = Table(name if how == "head" else "", title=Text(name) if how == "title" else None)
+    table.add_row(name if how == "cell" else "")
+    shown = {"text": name, "Text": Text(name)}.get(how, table)
+    console.print(shown)
+    drawn = console.file.getvalue()
+    assert all(is_drawn(letter) or letter == "\n" for letter in drawn)
+    if how in ("text", "cell"):
+        assert visible(name) in drawn
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_page_only_shows_names(name):
+    text = page.as_text(name)
+    assert "<" not in text
+    assert '"' not in text
+    assert all(is_drawn(letter) or letter in "\n\t" for letter in text)
+    assert "<" not in page.as_json({"title": name, name: [name]})
+    assert "\u202e" not in page.as_json(name)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_markdown_page_only_shows_names(name):
+    (_, _, row) = markdown.table(["a", "b"], [[name, "1 [0, 2]"]])
+    assert row.replace("\\|", "").count("|") == 3
+    assert "<script" not in row
+    assert "<img" not in row
+    assert "](" not in row
+    assert row.isprintable()
+
+
+@pytest.mark.filterwarnings("ignore:Glyph")
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_plot_only_shows_names(name, tmp_path):
+    from matplotlib.figure import Figure
+
+    canvas = Figure()
+    canvas.suptitle(plot_text.plot_text(name))
+    canvas.savefig(tmp_path / "a.svg")
+    assert (tmp_path / "a.svg").exists()
+
+
+@given(st.text())
+def test_what_is_shown_is_drawn_and_shown_again_the_same(text):
+    once = visible(text)
+    assert all(map(is_drawn, once))
+    assert visible(once) == once
+
+
+def test_consoles_of_commands_take_no_markup(capsys):
+    for console in (out(), err()):
+        console.print("[bold]x[/]")
+        console.print(titled("[i]t", ["[u]h", ""], [["[/]", "[b]1"]]))
+    said = capsys.readouterr()
+    for text in (said.out, said.err):
+        for name in ("[bold]x[/]", "[i]t", "[u]h", "[/]", "[b]1"):
+            assert name in text
+
+
+def test_the_log_shows_names():
+    record = logging.LogRecord("a", logging.WARNING, "", 1, "boat %s", ("\x1b[2Jx",), None)
+    assert SafeFormatter("%(message)s").format(record) == "boat \\x1b[2Jx"
+
+
+@given(st.text())
+def test_plain_text_is_ascii(text):
+    assert plain(text).isascii()
+
+
+def test_signs_are_written_by_their_meaning():
+    assert plain("54° → ±2 m… ≥ 3 µs ⚑") == "54 deg -> +-2 m... >= 3 us F"
+    assert plain("│─┼━█⣿⠁⠀") == "|-+-##. "
+
+
+SAY = """
+import sys
+from steerclear.experiments.terminal import prepare
+prepare()
+from steerclear.experiments.commands.console import out, err
+from steerclear.experiments.tables import titled
+for console in (out(), err()):
+    console.print(titled("54° → ⚑", ["", "≥"], [["\\u2800\\u28ff", "\\ud800…"]]))
+"""
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"PYTHONIOENCODING": "ascii"},
+        {"PYTHONIOENCODING": "latin-1"},
+        {"PYTHONIOENCODING": "ascii:strict"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    ],
+)
+def test_a_terminal_without_unicode_stops_nothing(environment, tmp_path):
+    (tmp_path / "say.py").write_text(SAY, encoding="utf-8")
+    clean = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)} | environment
+    done = subprocess.run(
+        [sys.executable, "say.py"], cwd=tmp_path, env=clean, capture_output=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"54" in done.stdout
+    assert b"54" in done.stderr
+
+
+WITHOUT = """
+import sys, os, signal
+for name in ("termios", "fcntl", "resource", "pwd", "grp", "tty", "pty", "syslog", "crypt"):
+    sys.modules[name] = None
+for name in ("fork", "geteuid", "getuid", "killpg", "sched_getaffinity", "setsid", "tcgetpgrp", "getpgrp", "nice"):
+    if hasattr(os, name):
+        delattr(os, name)
+for name in ("SIGKILL", "SIGHUP", "SIGQUIT"):
+    delattr(signal, name)
+from typer.testing import CliRunner
+from steerclear.experiments import cli
+import steerclear.shield.bridge.mavlink, steerclear.experiments.deploy.run
+for command in [[], *[[info.name or info.callback.__name__.replace("_", "-")] for info in cli.app.registered_commands]]:
+    done = CliRunner().invoke(cli.app, [*command, "--help"])
+    assert done.exit_code == 0, (command, done.output, done.exception)
+from steerclear.experiments.deploy.keys import Keyboard
+assert not Keyboard(print).is_terminal
+done = CliRunner().invoke(cli.app, ["ablate", "--opponents", "nobody"])
+assert done.exit_code == 2, done.output
+print("ok")
+"""
+
+
+def test_where_there_is_no_unix_commands_are_there_and_keys_are_not(tmp_path):
+    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, timeout=300, check=False, cwd=tmp_path)
+    assert done.stdout.strip().endswith(b"ok"), done.stderr.decode()[-2000:]
+
+
+def fails(error):
+    def check(name):
+        raise error
+
+    return check
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a\nb \x1b[2J"), KeyError("x"), RecursionError(), AssertionError()])
+def test_what_nobody_foresaw_is_one_line_and_a_file(error, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.commands.evaluate.run_games", fails(error))
+    monkeypatch.setattr("steerclear.experiments.commands.evaluate.AblationSettings", fails(error))
+    monkeypatch.setattr("steerclear.experiments.commands.evaluate.o.split_names", lambda *_: fails(error)(""))
+    done = CliRunner().invoke(cli.app, ["evaluate", "medium"])
+    assert done.exit_code == ExitCode.FAULT == 70
+    assert done.stderr.count("\n") == 1
+    assert "a fault of steerclear" in done.stderr
+    assert "\x1b" not in done.output
+    path = Path(done.stderr.split("traceback is in ")[1].split(": please")[0])
+    assert "Traceback" in path.read_text(encoding="utf-8")
+    path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(OSError(28, "No space left on device", "/a"), "free some space"), (MemoryError(), "not enough memory")],
+)
+def test_what_the_machine_refuses_is_no_fault(error, words, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.commands.evaluate.o.split_names", lambda *_: fails(error)(""))
+    done = CliRunner().invoke(cli.app, ["evaluate", "medium"])
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in done.stderr
+
+
+def test_a_fault_whose_file_cannot_be_written_is_told(monkeypatch):
+    monkeypatch.setattr(
+        "steerclear.experiments.faults.tempfile.NamedTemporaryFile", lambda *a, **k: fails(OSError(28, "full"))("")
+    )
+    assert "could not be written (full)" in fault_words(RuntimeError("x"))
+    assert machine_words(RuntimeError("x")) == ""
