@@ -42,16 +42,16 @@ COLUMNS = (
     Column("bound by", 12, 5, right=False),
 )
 """What was wanted and sent stands there whole in every terminal of 30 columns; a command is ``12.5 359°``."""
-GROWING = (("closest", 22), ("boat", 16), ("bound by", 24), ("closest", 60))
+GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 60))
 """Where room that is left over goes, in this order, each up to a width."""
-BESIDE = sum(column.width + GAP for column in COLUMNS) + 8
-"""Width with every column, ``closest`` whole: what the table has beside the map."""
+BESIDE = sum(column.width + GAP for column in COLUMNS) + 12
+"""Width with every column, ``closest`` whole: what the table has beside the map. Below it ``bound by`` is left out."""
 NEVER_CUT = ("wanted", "sent")
 
 
 def fitting(width: int) -> dict[str, int]:
     """Columns that a width has room for, with the width of each; what is left over goes to those that may grow."""
-    shown = list(COLUMNS)
+    shown = [column for column in COLUMNS if width >= BESIDE or column.title != "bound by"]
     while len(shown) > 1 and _needed(shown) > width:
         last = max(shown, key=lambda column: (column.rank, COLUMNS.index(column)))
         if last.rank == 0:
