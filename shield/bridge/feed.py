@@ -169,21 +169,28 @@ class FeedReceiver:
         except FeedError as error:
             self._refuse("malformed", f"{host}: {error}")
             return
-        problem = self._order.problem(packet, now_s)
+        problem = self._out_of_place(packet) or self._order.problem(packet, now_s)
         if problem is not None:
             self._refuse(*problem)
             if problem[0] in RIVALS:
                 self._note_rival(packet, problem[1], now_s)
             return
-        if packet.sender == TELEMETRY:
-            self._refuse("sender", f"{host}: {TELEMETRY} is no name for a sender; take another")
-            return
         for text in packet.refused:
             self._refuse("fix", f"{packet.sender}: {text}")
         if packet.game is not None:
-            self._take_game(packet.game, packet.sender, now_s)
+            with self._lock:
+                self._game, self._game_s = packet.game, now_s
         for fix in packet.fixes:
             self._take_fix(self._told, fix, packet.sender, now_s)
+
+    def _out_of_place(self, packet: Packet) -> tuple[str, str] | None:
+        """Why a packet is none for us whoever sent it, as (kind, explanation): looked at first, so it takes no seat."""
+        if packet.sender == TELEMETRY:
+            return "sender", f"{TELEMETRY} is no name for a sender; take another"
+        strangers = set() if packet.game is None or self._boats is None else set(packet.game.boats) - self._boats
+        if strangers:
+            return "unknown boat", f"{packet.sender}: the game has {', '.join(sorted(strangers))}, not of this fleet"
+        return None
 
     def _note_rival(self, packet: Packet, text: str, now_s: float) -> None:
         with self._lock:
@@ -247,14 +254,6 @@ class FeedReceiver:
         finally:
             self._socket.settimeout(0.2)
         self._refuse("flood", f"more than {PACKETS_PER_S:g} packets a second", dropped)
-
-    def _take_game(self, game: GameState, sender: str, now_s: float) -> None:
-        if self._boats is not None and not self._boats >= set(game.boats):
-            strangers = ", ".join(sorted(set(game.boats) - self._boats))
-            self._refuse("unknown boat", f"{sender}: the game has {strangers}, not of this fleet")
-            return
-        with self._lock:
-            self._game, self._game_s = game, now_s
 
     def _take_fix(self, told: Told, fix: Fix, sender: str, now_s: float) -> None:
         is_known = told.has_room(fix.boat) if self._boats is None else fix.boat in self._boats

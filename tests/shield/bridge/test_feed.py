@@ -259,6 +259,16 @@ def test_a_second_referee_waits_until_the_first_is_gone():
         assert receiver.game().time_s == 99.0
 
 
+@pytest.mark.parametrize("wrong", [{"boats": {"blue_9": vars(STATUS)}, "sender": "other"}, {"sender": "telemetry"}])
+def test_who_is_refused_takes_no_referees_seat(receiver, wrong):
+    receiver.take(game(**wrong), LOCAL)
+    receiver.take(game(), LOCAL)
+    assert receiver.game() == GAME
+    assert receiver.alarms() == ()
+    receiver.take(game(**wrong, seq=2), LOCAL)
+    assert receiver.alarms() == ()
+
+
 def test_senders_and_boats_without_end_do_not_fill_the_memory():
     with FeedReceiver("127.0.0.1:0", FRAME, ManualClock()) as receiver:
         for k in range(200):
