@@ -52,6 +52,8 @@ class ChainCheck:
             head: in it; None: that log has no chain.
             is_first: whether it is the log's first file.
         """
+        if self._key is not None and (head is None or not head.keyed):
+            self._tell("it carries no codes, though a key was given: it was written without the key")
         if head is None:
             self._is_bare = True
             return
@@ -61,8 +63,6 @@ class ChainCheck:
             self._join(self._chain, head)
         elif head.count and is_first:
             self._tell(f"the {head.count} records before its first are missing")
-        if self._key is not None and not head.keyed:
-            self._tell("it carries no codes, though a key was given: it was written without the key")
         self.chained, self.keyed = True, head.keyed
         self._chain, self._last, self.end, self._early = Chain(head, self._key), head.head, "", 0
 

@@ -372,6 +372,7 @@ def test_a_forger_who_makes_the_chain_anew_is_found_by_the_key_alone(tmp_path, t
 
 def test_a_log_without_codes_is_not_taken_for_one_with(tmp_path, log):
     assert "carries no codes, though a key was given" in said(log, KEY)
+    assert "carries no codes, though a key was given" in said(OLD, KEY), "nor one from which the whole chain was taken"
 
 
 @pytest.mark.parametrize("chain", ["null", "{}", '{"head": "zz"}', '{"head": 5}', "[", '{"head": "", "count": -1}'])
