@@ -20,7 +20,7 @@ from steerclear.policies.words import plain_text
 
 from ..entries.keeper import OVER, READY
 from ..entries.limits import Limits
-from ..entries.system import end_group
+from ..entries.system import end_group, end_marked
 from .frames import GONE, Broken, FrameReader, FrameWriter
 
 KEEPER = "steerclear.experiments.entries.keeper"
@@ -193,6 +193,7 @@ class Worker:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=KEEPER_S)
         end_group(self._process.pid)
+        end_marked(self._folder)  # where code ended its keeper, what it started has nobody else to end it
         self.wait(GONE_S)
         shutil.rmtree(self._folder, ignore_errors=True)
 

@@ -67,6 +67,30 @@ def end_children(patience_s: float = 2.0) -> None:
         time.sleep(0.001)
 
 
+def end_marked(mark: str, patience_s: float = 2.0) -> None:
+    """End all processes that were started with ``NAME=mark`` in their environment, and what they start meanwhile.
+
+    It finds those that nobody is the parent of any more; forked ones keep the environment they were started with.
+    """
+    end_s = time.monotonic() + patience_s
+    while (found := _marked(f"={mark}\0".encode())) and time.monotonic() < end_s:
+        for pid in found:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        time.sleep(0.001)
+
+
+def _marked(mark: bytes) -> list[int]:
+    """Other processes that live and have a setting of this value; those that ended and wait for a parent have none."""
+    found = []
+    with contextlib.suppress(OSError):
+        for pid in [int(name) for name in os.listdir("/proc") if name.isdigit()]:
+            with contextlib.suppress(OSError), open(f"/proc/{pid}/environ", "rb") as file:
+                if pid != os.getpid() and mark in file.read():
+                    found.append(pid)
+    return found
+
+
 def _read(path: str) -> str:
     try:
         with open(path) as file:

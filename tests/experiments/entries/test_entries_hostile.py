@@ -124,6 +124,35 @@ def test_what_it_leaves_running_ends_with_its_game(team_of, play, tmp_path):
     assert team.report().failures == ()
 
 
+def test_what_it_leaves_running_ends_also_when_it_ended_its_keeper(team_of, play, tmp_path):
+    note = tmp_path / "note"
+    team = team_of(
+        f"""
+        keeper, child = os.getppid(), os.fork()
+        if child == 0:
+            os.setsid()
+            if os.fork():
+                os._exit(0)
+            while True:
+                with open({str(note)!r}, "a") as file:
+                    file.write("x")
+                time.sleep(0.01)
+        os.waitpid(child, 0)
+        while not os.path.exists({str(note)!r}):
+            time.sleep(0.01)
+        os.kill(keeper, 9)
+        time.sleep(600)
+        """
+    )
+    assert play(team, 1) == [HELD]
+    assert "SIGKILL" in team.report().failures[0].message
+    end_s, size = time.monotonic() + 10.0, -1
+    while note.stat().st_size != size and time.monotonic() < end_s:
+        size = note.stat().st_size
+        time.sleep(0.2)
+    assert note.stat().st_size == size > 0
+
+
 def test_an_entry_that_cannot_be_loaded_says_why(team_of):
     for start, words in (
         ("raise ValueError('no weights')", "cannot be built: ValueError: no weights"),
