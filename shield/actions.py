@@ -134,6 +134,11 @@ def _is_bool(action: Any) -> bool:
     return isinstance(action, (bool, np.bool_)) or str(kind) in ("bool", "torch.bool")
 
 
+def _holds_bools(actions: Any) -> bool:
+    """Whether an action of several boats is True or False."""
+    return _is_bool(actions) if hasattr(actions, "dtype") else any(map(_is_bool, actions))
+
+
 def _number(seat: Seat, action: Any, value: float) -> int | str:
     if not np.isfinite(value) or value != np.floor(value):
         raise _unusable(seat, action)
@@ -205,9 +210,10 @@ def read_flat(actions: Any, top_mps: Array, seat_of: Callable[[int], Seat], pair
         fits = given.shape == ((n, 2) if pairs else (n,))
         if fits and pairs and np.isfinite(given).all():
             return given.copy()
-        if fits and not pairs and ((given == np.floor(given)) & (given >= -1) & (given <= STOP)).all():
+        whole = fits and not pairs and ((given == np.floor(given)) & (given >= -1) & (given <= STOP)).all()
+        if whole and not _holds_bools(actions):
             return DISCRETE[given.astype(np.int64)] * np.stack([top_mps, np.ones(n)], axis=1)
-        rows = list(given) if fits else []
+        rows = list(actions) if fits else []
     if len(rows) != n:
         wanted = f"finite actions of shape ({n}, 2): speed m/s, relative heading deg"
         raise GameError(f"give {wanted}" if pairs else f"give {n} discrete actions in 0..{STOP} (or -1 to stop)")

@@ -13,30 +13,12 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
-class _Unsaid(float):
-    """A default that a game's own distance takes the place of; any value that is given stays."""
-
-
-class _Sayings:
-    """Which settings nobody gave, kept beside the settings: of the same numbers two configs are equal."""
-
-    __slots__ = ("_unsaid",)
-    _unsaid: frozenset[str]
-
-    def said(self, name: str) -> bool:
-        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
-        return name not in self._unsaid
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_unsaid": self._unsaid}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            object.__setattr__(self, name, value)
+class Unsaid(float):
+    """A distance that nobody chose: a game's own, if larger, takes its place. It stays one in copies of settings."""
 
 
 @dataclass(frozen=True)
-class ShieldConfig(_Sayings):
+class ShieldConfig:
     """Settings of the shield.
 
     Attributes:
@@ -88,7 +70,7 @@ class ShieldConfig(_Sayings):
         ConfigError: a value is of the wrong type, not finite or out of range.
     """
 
-    separation_m: float = _Unsaid(2.5)
+    separation_m: float = Unsaid(2.5)
     buffer_m: float = 0.05
     dt_s: float = 0.1
     certificate: str = "auto"
@@ -114,18 +96,16 @@ class ShieldConfig(_Sayings):
     max_track_age_s: float = 2.0
     delay_s: float = 0.0
     edge_m: float | None = 0.2
-    hull_m: float = _Unsaid(1.0)
+    hull_m: float = Unsaid(1.0)
 
     def __post_init__(self) -> None:
         from .certificates import CERTIFICATES
         from .program import check_solver
 
-        unsaid = frozenset(entry.name for entry in fields(self) if isinstance(getattr(self, entry.name), _Unsaid))
-        object.__setattr__(self, "_unsaid", unsaid)
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)
-            if isinstance(value, Real):  # compiled code knows numbers by their kind: it would be compiled anew
+            if isinstance(value, Real) and not isinstance(value, Unsaid):  # compiled code knows numbers by their kind
                 object.__setattr__(self, entry.name, float(value))
         if not 0.0 <= self.opponent_share <= 1.0:
             raise ConfigError(f"opponent_share is {self.opponent_share}; give a share between 0 and 1")
@@ -134,6 +114,10 @@ class ShieldConfig(_Sayings):
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
         check_solver(self.solver)
+
+    def said(self, name: str) -> bool:
+        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
+        return not isinstance(getattr(self, name), Unsaid)
 
     @classmethod
     def of(cls, **settings: Any) -> ShieldConfig:

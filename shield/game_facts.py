@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .config import ShieldConfig
+from .config import ShieldConfig, Unsaid
 from .exceptions import ConfigError
 from .jit import Array, IntArray
 
@@ -76,7 +76,7 @@ def with_distances(config: ShieldConfig, facts: GameFacts, team: int) -> ShieldC
     larger: dict[str, Any] = {}
     for name, metres, why in _distances(facts, team):
         if not config.said(name) and metres > getattr(config, name):
-            larger[name] = metres
+            larger[name] = Unsaid(metres)
             _log_once(
                 logging.WARNING,
                 f"no {name} was given: the shield keeps {metres:g} m, the distance at which this game {why}",

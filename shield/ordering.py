@@ -30,9 +30,13 @@ def order_of(names: tuple[str, ...]) -> IntArray | None:
     return order
 
 
-def _parts(name: str) -> list[tuple[bool, int, str]]:
-    """A name as what it is compared by: texts and the numbers between them."""
-    return [(bool(k % 2), int(part) if k % 2 else 0, part) for k, part in enumerate(_NUMBER.split(name))]
+def _parts(name: str) -> list[tuple[bool, int, str, str]]:
+    """A name as what it is compared by: texts and the numbers between them, of any length."""
+    parts = []
+    for k, part in enumerate(_NUMBER.split(name)):
+        digits = part.lstrip("0") if k % 2 else ""
+        parts.append((bool(k % 2), len(digits), digits, part))
+    return parts
 
 
 def ordered(fleet: Fleet, wanted: Commands, order: IntArray) -> tuple[Fleet, Commands]:

@@ -81,6 +81,7 @@ def test_where_a_scene_lies_and_which_way_it_faces_changes_nothing(platform):
         (("red", "blue"), [1, 0]),
         (("a", "a"), None),
         (("7", "b7", "07"), [2, 0, 1]),
+        (("a" + "9" * 5000, "a1" + "0" * 4999, "a010"), [2, 1, 0]),
         ((), None),
     ],
 )

@@ -172,6 +172,8 @@ def test_the_same_seed_plays_the_same_games():
         ("discrete", np.full(11, 1)),
         ("discrete", np.full(12, np.nan)),
         ("discrete", np.full(12, 1.5)),
+        ("discrete", np.ones(12, bool)),
+        ("discrete", [True] * 12),
         ("discrete", np.array(["a"] * 12)),
         ("discrete", []),
         ("continuous", np.full((12, 2), np.nan)),

@@ -136,13 +136,22 @@ def test_shields_of_batches_take_the_games_distances_and_tell_of_smaller_ones(to
 def test_what_was_chosen_is_known_of_copies_and_does_not_make_settings_differ():
     import copy
     import pickle
+    from dataclasses import replace
 
     unsaid, said = ShieldConfig(dt_s=0.2), ShieldConfig(dt_s=0.2, separation_m=2.5)
     assert unsaid == said
     assert hash(unsaid) == hash(said)
-    assert type(unsaid.separation_m) is float
-    for same in (copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))):
+    assert (unsaid.separation_m, str(unsaid.separation_m)) == (2.5, "2.5")
+    copies = (copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing)), lambda thing: replace(thing, dt_s=0.1))
+    for same in copies:
         assert (same(unsaid).said("separation_m"), same(said).said("separation_m")) == (False, True)
+
+
+def test_a_shield_that_took_one_games_distance_takes_a_larger_one_of_the_next():
+    first = ShieldedParallelEnv(game("aamas2024", agent_radius_m=1.5), Shield())
+    assert first.shield.config.separation_m == 3.0
+    second = ShieldedParallelEnv(game("aamas2024", agent_radius_m=2.0), first.shield)
+    assert second.shield.config.separation_m == 4.0
 
 
 def test_a_shield_is_put_to_a_game_that_was_changed_by_the_next_reset():
