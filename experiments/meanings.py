@@ -11,6 +11,7 @@ REASONS = {
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two team-mates kept each other from turning: one gives way, one stands on",
+    "limited": "the wanted speed is beyond what the boat does: cut to that, and so it is safe",
 }
 """By name of the reason, small letters."""
 

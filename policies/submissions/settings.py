@@ -149,6 +149,12 @@ def _log() -> tuple[Any, ...]:
 
 
 def _set_log(values: tuple[Any, ...]) -> None:
+    known = {id(state[0]) for state in values[0]}
+    for one in logging.root.manager.loggerDict.values():
+        if isinstance(one, logging.Logger) and id(one) not in known:  # made since: as if nobody had set anything
+            one.setLevel(logging.NOTSET)
+            one.disabled, one.propagate = False, True
+            one.handlers[:], one.filters[:] = [], []
     for one, level, disabled, propagate, handlers, filters in values[0]:
         if one.level != level:
             one.setLevel(level)  # forgets what was worked out from it

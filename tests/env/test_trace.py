@@ -97,7 +97,7 @@ def test_arrays_that_do_not_fit_are_refused(write, arrays, name, change, message
     [
         ({"config": {"dynamics": "canoe"}}, "fit no game: unknown platform 'canoe'"),
         ({"config": {"lidar_obs": True}}, "lidar_obs = True is not supported"),
-        ({"team_size": 0}, "team_size is 0"),
+        ({"team_size": 0}, "team_size in meta is 0"),
         ({"dt": None}, "dt_s is None"),
     ],
 )

@@ -8,7 +8,7 @@ from steerclear.experiments.commands import reach
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.reach_show import draw_sets, tables_page
-from steerclear.shield.exceptions import TableError
+from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.tables import make
 from steerclear.shield.tables.files import CACHE_VARIABLE, SHIPPED, read_table, save_table
 from typer.testing import CliRunner
@@ -144,5 +144,5 @@ def test_the_page_of_tables_is_made_of_their_cards(tmp_path):
     text, card = (tmp_path / "table_cards.md").read_text(), read_table(HERON).card
     assert text == tables_page([card.to_json()])
     assert f"| 2/2 | {' | '.join(f'{area:.1f}' for area in card.areas_m2['2.5']['2/2'])} |" in text
-    with pytest.raises(TableError, match="card cannot be read"):
+    with pytest.raises(ConfigError, match="card cannot be read"):
         write_pages([{"command": "reach", "card": "{}"}], tmp_path)

@@ -22,6 +22,7 @@ NOT_ZERO = [
     "table_response_per_s",
     "fixed_response_per_s",
     "give_way_after_s",
+    "search_limit",
     "speed_weight",
     "horizon_s",
     "hunt_s",
@@ -33,6 +34,7 @@ MAY_BE_INFINITE = [
     "fixed_response_per_s",
     "give_way_after_s",
     "max_track_age_s",
+    "search_limit",
 ]
 
 

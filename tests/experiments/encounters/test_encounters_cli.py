@@ -102,7 +102,7 @@ def _breaching(measure_chunk):
         (["--noise", "9"], "noise_m is 9.0"),
         (["--workers", "0"], "at least 1"),
         (["--resume"], "--resume needs the --out"),
-        (["--scene", "missing.json"], "cannot read missing.json"),
+        (["--scene", "missing.json"], "cannot read a scene from missing.json"),
         (["--scene", "missing.json", "--radius", "4", "--resume"], "--radius, --resume beside --scene"),
     ],
 )

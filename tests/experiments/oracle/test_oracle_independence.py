@@ -9,7 +9,7 @@ import pytest
 from steerclear.experiments import oracle
 
 FILES = sorted(Path(oracle.__file__).parent.glob("*.py"))
-ALLOWED = {"__future__", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections", "functools",
+ALLOWED = {"__future__", "contextlib", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections", "functools",
            "hashlib", "itertools", "pathlib"}  # fmt: skip
 BLOCKED = """
 import sys

@@ -129,7 +129,7 @@ def test_other_wrappers_may_stand_in_between(on):
 
 
 def test_an_environment_of_turns_is_refused():
-    with pytest.raises(ConfigError, match=r"one boat's action at a time; give pettingzoo\.utils\.aec_to_parallel"):
+    with pytest.raises(ConfigError, match="is an AEC env, in which boats act in turn"):
         ShieldedParallelEnv(parallel_to_aec(MctfEnv(SMALL)), Shield())
 
 
