@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from .summary import Row
 
-SIDES = (("own policy", "policy_failures", "own: "), ("opponents' policy", "opponent_policy_failures", "opponent: "))
-"""Words, column of the count, and how the texts of its failures begin."""
+SIDES = (("own policy", "", "own: "), ("opponents' policy", "opponent_", "opponent: "))
+"""Words, how the columns begin, and how the texts of its failures do."""
 
 
 def failure_warnings(rows: Sequence[Row]) -> list[str]:
@@ -19,10 +19,11 @@ def failure_warnings(rows: Sequence[Row]) -> list[str]:
     Returns:
         One for each side that failed: how often, in how many games, and its first text; empty when none did.
     """
-    return [_sentence(*side, rows) for side in SIDES if any(row[side[1]] for row in rows)]
+    return [_sentence(*side, rows) for side in SIDES if any(row[side[1] + "policy_failures"] for row in rows)]
 
 
-def _sentence(words: str, column: str, begin: str, rows: Sequence[Row]) -> str:
+def _sentence(words: str, columns: str, begin: str, rows: Sequence[Row]) -> str:
+    column = columns + "policy_failures"
     failed = [row for row in rows if row[column]]
     count = sum(int(row[column]) for row in failed)
     texts = [text for row in failed if (text := row["first_failure"] or "").startswith(begin)]
@@ -35,7 +36,7 @@ def _sentence(words: str, column: str, begin: str, rows: Sequence[Row]) -> str:
 
 
 def held_games(rows: Sequence[Row]) -> list[str]:
-    """Sentences about policies that did not play: as many unusable answers as a game has steps, or more.
+    """Sentences about policies that did not play: in no step of a game had a boat of theirs a usable answer.
 
     Args:
         rows: the games.
@@ -46,8 +47,8 @@ def held_games(rows: Sequence[Row]) -> list[str]:
     return [words for side in SIDES if (words := _held(*side, rows))]
 
 
-def _held(words: str, column: str, begin: str, rows: Sequence[Row]) -> str:
-    held = [row for row in rows if row["steps"] > 0 and int(row[column]) >= row["steps"]]
+def _held(words: str, columns: str, begin: str, rows: Sequence[Row]) -> str:
+    held = [row for row in rows if row["steps"] > 0 and row[columns + "policy_usable_steps"] == 0]
     if not held:
         return ""
     texts = [text for row in held if (text := row["first_failure"] or "").startswith(begin)]

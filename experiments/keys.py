@@ -71,6 +71,8 @@ GAME_COLUMNS = {
     "reason_*": "boat-steps decided for that reason",
     "policy_failures": "times the own policy raised or answered nonsense; its boats held",
     "opponent_policy_failures": "the same of the other team",
+    "policy_usable_steps": "steps in which the own policy gave some boat a usable answer",
+    "opponent_policy_usable_steps": "the same of the other team",
     "first_failure": "text of the first of them",
     "primary": "captures - captures_against - penalty * collisions",
     "secondary": "grabs + tags - grabs_against - tags_against",

@@ -261,5 +261,7 @@ def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:
     return {
         "policy_failures": own.count,
         "opponent_policy_failures": opponent.count,
+        "policy_usable_steps": own.usable_steps,
+        "opponent_policy_usable_steps": opponent.usable_steps,
         "first_failure": texts[0] if texts else None,
     }

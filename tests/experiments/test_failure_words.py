@@ -10,8 +10,9 @@ from steerclear.experiments.results import results_of, write_results
 from steerclear.experiments.spec import MatchSpec
 
 
-def row(own=0, other=0, text=None):
-    return {"policy_failures": own, "opponent_policy_failures": other, "first_failure": text}
+def row(own=0, other=0, text=None, usable=(7, 7)):
+    steps = dict(zip(("policy_usable_steps", "opponent_policy_usable_steps"), usable, strict=True))
+    return {"policy_failures": own, "opponent_policy_failures": other, "first_failure": text, **steps}
 
 
 def played(steps, row):
@@ -41,9 +42,15 @@ def test_failures_are_counted_and_the_first_is_quoted(rows, words):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        ([played(10, row(10, 0, "own: raised"))], "the own policy gave no usable answer throughout 1 of 1 games"),
-        ([played(10, row(30, 0)), played(10, row(9))], "throughout 1 of 2 games"),
-        ([played(5, row(0, 15, "opponent: late"))], "the opponents' policy gave no usable answer throughout 1 of 1"),
+        (
+            [played(10, row(10, 0, "own: raised", usable=(0, 7)))],
+            "the own policy gave no usable answer throughout 1 of 1 games",
+        ),
+        ([played(10, row(30, 0, usable=(0, 7))), played(10, row(9))], "throughout 1 of 2 games"),
+        (
+            [played(5, row(0, 15, "opponent: late", usable=(5, 0)))],
+            "the opponents' policy gave no usable answer throughout 1 of 1",
+        ),
     ],
 )
 def test_policies_that_did_not_play_are_named(rows, words):
@@ -54,7 +61,7 @@ def test_policies_that_did_not_play_are_named(rows, words):
 
 
 def test_policies_that_failed_now_and_then_did_play():
-    assert held_games([played(10, row(9, 9)), played(0, row())]) == []
+    assert held_games([played(10, row(29, 10, usable=(1, 10))), played(0, row(usable=(0, 0)))]) == []
 
 
 def test_nobody_is_quoted_with_the_others_words():

@@ -180,10 +180,12 @@ def test_numbers_no_float_holds_are_refused():
 
 
 def test_whole_numbers_are_kept_as_floats_for_compiled_code():
-    config = ShieldConfig(separation_m=3, margin_cap_m=0, response_per_s=1, horizon_s=6, edge_m=None)
+    config = ShieldConfig(separation_m=3, margin_cap_m=0, response_per_s=1, horizon_s=6, edge_m=None, hull_m=1)
     numbers = [value for value in vars(config).values() if not isinstance(value, str) and value is not None]
     assert {type(value) for value in numbers} == {float}
-    assert config == ShieldConfig(separation_m=3.0, margin_cap_m=0.0, response_per_s=1.0, horizon_s=6.0, edge_m=None)
+    assert config == ShieldConfig(
+        separation_m=3.0, margin_cap_m=0.0, response_per_s=1.0, horizon_s=6.0, edge_m=None, hull_m=1.0
+    )
 
 
 @pytest.mark.parametrize(

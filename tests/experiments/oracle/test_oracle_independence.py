@@ -9,8 +9,8 @@ import pytest
 from steerclear.experiments import oracle
 
 FILES = sorted(Path(oracle.__file__).parent.glob("*.py"))
-ALLOWED = {"__future__", "contextlib", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections", "functools",
-           "hashlib", "itertools", "pathlib"}  # fmt: skip
+ALLOWED = {"__future__", "contextlib", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections",
+           "functools", "hashlib", "itertools", "logging", "pathlib"}  # fmt: skip
 BLOCKED = """
 import sys
 class Wall:
