@@ -26,6 +26,8 @@ def warm_up() -> None:
         raise ConfigError("compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written to")
     columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
     console = err()
+    if not console.is_terminal:
+        console.print("compiling everything: one to three minutes of an idle machine", soft_wrap=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         shown = _Shown(bar)
         with told_to(shown):

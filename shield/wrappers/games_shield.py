@@ -6,6 +6,7 @@ from typing import Any
 
 from ..batch import BatchedShield
 from ..config import ShieldConfig
+from ..exceptions import ConfigError
 from ..game_facts import check_step, facts_of_games, told_distances, with_distances
 from ..same_games import platforms_of
 from .mctf import surroundings_of
@@ -27,6 +28,10 @@ def games_shield(
     Raises:
         ConfigError: unknown team, another step than the games', or a setting that a batch cannot honour.
     """
+    if config is not None and not isinstance(config, ShieldConfig):
+        raise ConfigError(
+            f"config is a {type(config).__name__}; give a ShieldConfig, such as Shield.for_game(core).config"
+        )
     number, facts = team_number(team), facts_of_games(core)
     settings = ShieldConfig.of(**facts.settings()) if config is None else with_distances(config, facts, number)
     check_step(settings, facts)

@@ -48,6 +48,10 @@ class MctfReader:
     def check_answers(self, agent_ids: Sequence[str]) -> None:
         """The game plays one command a step, of any kind."""
 
+    def moment(self) -> float:
+        """Time of the game, s."""
+        return float(self.env.core.time_s[0])
+
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now; boats the game drives are controlled only with ``shield_autopilot``."""
         core = self.env.core

@@ -44,6 +44,7 @@ class ShieldedTeamPolicy:
         self.name = f"shielded {getattr(policy, 'name', type(policy).__name__)}"
         self.decisions: Decisions | None = None
         self._reader: GameReader | None = None
+        self._shown: tuple[float, Any] | None = None
         self._team = 0
         self._agent_ids: tuple[str, ...] = ()
 
@@ -58,7 +59,7 @@ class ShieldedTeamPolicy:
         self._team = _team_of(reader, agent_ids)
         reader.check_answers(agent_ids)
         self.shield = shield_for(self.shield, reader, self._team)
-        self._reader, self._agent_ids = reader, tuple(agent_ids)
+        self._reader, self._agent_ids, self._shown = reader, tuple(agent_ids), None
         self.shield.reset()
         self.policy.reset(env, agent_ids, seed)
 
@@ -66,10 +67,11 @@ class ShieldedTeamPolicy:
         """Actions of the boats; those the shield had to change are (speed m/s, relative heading deg) pairs.
 
         Raises:
-            PolicyError: `reset` has not been called.
+            PolicyError: `reset` has not been called, or another game is played than the one it was called with.
         """
         if self._reader is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
+        self._check_game(self._reader, observations)
         answer = self.policy.act(observations, infos)
         if not isinstance(answer, Mapping):
             raise PolicyError(
@@ -88,6 +90,24 @@ class ShieldedTeamPolicy:
             if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
                 actions[agent] = sent.copy()
         return actions
+
+    def _check_game(self, reader: GameReader, observations: Mapping[str, Any]) -> None:
+        """Check that the game whose positions are read is the one that is played: it moves on when what is shown does.
+
+        A copy of a wrapped policy takes a copy of its game along, which nobody plays.
+
+        Raises:
+            PolicyError: it stands still.
+        """
+        moment = reader.moment()
+        seen = observations.get(self._agent_ids[0]) if isinstance(observations, Mapping) else None
+        shown = np.array(seen, dtype=object, copy=True)
+        before, self._shown = self._shown, (moment, shown)
+        if before is not None and moment == before[0] and not np.array_equal(shown, before[1]):
+            raise PolicyError(
+                "the game that this policy was given stands still while another is played; call reset(env, agent_ids, "
+                "seed) with the one that is played (a copy of a wrapped policy has a copy of its game)"
+            )
 
     def __getattr__(self, name: str) -> Any:
         # "policy" is not set yet: no looking it up on itself; and the policy's own way of copying knows no shield

@@ -83,6 +83,10 @@ class PyquaticusReader:
         """
         check_pairs(self.env, agent_ids)
 
+    def moment(self) -> float:
+        """Time of the game, s."""
+        return float(self.env.current_time)
+
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now."""
         players = list(self.env.players.values())

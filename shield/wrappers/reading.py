@@ -45,6 +45,9 @@ class GameReader(Protocol):
             ConfigError: it does not.
         """
 
+    def moment(self) -> float:
+        """Time of the game, s: it is another after every step."""
+
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
         """All boats now; controlled are those of ``team`` that the shield can decide for."""
 

@@ -46,7 +46,8 @@ class TeamBatch:
         seed: seed of games and opponent.
 
     Raises:
-        ConfigError: unknown team or kind of actions, or a shield that is none of these games.
+        ConfigError: unknown team or kind of actions, an opponent for single games, or a shield that is none of these
+            games.
     """
 
     def __init__(
@@ -58,6 +59,10 @@ class TeamBatch:
         actions: str = "discrete",
         seed: int = 0,
     ) -> None:
+        if opponent is not None and not callable(getattr(opponent, "restart", None)):
+            raise ConfigError(
+                f"{type(opponent).__name__} plays one game, not a batch; give steerclear.policies.make_batch(name)"
+            )
         if actions not in ACTIONS:
             raise ConfigError(f"unknown actions {actions!r}; choose one of {', '.join(ACTIONS)}")
         self.core, self.opponent, self.shield = core, opponent, shield

@@ -313,3 +313,14 @@ def test_stable_baselines_gets_what_it_asks_for():
     assert env.get_attr("num_envs", [0, 3]) == [12, 12]
     assert env.env_is_wrapped(object) == [False] * 12
     assert env.env_method("reset", 3, indices=0)[0].tobytes() == first.tobytes()
+
+
+def test_a_policy_of_single_games_is_no_opponent_of_a_batch():
+    core = BatchedMctf("aamas2024", n_games=1)
+    with pytest.raises(ConfigError, match=r"give steerclear\.policies\.make_batch"):
+        TeamBatch(core, policies.make("medium"))
+
+
+def test_a_shield_is_no_settings_for_one_of_games():
+    with pytest.raises(ConfigError, match="config is a Shield; give a ShieldConfig"):
+        games_shield(BatchedMctf("aamas2024", n_games=1), Shield())

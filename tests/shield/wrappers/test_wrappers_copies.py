@@ -13,6 +13,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Shield
+from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.wrappers import ShieldedParallelEnv, ShieldedTeamPolicy
 from wrapped_games import GAMES, KINDS, SMALL, Batch, Env, sb3_front
 
@@ -172,3 +173,31 @@ def test_a_wrapper_is_copied_with_the_wrapped_game_only():
     other = copy.deepcopy(wrapped)
     assert other.unwrapped is not env
     assert other._reader.env is other.unwrapped
+
+
+@pytest.mark.parametrize("way", [*COPIES, "another game"])
+def test_a_wrapped_policy_that_reads_a_game_nobody_plays_says_so_instead_of_steering(way):
+    game = MctfEnv(SMALL)
+    observations, infos = game.reset(seed=3)
+    policy = Shield.for_game(game).wrap(policies.make("medium"))
+    policy.reset(game, game.agents[:3], seed=1)
+    if way == "another game":
+        game = MctfEnv(SMALL)
+        observations, infos = game.reset(seed=4)
+    else:
+        policy = COPIES[way](policy)
+    observations, _, _, _, infos = game.step(policy.act(observations, infos))  # of a copy it was the same until now
+    with pytest.raises(PolicyError, match="stands still while another is played; call reset"):
+        policy.act(observations, infos)
+    policy.reset(game, game.agents[:3], seed=1)
+    for _ in range(3):
+        observations, _, _, _, infos = game.step(policy.act(observations, infos))
+
+
+def test_a_wrapped_policy_may_be_asked_twice_in_one_step():
+    game = MctfEnv(SMALL)
+    observations, infos = game.reset(seed=3)
+    policy = Shield.for_game(game).wrap(policies.make("medium"))
+    policy.reset(game, game.agents[:3], seed=1)
+    for _ in range(3):
+        policy.act(observations, infos)

@@ -136,7 +136,7 @@ class Quaticus:
         self.flags = [SimpleNamespace(home=home, taken=False) for home in self.flag_homes]
         self.act_space_checked, self.act_space_match = {}, {}
         self.env_size, self.flag_keepout_radius, self.agent_radius = (160.0, 80.0), 3.0, [2.0, 2.0]
-        self.metadata, self.stepped, self.moved = {}, [], []
+        self.metadata, self.stepped, self.moved, self.current_time = {}, [], [], 0.0
         self.aquaticus_field_points = {"HOME": (20.0, 40.0)}
         self._walls = [[1], [2]]
 
