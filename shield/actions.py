@@ -40,6 +40,7 @@ class Seat(NamedTuple):
         lowest: lowest number of a discrete action; they count from the end, as Python's indices do.
         bools: True and False are numbers.
         longer: of more than two entries the first two count.
+        pairs: pairs are played as well as numbers.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Seat(NamedTuple):
     lowest: int = -1
     bools: bool = False
     longer: bool = False
+    pairs: bool = True
 
 
 def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
@@ -170,6 +172,8 @@ def _unusable(seat: Seat, action: Any) -> GameError:
 
 def _help(seat: Seat) -> str:
     whole = f"0..{len(seat.points) - 1}" if seat.numbered else f"0..{STOP} (or -1 to stop)"
+    if not seat.pairs:
+        return f"give a whole number {whole}"
     point = "" if seat.to_point is None else " or a field point's name"
     comma = "," if point else " or"
     return f"give a whole number {whole}{comma} a pair (speed m/s, relative heading deg){point}"

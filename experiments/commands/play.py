@@ -87,13 +87,16 @@ def play(
     if keyboard and own not in ("medium", "keyboard"):
         raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {own}")
     own = "keyboard" if keyboard else own
+    asked = o.shield_settings(separation, certificate, solver, shield_set)
+    if asked and not shield:
+        raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
     spec = MatchSpec(
         preset=preset,
         own=own,
         opponent=opponent,
         seed=seed,
         side=side,
-        shield=o.shield_settings(separation, certificate, solver, shield_set) if shield else None,
+        shield=asked if shield else None,
         shield_autopilot=not no_shield_autopilot,
         rules=o.game_settings(max_time, platform, rules),
         fixed_start=fixed_start,

@@ -55,10 +55,10 @@ class Stage:
 
     def _fill(self, top: Path, max_bytes: int) -> Path:
         if self.source.is_dir():
-            folder = link_folder(find_entry(self.source), top)
+            folder = link_folder(find_entry(self.source, self.source), top)
         else:
             unpack(self.source, top, max_bytes)
-            folder = find_entry(top)
+            folder = find_entry(top, self.source)
         with contextlib.suppress(OSError):  # a file system without links: only the template's own paths need it
             (folder / WORKING_DIR).symlink_to(".", target_is_directory=True)
         return folder
@@ -68,18 +68,18 @@ class Stage:
         self._clean()
 
 
-def find_entry(folder: Path) -> Path:
+def find_entry(folder: Path, source: Path) -> Path:
     """The folder that holds ``solution.py``: this one, or its only subfolder that has it.
 
     Raises:
-        PolicyError: none or several.
+        PolicyError: none or several; it names the source.
     """
     if (folder / ENTRY_FILE).is_file():
         return folder
     inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
     if len(inside) != 1:
         found = "none there" if not inside else "several: " + ", ".join(path.name for path in inside)
-        raise PolicyError(f"a submission needs one {ENTRY_FILE} at its top ({found}); looked in {folder}")
+        raise PolicyError(f"{source} needs one {ENTRY_FILE} at its top, or in its only folder ({found})")
     return inside[0]
 
 
@@ -127,6 +127,8 @@ def check_members(archive: Path, members: list[zipfile.ZipInfo], max_bytes: int)
         if mode and stat.S_IFMT(mode) not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise PolicyError(f"{archive}: {member.filename!r} is a link or a device; zip plain files only")
         if not is_inside(member.filename):
+            if is_inside(member.filename.replace("\\", "/")):
+                raise PolicyError(f"{archive}: {member.filename!r} has a backslash; zip it with / in its names")
             raise PolicyError(f"{archive}: {member.filename!r} would land outside its folder; zip relative paths only")
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise PolicyError(f"{archive}: {member.filename!r} is packed in an unusual way; zip it with plain deflate")

@@ -148,11 +148,10 @@ class TeamBatch:
 
     def _decode(self, actions: Any) -> Array:
         """Commands (B, boats, 2) of flat actions."""
+        pairs = self.actions == "continuous"
         top_mps = np.tile(self.core.max_speed_mps[self.boats], self.core.n_games)
         try:
-            flat = read_flat(
-                actions, top_mps, lambda i: Seat(f"learner {i}", float(top_mps[i])), self.actions == "continuous"
-            )
+            flat = read_flat(actions, top_mps, lambda i: Seat(f"learner {i}", float(top_mps[i]), pairs=pairs), pairs)
         except GameError as error:
             raise PolicyError(str(error)) from None
         return flat.reshape(self.core.n_games, len(self.boats), 2)

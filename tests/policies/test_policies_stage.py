@@ -72,6 +72,19 @@ def test_a_zip_that_reaches_outside_is_refused_whole(tmp_path, name):
         check_members(tmp_path, [zipfile.ZipInfo("solution.py"), info], 10**9)
 
 
+def test_names_as_windows_writes_them_are_told(tmp_path):
+    info = zipfile.ZipInfo("placeholder")
+    info.filename = "team\\solution.py"
+    with pytest.raises(PolicyError, match="has a backslash; zip it with / in its names"):
+        check_members(tmp_path, [info], 10**9)
+
+
+def test_a_zip_without_an_entry_is_named_itself(tmp_path):
+    source = pack(tmp_path / "mine.zip", **{"readme.txt": "no entry"})
+    with pytest.raises(PolicyError, match=r"mine\.zip needs one solution\.py at its top, or in its only folder"):
+        Stage(source)
+
+
 def test_path_traversal_end_to_end(tmp_path):
     source = pack(tmp_path / "evil.zip", **{"solution.py": SOLUTION, "../../evil.txt": "evil"})
     with pytest.raises(PolicyError, match="outside its folder"):
