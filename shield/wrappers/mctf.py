@@ -45,6 +45,10 @@ class MctfReader:
         with self.env.filtered(command_filter):
             yield
 
+    def time_s(self) -> float:
+        """Time of the game, s."""
+        return float(self.env.core.time_s[0])
+
     def check_answers(self, agent_ids: Sequence[str]) -> None:
         """The game plays one command a step, of any kind."""
 

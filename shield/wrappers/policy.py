@@ -12,8 +12,9 @@ from ..commands import Commands
 from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
+from ..game_facts import GameFacts
 from ..shield import Shield
-from .checks import shield_for
+from .checks import check_unchanged, facts_now, shield_for
 from .reading import GameReader, one_game_shield, reader_of
 
 logger = logging.getLogger(__name__)
@@ -46,6 +47,9 @@ class ShieldedTeamPolicy:
         self._reader: GameReader | None = None
         self._team = 0
         self._agent_ids: tuple[str, ...] = ()
+        self._facts: GameFacts | None = None
+        self._is_copy = False
+        self._acted_s: float | None = None
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
@@ -58,7 +62,8 @@ class ShieldedTeamPolicy:
         self._team = _team_of(reader, agent_ids)
         reader.check_answers(agent_ids)
         self.shield = shield_for(self.shield, reader, self._team)
-        self._reader, self._agent_ids = reader, tuple(agent_ids)
+        self._reader, self._agent_ids, self._facts = reader, tuple(agent_ids), facts_now(reader)
+        self._is_copy, self._acted_s = False, None
         self.shield.reset()
         self.policy.reset(env, agent_ids, seed)
 
@@ -66,10 +71,13 @@ class ShieldedTeamPolicy:
         """Actions of the boats; those the shield had to change are (speed m/s, relative heading deg) pairs.
 
         Raises:
-            PolicyError: `reset` has not been called.
+            PolicyError: `reset` has not been called, or this is a copy and its game does not move.
+            ConfigError: the env was set since then to what the shield is not for.
         """
-        if self._reader is None:
+        if self._reader is None or self._facts is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
+        check_unchanged(self._facts, self._reader)
+        self._check_game()
         answer = self.policy.act(observations, infos)
         if not isinstance(answer, Mapping):
             raise PolicyError(
@@ -88,6 +96,29 @@ class ShieldedTeamPolicy:
             if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
                 actions[agent] = sent.copy()
         return actions
+
+    def _check_game(self) -> None:
+        """Refuse to act on for a copy whose game stands still: another one is played, in which its boats are not.
+
+        Raises:
+            PolicyError: it does.
+        """
+        if not self._is_copy or self._reader is None:
+            return
+        now_s = self._reader.time_s()
+        if self._acted_s is not None:
+            if now_s == self._acted_s:
+                raise PolicyError(
+                    "this is a copy of a wrapped policy, with a copy of its game, which does not move; call "
+                    "reset(env, agent_ids, seed) with the game that is played, or copy both at once: "
+                    "copy.deepcopy((policy, env))"
+                )
+            self._is_copy = False
+        self._acted_s = now_s
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state)
+        self._is_copy, self._acted_s = True, None
 
     def __getattr__(self, name: str) -> Any:
         # "policy" is not set yet: no looking it up on itself; and the policy's own way of copying knows no shield

@@ -75,6 +75,10 @@ class PyquaticusReader:
         with _standing_in(env, "step", stepping), _standing_in(env, "_move_agents", moving):
             yield
 
+    def time_s(self) -> float:
+        """Time of the game, s."""
+        return float(self.env.current_time)
+
     def check_answers(self, agent_ids: Sequence[str]) -> None:
         """Check that the environment plays pairs, and each for one move.
 

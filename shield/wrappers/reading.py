@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from numbers import Integral
 from typing import Any, Protocol
 
 from ..exceptions import ConfigError
@@ -38,6 +39,9 @@ class GameReader(Protocol):
     def filtering(self, safe: Callable[[Array], Array]) -> AbstractContextManager[None]:
         """While inside, commands (n, 2) pass ``safe`` before the boats move; afterwards the game is as it was."""
 
+    def time_s(self) -> float:
+        """Time of the game, s; it goes on with every step."""
+
     def check_answers(self, agent_ids: Sequence[str]) -> None:
         """Check that the game plays what a shield around a policy answers, one command a step.
 
@@ -68,11 +72,11 @@ def team_number(team: str | int) -> int:
     Raises:
         ConfigError: neither.
     """
-    if team in (0, 1):
+    if isinstance(team, str) and team in SIDES:
+        return SIDES[team]
+    if isinstance(team, Integral) and not isinstance(team, bool) and team in (0, 1):
         return int(team)
-    if team not in SIDES:
-        raise ConfigError(f"unknown team {team!r}; choose 'blue' or 'red'")
-    return SIDES[str(team)]
+    raise ConfigError(f"unknown team {team!r}; choose 'blue' or 'red'")
 
 
 def one_game_shield(shield: Any) -> Any:

@@ -13,6 +13,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Shield
+from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.wrappers import ShieldedParallelEnv, ShieldedTeamPolicy
 from wrapped_games import GAMES, KINDS, SMALL, Batch, Env, sb3_front
 
@@ -172,3 +173,16 @@ def test_a_wrapper_is_copied_with_the_wrapped_game_only():
     other = copy.deepcopy(wrapped)
     assert other.unwrapped is not env
     assert other._reader.env is other.unwrapped
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_a_copy_of_a_policy_alone_does_not_act_on_in_the_game_of_the_original(way):
+    game = begun(KINDS["policy"])
+    team = COPIES[way](game.team)
+    game.play(1)
+    team.act(*game.seen)
+    with pytest.raises(PolicyError, match="a copy of its game, which does not move; call reset"):
+        team.act(*game.seen)
+    team.reset(game.env, game.env.possible_agents[:3], 0)
+    for _ in range(2):
+        team.act(*game.seen)
