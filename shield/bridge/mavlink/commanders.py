@@ -88,7 +88,7 @@ class Commanders:
         return frame is not None and self._ours.sent_lately(bytes(frame))
 
     def _hear_echo(self, message: Any, now_s: float) -> tuple[str, str]:
-        if getattr(message, "target_system", self._system_id) != self._system_id:
+        if _target_of(message) not in (-1, EVERYBODY, self._system_id):
             return "", ""
         text = "our own packets come back: a radio or router on this link reflects them; stop that, it costs bandwidth"
         return "echo", self._say("echo", self._ours, now_s, text)
