@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from . import here as here  # isort: split
+
 import sys
 from typing import Annotated
 

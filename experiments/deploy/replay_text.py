@@ -44,7 +44,7 @@ def _show_log(console: Console, replay: Replay) -> None:
     elif not replay.complete:
         console.print("The log was not closed (crash, power or kill); read up to what was on the disk.")
     for text in replay.damage:
-        console.print(f"Damage: {text}.")
+        console.print(f"Damage: {text}.", style="red", markup=False)
     for line in replay.lines[:MOST_ROWS]:
         console.print(f"  {line.name}: {line.text}", markup=False)
     _rest(console, len(replay.lines))

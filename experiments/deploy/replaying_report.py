@@ -68,7 +68,7 @@ class Replay:
 
         Logs of version 1 have no chain, and one that was killed has no end: that is told, and they count as they are.
         """
-        return self.proof.proved and self.chain.broken == 0
+        return self.proof.proved and self.chain.broken == 0 and not self.damage
 
     @property
     def made_by(self) -> str:

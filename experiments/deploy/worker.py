@@ -20,7 +20,7 @@ from steerclear.policies.words import plain_text
 
 from ..entries.keeper import OVER, READY
 from ..entries.limits import Limits
-from ..entries.system import end_group, end_marked
+from ..entries.system import end_group, end_marked, is_stopped
 from .frames import GONE, Broken, FrameReader, FrameWriter
 
 KEEPER = "steerclear.experiments.entries.keeper"
@@ -102,9 +102,11 @@ class Worker:
         """Whole messages that have come; also reads what the process printed.
 
         Raises:
-            Broken: the process is gone.
+            Broken: the process is gone, or stopped the one that watches it.
         """
         self._read_output()
+        if is_stopped(self._process.pid):
+            raise Broken("it stopped the process that watches it; its process was ended")
         gone = self.is_gone  # asked first: a process it started may hold the pipe open
         messages = self._reader.read()
         if gone and not messages:

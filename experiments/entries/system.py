@@ -46,6 +46,11 @@ def written_bytes(pid: int) -> int:
     return 0
 
 
+def is_stopped(pid: int) -> bool:
+    """Whether a process was told to stop (SIGSTOP and its like), and has not gone on since."""
+    return _read(f"/proc/{pid}/stat").rpartition(")")[2].split()[:1] in (["T"], ["t"])
+
+
 def end_group(pid: int) -> None:
     """End at once all processes of a group that was started as one of its own."""
     with contextlib.suppress(ProcessLookupError, PermissionError, AttributeError):

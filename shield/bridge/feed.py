@@ -54,14 +54,17 @@ _SEAL_TEXTS = {
 FORGED_COST = 0.1
 """What reading a packet costs that is not sealed as it should be: it is not looked into."""
 _PAUSE_S = 0.02
+LATE_S = 0.5
+"""Sealed packets later than this, beside the sender's quickest, are told."""
 
 
 class FeedReceiver:
     """Hears the feed on a socket of its own, in a thread of its own. A `ContactSource`; a context manager.
 
-    The age of a fix is counted on our clock from its receipt, plus the age its sender declared: senders' clocks are
-    never trusted. Packets that are malformed, old, repeated, too long, from hosts not allowed, not sealed as they
-    should be, or more than can be read are dropped and counted in `faults`. Senders that contradict each other about a
+    The age of a fix is counted on our clock from its receipt, plus the age its sender declared, plus, where packets are
+    sealed, how much later they come than the sender's quickest: senders' clocks are never trusted. Packets that are
+    malformed, old, repeated, too long, from hosts not allowed, not sealed as they should be, or more than can be read
+    are dropped and counted in `faults`. Senders that contradict each other about a
     boat are all given, each as a contact of its own: who takes them in must be right whichever of them is.
 
     Args:
@@ -177,11 +180,14 @@ class FeedReceiver:
             return
         for text in packet.refused:
             self._refuse("fix", f"{packet.sender}: {text}")
+        late_s = self._order.late_s(packet.sender)
+        if late_s > LATE_S:
+            self._refuse("late", f"packets of {packet.sender} come {late_s:.1f} s late: what is in them is as old")
         if packet.game is not None:
             with self._lock:
-                self._game, self._game_s = packet.game, now_s
+                self._game, self._game_s = packet.game, now_s - late_s
         for fix in packet.fixes:
-            self._take_fix(self._told, fix, packet.sender, now_s)
+            self._take_fix(self._told, fix, packet.sender, now_s, late_s)
 
     def _out_of_place(self, packet: Packet) -> tuple[str, str] | None:
         """Why a packet is none for us whoever sent it, as (kind, explanation): looked at first, so it takes no seat."""
@@ -255,7 +261,7 @@ class FeedReceiver:
             self._socket.settimeout(0.2)
         self._refuse("flood", f"more than {PACKETS_PER_S:g} packets a second", dropped)
 
-    def _take_fix(self, told: Told, fix: Fix, sender: str, now_s: float) -> None:
+    def _take_fix(self, told: Told, fix: Fix, sender: str, now_s: float, late_s: float = 0.0) -> None:
         is_known = told.has_room(fix.boat) if self._boats is None else fix.boat in self._boats
         if not is_known:
             self._refuse("unknown boat", f"{sender}: boat {fix.boat} is not of this fleet")
@@ -269,7 +275,7 @@ class FeedReceiver:
             position_m=(x_m, y_m),
             heading_rad=self._frame.heading_to_field_rad(math.radians(fix.heading_deg)),
             speed_mps=fix.speed_mps,
-            fixed_s=now_s - fix.age_s,
+            fixed_s=now_s - fix.age_s - late_s,
             error_m=fix.error_m,
             source=sender,
         )

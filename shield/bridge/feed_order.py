@@ -6,7 +6,8 @@ ahead of itself for good, and what was refused leaves no trace.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from .feed_packets import Packet
 from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
@@ -20,6 +21,8 @@ MOST_AHEAD = 1000
 """A count this much further than the last is not of the sender that speaks."""
 REORDERED = 100
 """Packets this far behind may have been overtaken on the way; older ones show that two programs count."""
+DRIFT = 1e-3
+"""Clocks go apart by less than this, s per s."""
 RIVALS = ("second run", "second referee")
 """Kinds that show two programs under one name, or in one office: whoever is right, both cannot be."""
 
@@ -31,6 +34,8 @@ class _Sender:
     stamp: int
     first_s: float
     heard_s: float
+    ahead_s: float = -math.inf
+    late_s: float = 0.0
 
 
 class Order:
@@ -59,10 +64,34 @@ class Order:
         other = packet.game is not None and self._referee not in ("", packet.sender)
         if other and now_s - self._referee_s < REFEREE_GONE_S:
             return "second referee", f"{packet.sender} speaks while {self._referee} does; end one of them"
+        known = self._senders.get(packet.sender)
+        before = None if known is None else replace(known)
         found = self._step(packet, now_s)
+        if found is None:
+            self._note_way(packet, before, now_s)
         if found is None and packet.game is not None:
             self._referee, self._referee_s = packet.sender, now_s
         return found
+
+    def late_s(self, sender: str) -> float:
+        """How much longer the last packet of a sender was on its way than its quickest, s; 0 without stamps.
+
+        Whoever holds packets back and hands them on later changes no bit of them: only their time tells.
+        """
+        known = self._senders.get(sender)
+        return 0.0 if known is None else known.late_s
+
+    def _note_way(self, packet: Packet, before: _Sender | None, now_s: float) -> None:
+        """Compare how far a sender's clock is ahead with the furthest it was in this run."""
+        if self._clock is None or packet.stamp is None:
+            return
+        known = self._senders[packet.sender]
+        ahead_s = (packet.stamp - self._clock.now()) / TICKS_PER_S
+        furthest_s = -math.inf
+        if before is not None and before.run == packet.run:
+            furthest_s = before.ahead_s - DRIFT * max(now_s - before.heard_s, 0.0)
+        known.ahead_s = max(ahead_s, furthest_s)
+        known.late_s = known.ahead_s - ahead_s
 
     def _stamp_problem(self, packet: Packet) -> tuple[str, str] | None:
         """A sealed packet must be later than all before of its sender, and of our time."""

@@ -25,7 +25,7 @@ LARGEST = 1e9
 _FAR_OUT = frozenset({655.35, 6553.5, 65535.0})
 """16 bits of ones, in the units boats and receivers use: not available."""
 NOT_AVAILABLE: Mapping[str, frozenset[float]] = {
-    "heading_deg": _FAR_OUT | {360.0, 511.0, 3600.0, 36000.0},
+    "heading_deg": _FAR_OUT | {-360.0, 360.0, 511.0, 3600.0, 36000.0},
     "speed_mps": _FAR_OUT | {102.3, 1023.0},
     "latitude_deg": frozenset({91.0}),
     "longitude_deg": frozenset({181.0}),

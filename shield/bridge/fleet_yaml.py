@@ -34,6 +34,8 @@ _NO_NUMBER = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 """Some settings of the shield may be endless; keys that may not say so themselves."""
 _CORE_NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|0o[0-7]+|0x[0-9a-fA-F]+")
 """All that YAML 1.2 takes for a number: with leading zeros or another base, 1.1 does not agree."""
+_LINE_ENDS = re.compile("[\x85\u2028\u2029]")
+"""They end a line in YAML 1.1 only: what is a comment in the one is a setting in the other."""
 _TEXT_TAG = "tag:yaml.org,2002:str"
 
 
@@ -47,8 +49,16 @@ def read_settings(text: str) -> Any:
         FleetFileError: it is no YAML, says something that other programs read otherwise, gives a key twice, or is
             too large or too deep; one line that names the line and the remedy.
     """
+    if not isinstance(text, str):
+        raise FleetFileError(f"it is {type(text).__name__}; give its text")
     if len(text) > MOST_BYTES or len(text.encode(errors="replace")) > MOST_BYTES:
         raise FleetFileError(f"it is larger than {MOST_BYTES >> 10} KiB; give a fleet file")
+    line_end = _LINE_ENDS.search(text)
+    if line_end:
+        line = text.count("\n", 0, line_end.start()) + 1
+        raise FleetFileError(
+            f"line {line}: programs disagree about whether U+{ord(line_end[0]):04X} ends a line; use newlines"
+        )
     try:
         return _Builder(text).document()
     except yaml.YAMLError as error:

@@ -6,9 +6,11 @@ import copy
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
-from ..game_facts import check_step, facts_of_games, told_distances, with_distances
+from ..game_facts import GameFacts, check_step, facts_of_games, told_distances, with_distances
 from ..shield import Shield
 from .reading import GameReader, reader_of
 
@@ -49,6 +51,35 @@ def shield_for(shield: Any, reader: GameReader, team: int) -> Any:
     return other
 
 
+def facts_now(reader: GameReader) -> GameFacts:
+    """What the game is now; later changes of its arrays do not change it.
+
+    Raises:
+        ConfigError: it has settings that no shield can be built for.
+    """
+    facts = reader.facts()
+    return facts._replace(radius_m=np.array(facts.radius_m), team=np.array(facts.team))
+
+
+def check_unchanged(before: GameFacts, reader: GameReader) -> None:
+    """Refuse a game that was set to something else in its middle: its shield foresees what it was when it began.
+
+    Raises:
+        ConfigError: it was, or has settings by now that no shield can be built for.
+    """
+    now = reader.facts()
+    for name in GameFacts._fields:
+        then, found = getattr(before, name), getattr(now, name)
+        if then is not found and not np.array_equal(then, found):
+            raise ConfigError(
+                f"{name} of the game was {_words(then)} at its reset and is {_words(found)} now; reset() it"
+            )
+
+
+def _words(value: Any) -> str:
+    return str(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
 def layers_of(env: Any) -> Iterator[Any]:
     """The environment and all it wraps, outermost first."""
     while env is not None:
@@ -57,13 +88,18 @@ def layers_of(env: Any) -> Iterator[Any]:
         env = next((inner[name] for name in _INNER if inner.get(name) is not None), None)
 
 
-def refuse_second(env: Any, kind: type, team: int) -> None:
+def refuse_second(env: Any, kind: type, team: int, shield: Any) -> None:
     """Refuse an environment in which a wrapper of this kind shields the team already: both would mend its commands.
 
+    So would be lost what a shield remembers of one team, if it decided for the other in between.
+
     Raises:
-        ConfigError: there is one.
+        ConfigError: there is one, or one of the other team with this very shield.
     """
-    if any(isinstance(layer, kind) and getattr(layer, "team", None) == team for layer in layers_of(env)):
+    others = [layer for layer in layers_of(env) if isinstance(layer, kind)]
+    if any(getattr(layer, "shield", None) is shield for layer in others):
+        raise ConfigError("this shield serves the other team of this environment; give each team a Shield of its own")
+    if any(getattr(layer, "team", None) == team for layer in others):
         side = ("blue", "red")[team]
         raise ConfigError(
             f"the {side} team of this environment has a shield already; wrap env.unwrapped, or shield the other team"

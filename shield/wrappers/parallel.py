@@ -8,9 +8,10 @@ from pettingzoo.utils.wrappers import BaseParallelWrapper
 
 from ..commands import Commands
 from ..decision import Decisions
+from ..game_facts import GameFacts
 from ..jit import Array
 from ..shield import Shield
-from .checks import refuse_second, shield_for
+from .checks import check_unchanged, facts_now, refuse_second, shield_for
 from .reading import GameReader, one_game_shield, parallel_game, reader_of, team_number
 
 
@@ -40,7 +41,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
 
     Raises:
         ConfigError: the env cannot be read or has settings that no shield can be built for, the shield is none or one
-            for another step, the team is unknown, or has a shield in this env already.
+            for another step or serves the other team, the team is unknown, or has a shield in this env already.
     """
 
     def __init__(
@@ -55,8 +56,9 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         super().__init__(parallel_game(env))
         self.team = team_number(team)
         self._reader: GameReader = reader_of(env) if reader is None else reader
-        refuse_second(env, ShieldedParallelEnv, self.team)
-        self.shield = shield_for(one_game_shield(shield), self._reader, self.team)
+        refuse_second(env, ShieldedParallelEnv, self.team, one_game_shield(shield))
+        self.shield = shield_for(shield, self._reader, self.team)
+        self._facts: GameFacts = facts_now(self._reader)
         self.shield_autopilot = shield_autopilot
         self.keep_out = keep_out
         self.decisions: Decisions | None = None
@@ -68,12 +70,18 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
             ConfigError: the env was set since to what the shield is not for.
         """
         self.shield = shield_for(self.shield, self._reader, self.team)
+        self._facts = facts_now(self._reader)
         self.shield.reset()
         self.decisions = None
         return self.env.reset(seed=seed, options=options)
 
     def step(self, actions: dict[str, Any]) -> Any:
-        """One step; commands of the shielded team that are not safe are changed before the boats move."""
+        """One step; commands of the shielded team that are not safe are changed before the boats move.
+
+        Raises:
+            ConfigError: the env was set since its reset to what the shield is not for.
+        """
+        check_unchanged(self._facts, self._reader)
         with self._reader.filtering(self._safe):
             outcome = self.env.step(actions)
         self._tell(outcome[-1])
@@ -106,5 +114,5 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
                 infos[agent]["shield"] = self.decisions[i]
 
 
-_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader")
+_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader", "_facts")
 """Attributes of the wrapper itself."""

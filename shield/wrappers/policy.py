@@ -12,8 +12,9 @@ from ..commands import Commands
 from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
+from ..game_facts import GameFacts
 from ..shield import Shield
-from .checks import shield_for
+from .checks import check_unchanged, facts_now, shield_for
 from .reading import GameReader, one_game_shield, reader_of
 
 logger = logging.getLogger(__name__)
@@ -47,6 +48,7 @@ class ShieldedTeamPolicy:
         self._shown: tuple[float, Any] | None = None
         self._team = 0
         self._agent_ids: tuple[str, ...] = ()
+        self._facts: GameFacts | None = None
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
@@ -59,7 +61,8 @@ class ShieldedTeamPolicy:
         self._team = _team_of(reader, agent_ids)
         reader.check_answers(agent_ids)
         self.shield = shield_for(self.shield, reader, self._team)
-        self._reader, self._agent_ids, self._shown = reader, tuple(agent_ids), None
+        self._reader, self._agent_ids, self._facts = reader, tuple(agent_ids), facts_now(reader)
+        self._shown = None
         self.shield.reset()
         self.policy.reset(env, agent_ids, seed)
 
@@ -68,9 +71,11 @@ class ShieldedTeamPolicy:
 
         Raises:
             PolicyError: `reset` has not been called, or another game is played than the one it was called with.
+            ConfigError: the env was set since then to what the shield is not for.
         """
-        if self._reader is None:
+        if self._reader is None or self._facts is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
+        check_unchanged(self._facts, self._reader)
         self._check_game(self._reader, observations)
         answer = self.policy.act(observations, infos)
         if not isinstance(answer, Mapping):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from numbers import Integral
 from typing import Any, Protocol
 
 from ..exceptions import ConfigError
@@ -71,11 +72,11 @@ def team_number(team: str | int) -> int:
     Raises:
         ConfigError: neither.
     """
-    if team in (0, 1):
+    if isinstance(team, str) and team in SIDES:
+        return SIDES[team]
+    if isinstance(team, Integral) and not isinstance(team, bool) and team in (0, 1):
         return int(team)
-    if team not in SIDES:
-        raise ConfigError(f"unknown team {team!r}; choose 'blue' or 'red'")
-    return SIDES[str(team)]
+    raise ConfigError(f"unknown team {team!r}; choose 'blue' or 'red'")
 
 
 def one_game_shield(shield: Any) -> Any:

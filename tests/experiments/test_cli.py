@@ -365,3 +365,12 @@ def test_ctrl_c_ends_a_real_run_with_status_130_and_keeps_its_games(tmp_path):
     assert "--resume" in errors
     assert len(lines.read_text().splitlines()) >= 2
     assert json.loads((tmp_path / "out" / "results.json").read_text())["complete"] is False
+
+
+def test_a_folder_that_is_gone_is_named(tmp_path):
+    here = tmp_path / "gone"
+    here.mkdir()
+    code = f"import os; os.chdir({str(here)!r}); os.rmdir({str(here)!r}); import steerclear.experiments.cli"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr == "error: the present folder is gone (No such file or directory); change to another: cd\n"

@@ -40,6 +40,8 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
                 yield from _parts(item, tell)
             elif isinstance(item, (Schema, Channel, Message, Footer)):
                 yield item
+        if file.read(1):
+            tell("after its end more bytes follow, which were not read")
     except EndOfFile:
         return  # cut off: the footer that was not there tells
     except _DAMAGE as error:

@@ -18,11 +18,17 @@ _ORDERS = {
     int(mavlink.MAV_CMD_NAV_SET_YAW_SPEED), int(mavlink.MAV_CMD_DO_REPOSITION), int(mavlink.MAV_CMD_MISSION_START),
     int(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH), int(mavlink.MAV_CMD_NAV_LOITER_UNLIM), int(mavlink.MAV_CMD_DO_SET_SERVO),
     int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), int(mavlink.MAV_CMD_DO_MOTOR_TEST),
+    int(mavlink.MAV_CMD_DO_SET_REVERSE), int(mavlink.MAV_CMD_DO_PAUSE_CONTINUE), int(mavlink.MAV_CMD_DO_AUX_FUNCTION),
+    int(mavlink.MAV_CMD_DO_FLIGHTTERMINATION), int(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED),
+    int(mavlink.MAV_CMD_GUIDED_CHANGE_HEADING), int(mavlink.MAV_CMD_DO_GUIDED_LIMITS),
+    int(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT), int(mavlink.MAV_CMD_DO_FENCE_ENABLE),
 }  # fmt: skip
 SAY_AGAIN_S = 10.0
 ANSWER_S = 10.0
 """An answer to a command of our own comes within this time."""
 _MOST_STATIONS = 64
+EVERYBODY = 0
+"""Target of what all autopilots on a wire obey."""
 
 
 class Commanders:
@@ -57,7 +63,7 @@ class Commanders:
             return self._hear_echo(message, now_s)
         if name == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
             return "", self._hear_station(source, now_s)
-        if getattr(message, "target_system", -1) != self._system_id:
+        if _target_of(message) not in (EVERYBODY, self._system_id):
             return "", ""
         if name in _STEERS or (name in ("COMMAND_LONG", "COMMAND_INT") and message.command in _ORDERS):
             return self._fault(source, now_s, f"sends {name}")
@@ -82,7 +88,7 @@ class Commanders:
         return frame is not None and self._ours.sent_lately(bytes(frame))
 
     def _hear_echo(self, message: Any, now_s: float) -> tuple[str, str]:
-        if getattr(message, "target_system", self._system_id) != self._system_id:
+        if _target_of(message) not in (-1, EVERYBODY, self._system_id):
             return "", ""
         text = "our own packets come back: a radio or router on this link reflects them; stop that, it costs bandwidth"
         return "echo", self._say("echo", self._ours, now_s, text)
@@ -109,6 +115,11 @@ class Commanders:
             self._said_s.clear()
         self._said_s[key] = now_s
         return f"{self._boat}: {text}"
+
+
+def _target_of(message: Any) -> int:
+    """System a message is for; -1: it names none."""
+    return int(getattr(message, "target_system", getattr(message, "target", -1)))
 
 
 def _who(source: tuple[int, int]) -> str:

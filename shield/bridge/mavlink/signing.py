@@ -30,6 +30,10 @@ _MARKER_2 = 0xFD
 _BLOCK = 13
 _SHORTEST_PASSPHRASE = 8
 _LONGEST = 4096
+_LIKE_DIGITS = 32
+"""So many hexadecimal digits and nothing else are meant as a key, not as a passphrase."""
+_NOT_DIGITS = re.compile(r"[\s:,;_\-'\"\0\ufeff]")
+"""What keys are written with between and round their digits."""
 
 
 @dataclass(frozen=True)
@@ -66,16 +70,21 @@ def read_key(path: str | Path) -> bytes:
     path = Path(path)
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    except OSError as error:
-        raise ConfigError(
-            f"cannot read the signing key {path} ({error.strerror}); give the path of a key file"
-        ) from None
+    except (OSError, ValueError) as error:  # a path with a NUL in it is no path
+        raise _unreadable(path, error) from None
     try:
         _check_safe(path, os.fstat(descriptor))  # of the opened file: what is checked is what is read
-        content = os.read(descriptor, _LONGEST)
+        content = os.read(descriptor, _LONGEST + 1)
+    except OSError as error:
+        raise _unreadable(path, error) from None
     finally:
         os.close(descriptor)
     return _parse_key(path, content)
+
+
+def _unreadable(path: Path, error: Exception) -> ConfigError:
+    why = getattr(error, "strerror", None) or error
+    return ConfigError(f"cannot read the signing key {str(path)!r} ({why}); give the path of a key file")
 
 
 def _check_safe(path: Path, status: os.stat_result) -> None:
@@ -99,7 +108,13 @@ def _parse_key(path: Path, content: bytes) -> bytes:
         text = ""
     if re.fullmatch(r"[0-9a-fA-F]{64}", text):
         return bytes.fromhex(text)
-    if len(text) < _SHORTEST_PASSPHRASE or "\n" in text:
+    digits = _NOT_DIGITS.sub("", text.casefold().removeprefix("0x"))
+    if len(digits) >= _LIKE_DIGITS and re.fullmatch(r"[0-9a-f]+", digits):
+        raise ConfigError(
+            f"the signing key {path} looks like hexadecimal digits, {len(digits)} of them, but is not just 64; write "
+            "64 digits and nothing else, or a passphrase that nobody takes for digits"
+        )
+    if len(text) < _SHORTEST_PASSPHRASE or len(content) > _LONGEST or not text.isprintable():
         raise ConfigError(
             f"the signing key {path} holds neither 64 hexadecimal digits nor one line of passphrase of at least "
             f"{_SHORTEST_PASSPHRASE} characters; write one of them, the same as on the boats"

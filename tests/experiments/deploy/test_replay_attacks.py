@@ -238,3 +238,20 @@ def test_the_tests_log_is_sound(log):
     assert run(log)[0] == 0
     with LogReader(log) as reader:
         assert len(list(reader.ticks())) == STEPS
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: data + data, "after its end more bytes follow"),
+        (lambda data: data + b"\0", "after its end more bytes follow"),
+        (lambda data: data[:-1], "from some point on it makes no sense"),
+    ],
+)
+def test_a_file_with_more_or_less_than_was_written_is_not_proved(tmp_path, log, change, words):
+    path = tmp_path / "x.mcap"
+    path.write_bytes(change(log.read_bytes()))
+    code, said = run(path)
+    assert code == 3
+    assert words in said
+    assert "NOT PROVED" in said

@@ -36,6 +36,7 @@ FORFEITS = {
         "more than 1 GiB of memory",
     ),
     "it ends its keeper": ("os.kill(os.getppid(), 9)\ntime.sleep(600)", "ended by SIGKILL"),
+    "it stops its keeper": ("os.kill(os.getppid(), 19)\ntime.sleep(600)", "stopped the process that watches it"),
     "it writes into our pipe": ("os.write(int(sys.argv[2]), b'\\xff' * 64)\ntime.sleep(600)", "a message of"),
     "it answers for us": (
         "import struct\nos.write(int(sys.argv[2]), struct.pack('<I', 2) + b'[]')\nreturn 4",
@@ -56,6 +57,13 @@ def test_an_entry_that_is_ended_forfeits_its_moves_and_the_game_goes_on(team_of,
     assert (failure.kind, failure.step, failure.count) == ("process ended", 0, 9)
     assert any(part in failure.message for part in words.split("|")), failure.message
     assert "hold for the rest of the game" in team.held["agent_0"]
+
+
+def test_an_entry_that_stops_its_keeper_and_plays_on_is_ended(team_of, play):
+    team = team_of("os.kill(os.getppid(), 19)\nreturn 4", limits=SMALL)
+    assert play(team, 5)[-1] == HELD
+    (failure,) = team.report().failures
+    assert "stopped the process that watches it" in failure.message
 
 
 MISTAKES = {

@@ -160,7 +160,7 @@ BAD_FIXES = [
     {"speed_mps": 655.35},
     {"error_m": 655.35},
     {"age_s": 65535},
-    *({"heading_deg": value} for value in (360, 360.0, 511, 511.0, 655.35, 65535, 3600, 36000)),
+    *({"heading_deg": value} for value in (360, 360.0, -360, 511, 511.0, 655.35, 65535, 3600, 36000)),
 ]
 
 

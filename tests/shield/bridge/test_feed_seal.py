@@ -150,3 +150,15 @@ def test_forged_packets_cost_a_tenth_so_that_more_of_them_leave_the_true_ones_ro
                 time.sleep(0.02)
                 assert time.monotonic() < end
         assert "flood" not in receiver.faults()
+
+
+def test_fixes_of_packets_that_were_held_back_are_not_fresh(receiver, monkeypatch):
+    now = receiver._order._clock.now
+    held = [sealed(KEY, seq, fixes=(TRUE,)) for seq in (1, 2)]
+    receiver.take(held[0], LOCAL)
+    monkeypatch.setattr(receiver._order._clock, "now", lambda: now() + 30 * 100_000)
+    receiver.take(held[1], LOCAL)
+    (contact,) = receiver.read()
+    assert 100.0 - contact.fixed_s == pytest.approx(30.0, abs=0.5)
+    assert receiver.faults() == {"late": 1}
+    assert "packets of hub come 30.0 s late" in receiver.fault_texts()["late"]

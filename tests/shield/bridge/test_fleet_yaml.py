@@ -207,3 +207,14 @@ def test_a_geofence_must_fit_the_error_of_positions_too():
     assert parse_fleet(text)
     with pytest.raises(FleetFileError, match=r"too small to keep 12\.2 m"):
         parse_fleet(text + "\nshield: {position_error_m: 12.0}")
+
+
+@pytest.mark.parametrize("end", ["\x85", "\u2028", "\u2029"])
+def test_ends_of_lines_that_only_some_programs_know_are_refused(end):
+    with pytest.raises(FleetFileError, match=r"line 2: programs disagree about whether U\+\w{4} ends a line"):
+        read_settings(f"a: 1\nb: 2 # a comment{end}c: 3\n")
+
+
+def test_bytes_are_no_text_of_a_fleet_file():
+    with pytest.raises(FleetFileError, match="it is bytes; give its text"):
+        read_settings(b"version: 1")

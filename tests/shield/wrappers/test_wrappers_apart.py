@@ -129,7 +129,7 @@ def test_other_wrappers_may_stand_in_between(on):
 
 
 def test_an_environment_of_turns_is_refused():
-    with pytest.raises(ConfigError, match="is an AEC env, in which boats act in turn"):
+    with pytest.raises(ConfigError, match=r"is an AEC env, in which boats act in turn, .* wrap the parallel env"):
         ShieldedParallelEnv(parallel_to_aec(MctfEnv(SMALL)), Shield())
 
 
@@ -173,3 +173,9 @@ def test_a_pyquaticus_step_that_fails_leaves_no_shield_behind():
     with pytest.raises(Exception, match="heading of boat 'agent_0' is not finite"):
         env.step({"agent_0": STRAIGHT})
     assert attributes(game) == before
+
+
+def test_one_shield_for_both_teams_is_refused():
+    shield = Shield()
+    with pytest.raises(ConfigError, match="give each team a Shield of its own"):
+        ShieldedParallelEnv(ShieldedParallelEnv(MctfEnv(SMALL), shield), shield, team="red")

@@ -172,3 +172,30 @@ def test_a_game_without_keep_out_has_no_circle_to_keep_off():
         wrapped.step({"agent_0": (2.0, 0.0)})
         assert wrapped.decisions[0].reason == Reason.PASSED
     assert env.core.state[0, 0, 1] > home[1]
+
+
+def longer(core):
+    core.config = replace(core.config, dt_s=0.5)
+
+
+def wider(core):
+    core.agent_radius_m[:] = 2.0
+
+
+@pytest.mark.parametrize(("change", "words"), [(longer, "dt_s of the game was 0.1"), (wider, "radius_m of the game")])
+def test_a_game_set_to_something_else_in_its_middle_is_refused(change, words):
+    env = ShieldedParallelEnv(game(), Shield())
+    seen = env.reset(seed=1)
+    team = Shield().wrap(policies.make("medium"))
+    team.reset(env.unwrapped, BLUE, 0)
+    env.step(team.act(*seen))
+    change(env.unwrapped.core)
+    for go_on in (lambda: env.step({}), lambda: team.act(*seen)):
+        with pytest.raises(ConfigError, match=words + r".* now; reset\(\) it"):
+            go_on()
+
+
+@pytest.mark.parametrize("team", [None, True, 2, -1, 1.0, "Blue", [0], b"blue"])
+def test_what_is_no_team_is_refused(team):
+    with pytest.raises(ConfigError, match=r"unknown team .*; choose 'blue' or 'red'"):
+        ShieldedParallelEnv(game(), Shield(), team)

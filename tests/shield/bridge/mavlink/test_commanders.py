@@ -31,6 +31,13 @@ STEERING = [
     mavlink.MAVLink_param_set_message(1, 1, b"WP_SPEED", 5.0, 9),
     command(mavlink.MAV_CMD_DO_SET_MODE),
     command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM),
+    command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, target=0),
+    command(mavlink.MAV_CMD_DO_SET_REVERSE),
+    command(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED),
+    command(mavlink.MAV_CMD_DO_AUX_FUNCTION),
+    mavlink.MAVLink_set_mode_message(0, 1, 0),
+    mavlink.MAVLink_rc_channels_override_message(0, 0, 1500, 0, 0, 0, 0, 0, 0, 0),
+    mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0),
 ]
 
 
@@ -48,6 +55,7 @@ def test_what_is_for_another_boat_or_asks_for_nothing_is_left():
     watch = watching()
     for message in (
         command(mavlink.MAV_CMD_DO_SET_MODE, target=2),
+        mavlink.MAVLink_manual_control_message(2, 0, 0, 0, 0, 0),
         command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL),
         mavlink.MAVLink_param_request_read_message(1, 1, b"WP_SPEED", -1),
         mavlink.MAVLink_heartbeat_message(11, 3, 1, 0, 4, 3),

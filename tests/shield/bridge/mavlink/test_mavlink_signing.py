@@ -31,10 +31,33 @@ def test_a_key_others_can_read_or_change_is_refused(tmp_path, mode):
         read_key(key_file(tmp_path / "key", KEY.hex(), mode))
 
 
-@pytest.mark.parametrize("text", ["", "short", "two lines\nof passphrase", KEY.hex()[:-2] + "\n" + "ab"])
+@pytest.mark.parametrize(
+    "text", ["", "short", "two lines\nof passphrase", "two\rlines of it", "not\x00seen\x1b[31m", "x" * 5000]
+)
 def test_what_is_no_key_is_refused(tmp_path, text):
     with pytest.raises(ConfigError, match="neither 64 hexadecimal digits nor"):
         read_key(key_file(tmp_path / "key", text))
+
+
+DIGITS = KEY.hex()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeff" + DIGITS, "0x" + DIGITS, ":".join(DIGITS[k : k + 2] for k in range(0, 64, 2)), DIGITS[:63],
+        DIGITS + "0", DIGITS[:32] + " " + DIGITS[32:], f'"{DIGITS}"', DIGITS + "\0", DIGITS[:-2] + "\nab", DIGITS[:32],
+    ],
+)  # fmt: skip
+def test_digits_that_are_not_just_64_are_never_taken_for_a_passphrase(tmp_path, text):
+    with pytest.raises(ConfigError, match=r"looks like hexadecimal digits, .* but is not just 64"):
+        read_key(key_file(tmp_path / "key", text))
+
+
+@pytest.mark.parametrize("path", ["a\0b", "/proc/self/mem"])
+def test_paths_that_cannot_be_read_are_named(path):
+    with pytest.raises(ConfigError, match=r"cannot read the signing key .*; give the path of a key file"):
+        read_key(path)
 
 
 def test_bytes_that_are_no_text_are_refused(tmp_path):
