@@ -54,6 +54,9 @@ class ResultStore:
             raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
 
     def _check(self, resume: bool, command: str | None) -> None:
+        for path in (self.lines, self.folder / RESULTS_FILE):
+            if path.exists() and not path.is_file():  # a pipe or a device would be read for ever
+                raise ConfigError(f"{path} is no plain file; move it away or choose another --out")
         holds = self.lines.exists() and (not self.lines.is_file() or self.lines.stat().st_size > 0)
         if not resume and (holds or (self.folder / RESULTS_FILE).exists()):
             raise ConfigError(f"{self.folder} already holds results; add --resume to continue or choose another --out")

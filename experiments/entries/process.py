@@ -117,7 +117,7 @@ def _sources(path: Path) -> str:
     """The beginning of its Python files, for a look at what they import."""
     texts: list[bytes] = []
     try:
-        if path.suffix == ".zip":
+        if path.suffix == ".zip" and path.is_file():
             with zipfile.ZipFile(path) as archive:
                 for name in [name for name in archive.namelist() if name.endswith(".py")][:MOST_SOURCES]:
                     with archive.open(name) as member:

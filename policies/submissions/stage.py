@@ -45,6 +45,8 @@ class Stage:
             self.source = self.source.parent
         if not self.source.exists():
             raise PolicyError(f"there is no submission at {self.source}; give a folder or a zip with {ENTRY_FILE}")
+        if not (self.source.is_dir() or self.source.is_file()):  # a pipe would be waited for, a device read for ever
+            raise PolicyError(f"{self.source} is no plain file; give a folder or a zip with {ENTRY_FILE}")
         top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
         self._clean = Finalize(self, shutil.rmtree, (top,), {"ignore_errors": True}, exitpriority=0)
         try:

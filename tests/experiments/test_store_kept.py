@@ -196,3 +196,12 @@ def test_lines_say_what_they_are(tmp_path):
     entry = json.loads(kept.lines.read_text())
     assert list(entry) == ["key", "code", "value", "sum"]
     assert entry["code"] == provenance.code_digest()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes in folders are Unix'")
+@pytest.mark.parametrize("name", [store.LINES_FILE, store.RESULTS_FILE])
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+def test_what_is_no_plain_file_is_refused_at_once(tmp_path, name, make):
+    make(tmp_path / name)
+    with pytest.raises(ConfigError, match=r"is no plain file; move it away or choose another --out"):
+        ResultStore(tmp_path, resume=True, command="ablate")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 from collections.abc import Iterator, Mapping
@@ -67,7 +68,7 @@ class LogReader:
         self.files = [path]
         self._topics: dict[int, str] = {}
         try:
-            self._file: IO[bytes] = path.open("rb")
+            self._file: IO[bytes] = _open(path)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise LogError(f"cannot open {path} ({why}); give a log that deploy wrote (.mcap)") from None
@@ -134,7 +135,7 @@ class LogReader:
                 self._tell(f"{self.files[-1].name} was cut off")
             self.complete = False
             try:
-                later = path.open("rb")
+                later = _open(path)
             except OSError as error:
                 self._tell(f"part {number}, {path.name}, cannot be read ({error.strerror}); what follows is left out")
                 return
@@ -192,6 +193,17 @@ class LogReader:
     def _tell(self, text: str) -> None:
         LOG.info("%s: %s", self.path, text)
         self.damage.append(text)
+
+
+def _open(path: Path) -> IO[bytes]:
+    """The file; a pipe would be waited for, a device read for ever.
+
+    Raises:
+        OSError: it cannot be read, or is no plain file.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "it is no plain file")
+    return path.open("rb")
 
 
 def _line(message: Message) -> LogLine:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -255,3 +256,10 @@ def test_a_file_with_more_or_less_than_was_written_is_not_proved(tmp_path, log, 
     assert code == 3
     assert words in said
     assert "NOT PROVED" in said
+
+
+def test_a_pipe_is_no_log_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.mcap")
+    code, said = run(tmp_path / "pipe.mcap")
+    assert code == 2
+    assert "it is no plain file" in said

@@ -7,6 +7,7 @@ import pytest
 from steerclear import policies
 from steerclear.experiments.entries import process
 from steerclear.experiments.entries.limits import Limits
+from steerclear.experiments.entries.team import EntryTeam
 from steerclear.shield.exceptions import PolicyError
 
 HELD = dict.fromkeys(["agent_0", "agent_1", "agent_2"], policies.HOLD)
@@ -193,3 +194,10 @@ def test_it_has_no_standard_input_and_its_prints_stay_with_it(team_of, play, cap
     assert play(team, 1) == [dict.fromkeys(HELD, 4)]
     assert "hello" in team._process._worker.output()
     assert "hello" not in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["pipe", "pipe.zip"])
+def test_a_pipe_is_no_entry_and_is_not_waited_for(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(PolicyError, match=r"is no plain file; give a folder or a zip"):
+        EntryTeam(str(tmp_path / name))
