@@ -17,7 +17,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.setup import boats_of
 from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES
 from steerclear.shield.tables.files import ValueTable, stack_tables
-from steerclear.shield.tables.lookup import table_value
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
 from steerclear.shield.tables.margin import full_thrust_state
 
 RANGES, BEARINGS = 200, 72
@@ -145,4 +145,4 @@ def values_m(values: ValueTable, state: Array) -> Array:
     tables = stack_tables([values])
     gap, heading = state[:, 1, : L.Y + 1] - state[:, 0, : L.Y + 1], np.radians(state[:, :, L.HEADING])
     rows = np.column_stack([gap, heading, state[:, :, L.SPEED]])
-    return np.array([table_value(tables, 0, *row) for row in rows.tolist()])
+    return np.array([table_value(tables, 0, WHOLE_S, *row) for row in rows.tolist()])

@@ -77,6 +77,8 @@ class ShieldConfig:
     coordination: str = "team"
     solver: str = "daqp"
     opponent_share: float = 1.0
+    adversary_s: float = math.inf
+    floor_s: float = math.inf
     response_per_s: float = 1.0
     table_response_per_s: float = 0.3
     fixed_response_per_s: float = 2.0
@@ -151,7 +153,7 @@ _RANGES = {
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
 _MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = _RATES | {"max_track_age_s", "give_way_after_s", "search_limit"}
+_MAY_BE_INFINITE = _RATES | {"adversary_s", "floor_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
 
 def _check_number(name: str, value: object) -> None:

@@ -26,6 +26,8 @@ _OWN = (
     "blocked_deg",
     "free_s",
     "gives_way",
+    "seen",
+    "odds",
 )
 """What is remembered of a boat alone."""
 

@@ -122,6 +122,8 @@ class Tuning(NamedTuple):
         mate_cap_m: margins from team-mates above this may shrink freely, m.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
         give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
+        adversary_s: time from now for which an opponent may do its worst, s.
+        floor_s: the same of one that gives no sign of steering at a boat of ours, s, see `certificates.evidence`.
         search_limit: cost at which a decision searches no further, see `certificates.effort`.
     """
 
@@ -136,6 +138,8 @@ class Tuning(NamedTuple):
     fixed_decay: float
     give_way_after_s: float
     search_limit: float
+    adversary_s: float
+    floor_s: float
 
 
 class Scene(NamedTuple):

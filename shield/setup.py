@@ -21,7 +21,7 @@ from .scene import Boats, Tuning
 from .shared import share
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
-from .tables.lookup import Tables, no_tables
+from .tables.lookup import WHOLE_S, Tables, no_tables
 from .tables.settings import OtherMay
 from .tables.told import ranges_told_m
 
@@ -44,6 +44,11 @@ On the boat's quarter they close in for so long on an all but parallel course: o
 either. Of faster ones a run that long says that all is lost, which it is not.
 """
 
+LONGEST_FEAR_S = WHOLE_S
+"""Fear for longer than this says no more, s."""
+LEAST_FEAR_S = 0.1
+"""Least time an opponent is feared for at all, s."""
+
 STATIC_REACTION_S = 0.5
 """Time beyond a half turn over which fixed things are looked at, s."""
 
@@ -63,6 +68,8 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             fixed_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
             search_limit=config.search_limit,
+            adversary_s=min(config.adversary_s, LONGEST_FEAR_S),
+            floor_s=max(min(config.floor_s, config.adversary_s, LONGEST_FEAR_S), LEAST_FEAR_S),
         )
     )
 
@@ -73,7 +80,7 @@ def _mates_are_known(config: ShieldConfig) -> bool:
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    feared = CERTIFICATES[config.certificate].hunters and config.opponent_share > 0.0
+    feared = CERTIFICATES[config.certificate].hunters and config.opponent_share > 0.0 and config.adversary_s > 0.0
     return config.coordination == "team" and exact and feared
 
 
@@ -92,7 +99,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    granted = config.opponent_share if certificate.hunters else 0.0
+    granted = config.opponent_share if certificate.hunters and config.adversary_s > 0.0 else 0.0
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     looked = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))

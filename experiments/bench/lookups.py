@@ -10,7 +10,7 @@ import numpy as np
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import Tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, table_range_m, table_value
 from steerclear.shield.tables.settings import OtherMay
 
 from ..jit import kernel
@@ -23,14 +23,14 @@ PAIR = ("surveyor", "heron")
 def _values(tables: Tables, places: Array, out: Array) -> None:
     for k in range(places.shape[0]):
         x, y, own, other, own_mps, other_mps = places[k]
-        out[k] = table_value(tables, 0, x, y, own, other, own_mps, other_mps)
+        out[k] = table_value(tables, 0, WHOLE_S, x, y, own, other, own_mps, other_mps)
 
 
 @kernel
 def _gradients(tables: Tables, places: Array, out: Array) -> None:
     for k in range(places.shape[0]):
         x, y, own, other, own_mps, other_mps = places[k]
-        slope = table_gradient(tables, 0, x, y, own, other, own_mps, other_mps)
+        slope = table_gradient(tables, 0, WHOLE_S, x, y, own, other, own_mps, other_mps)
         own_part = slope.own_x + slope.own_y + slope.own_heading + slope.own_speed
         out[k] = slope.value_m + own_part + slope.other_heading + slope.other_speed  # all of it is computed
 

@@ -15,7 +15,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate
 from steerclear.shield.platforms.usv import turn_of_rudder
-from steerclear.shield.tables.lookup import Gradient, Tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import WHOLE_S, Gradient, Tables, table_gradient, table_range_m, table_value
 
 from ..jit import kernel
 
@@ -88,13 +88,13 @@ def _seen_from(own: Array, other: Array) -> tuple[float, float, float, float, fl
 @kernel
 def value_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> float:
     """V of the pair, m."""
-    return table_value(setup.tables, setup.table[i, j], *_seen_from(own, other))
+    return table_value(setup.tables, setup.table[i, j], WHOLE_S, *_seen_from(own, other))
 
 
 @kernel
 def slope_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> Gradient:
     """V of the pair and its derivatives."""
-    return table_gradient(setup.tables, setup.table[i, j], *_seen_from(own, other))
+    return table_gradient(setup.tables, setup.table[i, j], WHOLE_S, *_seen_from(own, other))
 
 
 @kernel

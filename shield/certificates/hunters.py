@@ -9,6 +9,7 @@ import numpy as np
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Tuning
+from ..tables.lookup import WHOLE_S
 from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from .paths import READY_SAMPLE
@@ -146,6 +147,7 @@ def _run_hunter(
         (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
         sample_s,
         samples,
+        _adverse_samples(j, samples, sample_s, work),
         closely,
         closing(i, j, state, boats, tuning),
         work.radius[i, j],
@@ -156,6 +158,14 @@ def _run_hunter(
         work.hunter,
         work.spare,
     )
+
+
+@lean_kernel
+def _adverse_samples(j: int, samples: int, sample_s: float, work: Work) -> int:
+    """Sample from which on opponent j holds its course and speed: for as long as it is feared it does its worst."""
+    if work.fear_s[j] >= WHOLE_S:
+        return samples
+    return int(min(float(samples), math.ceil(work.fear_s[j] / sample_s)))
 
 
 @lean_kernel

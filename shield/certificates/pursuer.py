@@ -140,6 +140,7 @@ def clear_of_pursuer(
     ahead: float,
     sample_s: float,
     samples: int,
+    adverse: int,
     closely: int,
     closing_m: float,
     radius_m: float,
@@ -171,6 +172,7 @@ def clear_of_pursuer(
         ahead: most samples by which it leads the boat.
         sample_s: time between samples, s.
         samples: last sample.
+        adverse: sample from which on it holds its course and speed.
         closely: sample from which on the boat runs straight: it is followed in longer strides.
         closing_m: most the distance can shrink per sample, m.
         radius_m: radius to keep, m.
@@ -202,6 +204,8 @@ def clear_of_pursuer(
                 break
             stride = max(stride, min(free, LONGEST_STRIDE))
         stride = min(stride, samples - k)
+        if k < adverse:
+            stride = min(stride, adverse - k)
         c, s = c1, s1
         for _ in range(stride - 1):
             c, s = c * c1 - s * s1, s * c1 + c * s1
@@ -211,9 +215,10 @@ def clear_of_pursuer(
             before = k - stride
             vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
             ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
-        ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
-        time_s = stride * sample_s
-        new_speed = _speed_after(speed_mps, fastest_mps * (1.0 - loss * rudder), acc_mps2, dec_mps2, time_s)
+        time_s, new_speed = stride * sample_s, speed_mps
+        if k <= adverse:
+            ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
+            new_speed = _speed_after(speed_mps, fastest_mps * (1.0 - loss * rudder), acc_mps2, dec_mps2, time_s)
         way = 0.5 * (speed_mps + new_speed) * time_s
         speed_mps = new_speed
         x += way * ux

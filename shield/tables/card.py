@@ -40,6 +40,8 @@ class Card:
         model_error: error of the reduced model against the full one.
         margin: outcome of closed-loop runs of the full model; empty when not run.
         version: version of the package that solved it.
+        levels_s: shorter times T for which V(x, T) is kept as well, s.
+        levels: what the set {V(x, T) < radius} is at each of them: areas and reach as above.
         payload_sha256: digest of the packed values.
     """
 
@@ -60,6 +62,8 @@ class Card:
     areas_m2: dict[str, Any] = field(default_factory=dict)
     model_error: dict[str, Any] = field(default_factory=dict)
     margin: dict[str, Any] = field(default_factory=dict)
+    levels_s: tuple[float, ...] = ()
+    levels: dict[str, Any] = field(default_factory=dict)
     format: int = FORMAT
 
     def to_json(self) -> str:
@@ -75,7 +79,8 @@ class Card:
         """
         try:
             content = json.loads(text)
-            content["checked_radii_m"] = tuple(content["checked_radii_m"])
+            for name in ("checked_radii_m", "levels_s"):
+                content[name] = tuple(content.get(name, ()))
             card = Card(**content)
             card.make_grid()
         except (ValueError, TypeError, KeyError) as error:

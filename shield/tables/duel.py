@@ -11,7 +11,7 @@ from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..platforms.step import step_boat
 from ..platforms.usv import turn_of_rudder, wrap_degrees
-from .lookup import Tables, table_value
+from .lookup import WHOLE_S, Tables, table_value
 from .moves import SUB_STEP_S, run_hull
 from .sweep import closest
 
@@ -46,7 +46,7 @@ def pair_value(
     last = own_trail.shape[0] - 1
     x1 = x + trail[last, 0] * c + trail[last, 1] * s - own_trail[last, 0]
     y1 = y - trail[last, 0] * s + trail[last, 1] * c - own_trail[last, 1]
-    later = table_value(tables, table, x1, y1, own_end[0], psi + end[0], own_end[1], end[1])
+    later = table_value(tables, table, WHOLE_S, x1, y1, own_end[0], psi + end[0], own_end[1], end[1])
     return min(later, closest(x, y, s, c, own_trail, trail))
 
 

@@ -19,7 +19,7 @@ from ..exceptions import TableError
 from ..platforms.platform import Platform
 from ..platforms.registry import get_platform
 from .card import Card, platform_digest
-from .lookup import STEPS, Tables, no_tables
+from .lookup import LEVELS_S, N_LEVELS, STEPS, Tables, no_tables, pack
 from .settings import OtherMay, Problem, read_other_may, table_name
 from .solve import Progress
 
@@ -34,11 +34,13 @@ class ValueTable:
 
     Attributes:
         card: what it is.
-        values: uint8 over the grid, in steps of cap / 255, rounded down.
+        values: uint8 over the grid, in steps of cap / 255, rounded down; for the whole play.
+        levels: the same for each time of the card's ``levels_s``, shape ``(levels, *grid)``; no lower than ``values``.
     """
 
     card: Card
     values: NDArray[np.uint8]
+    levels: NDArray[np.uint8]
 
     def values_m(self) -> NDArray[np.float64]:
         """Values in m, over the grid."""
@@ -48,8 +50,10 @@ class ValueTable:
 def pack_values(problem: Problem, state: Progress) -> ValueTable:
     """Pack a solved table, values rounded down; its card has no figures yet."""
     grid = problem.grid
-    steps = np.floor(state.values.astype(np.float64) * (STEPS / grid.cap_m) + 1e-6)
-    values = np.clip(steps, 0, STEPS).astype(np.uint8).reshape(grid.shape)
+    values = pack(state.values, grid.cap_m).reshape(grid.shape)
+    kept_s = LEVELS_S if problem.other_may is OtherMay.WORST_CASE else ()
+    levels = [state.levels[k] if k < len(state.levels) else values.ravel() for k in range(len(kept_s))]
+    shorter = np.array(levels, np.uint8).reshape(-1, *grid.shape)
     card = Card(
         own=problem.own.name,
         other=problem.other.name,
@@ -62,9 +66,10 @@ def pack_values(problem: Problem, state: Progress) -> ValueTable:
         iterations=state.iterations,
         residual_m=round(float(state.residual_m), 6),
         version=_version(),
-        payload_sha256=_digest(values),
+        levels_s=kept_s,
+        payload_sha256=_digest(values, shorter),
     )
-    return ValueTable(card, values)
+    return ValueTable(card, values, shorter)
 
 
 def _version() -> str:
@@ -74,8 +79,18 @@ def _version() -> str:
         return "unknown"
 
 
-def _digest(values: NDArray[np.uint8]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+def _digest(values: NDArray[np.uint8], levels: NDArray[np.uint8]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes() + np.ascontiguousarray(levels).tobytes()).hexdigest()
+
+
+def _more(levels: NDArray[np.uint8], values: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """How much each level tells more than the next longer one: mostly nothing."""
+    return levels - np.concatenate([levels[1:], values[None]]) if len(levels) else levels
+
+
+def _levels(more: NDArray[np.uint8], values: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The levels again, from the longest down."""
+    return values + np.add.accumulate(more[::-1], axis=0, dtype=np.uint8)[::-1] if len(more) else more
 
 
 def cache_folder() -> Path:
@@ -102,7 +117,8 @@ def save_table(table: ValueTable, path: Path) -> None:
     lines = table.values.reshape(*shape[:3], -1)
     steps = np.diff(lines, axis=2, prepend=np.uint8(0))
     memory = io.BytesIO()
-    np.savez_compressed(memory, card=np.array(table.card.to_json()), steps=np.moveaxis(steps, 3, 0))
+    more = _more(table.levels, table.values)
+    np.savez_compressed(memory, card=np.array(table.card.to_json()), steps=np.moveaxis(steps, 3, 0), more=more)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(path.name + ".part")
@@ -123,6 +139,7 @@ def read_table(path: Path) -> ValueTable:
             if not {"card", "steps"} <= set(file.files):
                 raise TableError(f"{path} is no value table; give one that steerclear reach solve has made")
             text, steps = str(file["card"]), file["steps"]
+            more = file["more"] if "more" in file.files else np.zeros(0, np.uint8)
     except TableError:
         raise
     except FileNotFoundError as error:
@@ -135,9 +152,12 @@ def read_table(path: Path) -> ValueTable:
         raise TableError(f"table file {path} is damaged (its values do not fit its grid)")
     lines = np.add.accumulate(np.moveaxis(steps, 0, 3), axis=2, dtype=np.uint8)
     values = np.ascontiguousarray(lines).reshape(shape)
-    if _digest(values) != card.payload_sha256:
+    if more.dtype != np.uint8 or more.size != len(card.levels_s) * values.size:
+        raise TableError(f"table file {path} is damaged (its levels do not fit its card)")
+    levels = _levels(more.reshape(-1, *shape), values)
+    if _digest(values, levels) != card.payload_sha256:
         raise TableError(f"table file {path} is damaged (checksum differs)")
-    return ValueTable(card, values)
+    return ValueTable(card, values, levels)
 
 
 def remedy(own: str, other: str, other_may: OtherMay) -> str:
@@ -196,13 +216,24 @@ def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay)
 
 
 def stack_tables(tables: Sequence[ValueTable]) -> Tables:
-    """Put tables behind one another for compiled code; table i of the result is ``tables[i]``."""
+    """Put tables behind one another for compiled code; table i of the result is ``tables[i]``.
+
+    A table that keeps no shorter times tells of the whole play whatever time is asked for: no less than that is feared.
+    """
     if not tables:
         return no_tables()
-    sizes = [table.values.size for table in tables]
-    offset = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
-    data = np.concatenate([table.values.ravel() for table in tables])
-    return Tables(data, offset, np.stack([table.card.make_grid().pack() for table in tables]))
+    blocks: list[NDArray[np.uint8]] = []
+    level = np.zeros((len(tables), N_LEVELS), np.int64)
+    at = 0
+    for row, table in zip(level, tables, strict=True):
+        row[:] = at
+        blocks.append(table.values.ravel())
+        at += table.values.size
+        for k in [LEVELS_S.index(time_s) for time_s in table.card.levels_s if time_s in LEVELS_S]:
+            row[k] = at
+            blocks.append(table.levels[k].ravel())
+            at += table.values.size
+    return Tables(np.concatenate(blocks), level, np.stack([table.card.make_grid().pack() for table in tables]))
 
 
 def with_figures(table: ValueTable, **figures: object) -> ValueTable:

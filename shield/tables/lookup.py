@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +32,26 @@ STEPS = 255
 """Values are kept as whole steps of cap / 255, rounded down."""
 NO_TABLE = -1
 
+LEVELS_S = (3.0, 6.0, 9.0, 12.0, 20.0)
+"""Times T for which a table keeps V(x, T), the distance that can be kept from an other that does its worst for T, besides
+that for the whole play; in between it is interpolated. V(x, 0) is the distance itself."""
+WHOLE_S = 90.0
+"""Time from which on the whole play counts, s."""
+N_LEVELS = len(LEVELS_S) + 1
+"""Values kept of each place: at `LEVELS_S`, and for the whole play."""
+
 
 class Tables(NamedTuple):
     """Several value tables behind one another, for compiled code.
 
     Attributes:
         data: all values, uint8, in steps of cap / 255.
-        offset: where each table begins, shape ``(n_tables,)``.
+        level: where each table's levels begin, the last for the whole play, shape ``(n_tables, N_LEVELS)``.
         axes: each table's grid, shape ``(n_tables, N_AXES)``.
     """
 
     data: NDArray[np.uint8]
-    offset: IntArray
+    level: IntArray
     axes: Array
 
 
@@ -64,7 +72,13 @@ class Gradient(NamedTuple):
 
 def no_tables() -> Tables:
     """An empty set, for code that takes tables but has none."""
-    return Tables(np.zeros(0, np.uint8), np.zeros(0, np.int64), np.zeros((0, N_AXES)))
+    return Tables(np.zeros(0, np.uint8), np.zeros((0, N_LEVELS), np.int64), np.zeros((0, N_AXES)))
+
+
+def pack(values_m: NDArray[Any], cap_m: float) -> NDArray[np.uint8]:
+    """Values in m as whole steps of cap / 255, rounded down."""
+    steps = np.floor(values_m.astype(np.float64) * (STEPS / cap_m) + 1e-6)
+    return np.clip(steps, 0, STEPS).astype(np.uint8)
 
 
 @lean_kernel
@@ -106,9 +120,23 @@ def _angle_places(
 
 
 @lean_kernel
+def _level_of(fear_s: float) -> tuple[int, float]:
+    """The level below a time T, -1 for the distance itself, and the share of the way to the next one."""
+    if fear_s >= WHOLE_S:
+        return N_LEVELS - 1, 0.0
+    low, low_s = -1, 0.0
+    for k in range(N_LEVELS - 1):
+        if fear_s < LEVELS_S[k]:
+            return low, (fear_s - low_s) / (LEVELS_S[k] - low_s)
+        low, low_s = k, LEVELS_S[k]
+    return low, (fear_s - low_s) / (WHOLE_S - low_s)
+
+
+@lean_kernel
 def table_value(
     tables: Tables,
     table: int,
+    fear_s: float,
     dx_m: float,
     dy_m: float,
     own_heading_rad: float,
@@ -121,6 +149,7 @@ def table_value(
     Args:
         tables: the tables.
         table: which one.
+        fear_s: time T for which the other does its worst, s; from `WHOLE_S` on the whole play. Interpolated.
         dx_m: the other's position minus the own one, east, m.
         dy_m: the same, north, m.
         own_heading_rad: own heading, rad, clockwise from north.
@@ -128,7 +157,7 @@ def table_value(
         own_speed_mps: own stored speed, m/s; outside the table it is clamped.
         other_speed_mps: the other's stored speed, m/s, likewise.
     """
-    if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
+    if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps + fear_s):
         return math.nan
     axes = tables.axes[table]
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
@@ -136,14 +165,23 @@ def table_value(
         return rho
     psi, beta, _ = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
     own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
-    steps = blend(tables.data, tables.offset[table], axes, rho_place(axes, rho), psi, beta, own, other)
-    return steps * axes[CAP] / STEPS
+    low, part = _level_of(fear_s)
+    value = 0.0
+    for k in range(low, low + (2 if part > 0.0 else 1)):
+        share = part if k > low else 1.0 - part
+        if k < 0:
+            value += share * min(rho, axes[CAP])
+        else:
+            steps = blend(tables.data, tables.level[table, k], axes, rho_place(axes, rho), psi, beta, own, other)
+            value += share * (steps * axes[CAP] / STEPS)
+    return value
 
 
 @lean_kernel
 def table_gradient(
     tables: Tables,
     table: int,
+    fear_s: float,
     dx_m: float,
     dy_m: float,
     own_heading_rad: float,
@@ -155,18 +193,67 @@ def table_gradient(
 
     Where an input is clamped the derivative with respect to it is 0; on a cell's edge it is that of one side.
     """
-    total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps
+    total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps + fear_s
     if not math.isfinite(total):
         return Gradient(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+    rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
+    if rho < tables.axes[table, RHO_FIRST]:
+        return _slope_of_distance(math.inf, dx_m, dy_m, rho)
+    low, part = _level_of(fear_s)
+    value = x = y = heading = speed = other_heading = other_speed = 0.0
+    for k in range(low, low + (2 if part > 0.0 else 1)):
+        share = part if k > low else 1.0 - part
+        if k < 0:
+            slope = _slope_of_distance(tables.axes[table, CAP], dx_m, dy_m, rho)
+        else:
+            slope = _slope_of_level(
+                tables,
+                table,
+                tables.level[table, k],
+                dx_m,
+                dy_m,
+                own_heading_rad,
+                other_heading_rad,
+                own_speed_mps,
+                other_speed_mps,
+            )
+        value += share * slope.value_m
+        x += share * slope.own_x
+        y += share * slope.own_y
+        heading += share * slope.own_heading
+        speed += share * slope.own_speed
+        other_heading += share * slope.other_heading
+        other_speed += share * slope.other_speed
+    return Gradient(value, x, y, heading, speed, other_heading, other_speed)
+
+
+@lean_kernel
+def _slope_of_distance(cap_m: float, dx_m: float, dy_m: float, rho: float) -> Gradient:
+    """Value and derivatives of min(distance, cap)."""
+    if rho > cap_m:
+        return Gradient(cap_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    scale = 1.0 / max(rho, 1e-9)
+    return Gradient(rho, -dx_m * scale, -dy_m * scale, 0.0, 0.0, 0.0, 0.0)
+
+
+@lean_kernel
+def _slope_of_level(
+    tables: Tables,
+    table: int,
+    at: int,
+    dx_m: float,
+    dy_m: float,
+    own_heading_rad: float,
+    other_heading_rad: float,
+    own_speed_mps: float,
+    other_speed_mps: float,
+) -> Gradient:
+    """`table_gradient` of the level that begins ``at`` there in the data, beyond the first range."""
     axes = tables.axes[table]
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
-    if rho < axes[RHO_FIRST]:
-        scale = 1.0 / max(rho, 1e-9)
-        return Gradient(rho, -dx_m * scale, -dy_m * scale, 0.0, 0.0, 0.0, 0.0)
     psi, beta, side = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
     own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
     range_place = rho_place(axes, rho)
-    at = tables.offset[table]
     n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
     n_own, n_other = int(axes[N_OWN]), int(axes[N_OTHER])
     value = d_rho = d_psi = d_beta = d_own = d_other = 0.0

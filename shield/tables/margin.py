@@ -16,7 +16,7 @@ from ..platforms.step import step_boat
 from ..platforms.usv import fresh_state
 from .duel import GREEDY, LEAD, PURE, duel
 from .files import ValueTable, stack_tables
-from .lookup import Tables, table_value
+from .lookup import WHOLE_S, Tables, table_value
 from .moves import SUB_STEP_S, run_hull, sub_steps
 from .settings import OtherMay
 
@@ -125,7 +125,7 @@ def _draw(
         rho, bearing = radius_m * (last / radius_m) ** random.random(), random.uniform(-math.pi, math.pi)
         other[L.X], other[L.Y] = rho * math.sin(bearing), rho * math.cos(bearing)
         heading = math.radians(other[L.HEADING])
-        value = table_value(tables, 0, other[L.X], other[L.Y], 0.0, heading, own[L.SPEED], other[L.SPEED])
+        value = table_value(tables, 0, WHOLE_S, other[L.X], other[L.Y], 0.0, heading, own[L.SPEED], other[L.SPEED])
         if radius_m <= value < radius_m + BAND_M:
             return own, other, value
     raise TableError(f"no state of value near {radius_m:g} m was found: the table is empty there; solve it anew")

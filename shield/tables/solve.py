@@ -7,7 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..exceptions import TableError
 from ..jit import BoolArray
 from .active import widen
+from .lookup import LEVELS_S, pack
 from .moves import Moves, moves_of
 from .settings import RUDDERS, OtherMay, Problem, places
 from .sweep import sweep
@@ -40,6 +41,7 @@ class Progress:
         active: places (range, relative heading, bearing) that may still change.
         iterations: steps done.
         residual_m: largest change of the last step, m.
+        levels: packed values at each of `LEVELS_S` passed so far, uint8, ``(passed, size)``.
     """
 
     values: NDArray[np.float32]
@@ -47,6 +49,7 @@ class Progress:
     active: BoolArray
     iterations: int = 0
     residual_m: float = float("inf")
+    levels: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
 
 
 def start(problem: Problem) -> Progress:
@@ -92,6 +95,7 @@ def solve(
         try:
             while state.iterations < steps_of(problem) and state.residual_m > CONVERGED_M:
                 solver.step(state, pool)
+                _keep_level(problem, state)
                 if notice is not None:
                     notice(state.iterations, steps_of(problem), state.residual_m)
                 if checkpoint is not None and state.iterations % SAVE_EVERY == 0:
@@ -100,6 +104,15 @@ def solve(
             if checkpoint is not None:
                 _keep(problem, state, checkpoint)
     return state
+
+
+def _keep_level(problem: Problem, state: Progress) -> None:
+    """Keep V(x, T) when the iteration passes a time T that tables keep."""
+    passed = len(state.levels)
+    if passed < len(LEVELS_S) and state.iterations == round(LEVELS_S[passed] / problem.dt_s):
+        state.levels = np.concatenate(
+            [state.levels.reshape(passed, -1), pack(state.values, problem.grid.cap_m)[None]]
+        ) if passed else pack(state.values, problem.grid.cap_m)[None]
 
 
 class _Solver:
@@ -167,8 +180,8 @@ def _resume(problem: Problem, path: Path | None) -> Progress | None:
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             same = str(file["problem"]) == repr(problem)
-            values, hints, active = file["values"], file["hints"], file["active"]
-            state = Progress(values, hints, active, int(file["iterations"]), float(file["residual_m"]))
+            values, hints, active, levels = (file[name] for name in ("values", "hints", "active", "levels"))
+            state = Progress(values, hints, active, int(file["iterations"]), float(file["residual_m"]), levels)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise TableError(f"checkpoint {path} cannot be read ({error}); delete it to start afresh") from error
     if not same:

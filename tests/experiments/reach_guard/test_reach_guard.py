@@ -12,7 +12,7 @@ from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, NOT_COVERED, PASSE
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import table_value
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
 
 CONFIG = ShieldConfig(edge_m=None)
 USUAL = Conditions()
@@ -64,7 +64,7 @@ def test_certificate_is_the_value_after_the_step():
         step_boat(params, row, 2.0, 0.0, 0.1)
     tables = stack_tables([load_table("heron", "heron", "cooperative")])
     place, angles = other[:2] - own[:2], np.radians([own[L.HEADING], other[L.HEADING]])
-    value = table_value(tables, 0, *place, *angles, own[L.SPEED], other[L.SPEED])
+    value = table_value(tables, 0, WHOLE_S, *place, *angles, own[L.SPEED], other[L.SPEED])
     assert guard.reason.tolist() == [[PASSED, NOT_COVERED]]
     assert guard.certificate_m[0, 0] == pytest.approx(value - 2.55, abs=1e-3)
     assert np.isinf(guard.certificate_m[0, 1])

@@ -15,7 +15,7 @@ from steerclear.shield.certificates.values import margin_at_once, out_of_reach, 
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import table_value
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
 
 SECONDS = 3.0
 """Time over which they are run through."""
@@ -94,7 +94,7 @@ def run_and_looked_up(at, j, tables):
         hunter = at.work.hunter
         there = hunter[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
         headings = ready[READY_HEADING], math.atan2(hunter[2], hunter[3])
-        value = table_value(tables, 0, *there, *headings, ready[READY_SPEED], hunter[4])
+        value = table_value(tables, 0, WHOLE_S, *there, *headings, ready[READY_SPEED], hunter[4])
         if value < 6.0 - 1e-9:
             margin = value - at.work.radius[0, j] - at.boats.table_margin_m
             least = min(least, margin if margin >= 0.0 else margin * faded)

@@ -20,7 +20,7 @@ from steerclear.shield.platforms.limits import limits_of
 from steerclear.shield.platforms.usv import fresh_state
 from steerclear.shield.setup import boats_of
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import table_value
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
 
 SURVEYOR = get_platform("surveyor")
 
@@ -70,7 +70,7 @@ def value_margin(at, tables):
     ready, hunter = at.work.ready[0], at.work.hunter
     there = hunter[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
     headings = ready[READY_HEADING], math.atan2(hunter[2], hunter[3])
-    value = table_value(tables, 0, *there, *headings, ready[READY_SPEED], hunter[4])
+    value = table_value(tables, 0, WHOLE_S, *there, *headings, ready[READY_SPEED], hunter[4])
     return value - at.work.radius[0, 1] - at.boats.table_margin_m if value < 6.0 - 1e-9 else None
 
 

@@ -14,7 +14,7 @@ from steerclear.shield.platforms.actuator import actuate, largest_turn
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import fresh_state
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import table_value
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
 
 SURVEYOR = get_platform("surveyor")
 
@@ -47,7 +47,7 @@ def looked_up_by_hand(fleet):
         actuate(params, other, speed, turn * 2.0 * largest_turn(params, other, 0.1), 0.1)
         there = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
         headings = math.radians(own[L.HEADING]), math.radians(other[L.HEADING])
-        least = min(least, table_value(tables, 0, *there, *headings, own[L.SPEED], other[L.SPEED]))
+        least = min(least, table_value(tables, 0, WHOLE_S, *there, *headings, own[L.SPEED], other[L.SPEED]))
     return least
 
 

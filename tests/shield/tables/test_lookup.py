@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 from steerclear.shield.tables.files import stack_tables
-from steerclear.shield.tables.lookup import no_tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import WHOLE_S, no_tables, table_gradient, table_range_m, table_value
 from table_scenes import random_table
 
 TABLE = random_table()
@@ -50,8 +50,8 @@ def off_the_bow(x, y, own):
 def test_values_are_those_of_another_interpolation(x, y, own, other, v, w):
     state = x, y, own, other, v, w
     assume(off_the_bow(x, y, own))
-    assert table_value(TABLES, 1, *state) == pytest.approx(scipy_value(TABLE, *state), abs=1e-9)
-    assert table_gradient(TABLES, 1, *state).value_m == pytest.approx(table_value(TABLES, 1, *state), abs=1e-9)
+    assert table_value(TABLES, 1, WHOLE_S, *state) == pytest.approx(scipy_value(TABLE, *state), abs=1e-9)
+    assert table_gradient(TABLES, 1, WHOLE_S, *state).value_m == pytest.approx(table_value(TABLES, 1, WHOLE_S, *state), abs=1e-9)
 
 
 def test_gradients_are_those_of_finite_differences():
@@ -61,10 +61,10 @@ def test_gradients_are_those_of_finite_differences():
         state = np.array([x, y, *random.uniform(-4.0, 4.0, 2), *random.uniform(0.0, 2.0, 2)])
         slopes = []
         for i in range(6):
-            ends = [table_value(TABLES, 1, *(state + sign * h * np.eye(6)[i])) for sign in (-1.0, 0.0, 1.0)]
+            ends = [table_value(TABLES, 1, WHOLE_S, *(state + sign * h * np.eye(6)[i])) for sign in (-1.0, 0.0, 1.0)]
             one_sided = (ends[1] - ends[0]) / h, (ends[2] - ends[1]) / h
             slopes.append(0.5 * sum(one_sided) if abs(one_sided[1] - one_sided[0]) < 1e-3 else math.nan)
-        found = table_gradient(TABLES, 1, *state)
+        found = table_gradient(TABLES, 1, WHOLE_S, *state)
         by_position = [-found.own_x, -found.own_y, found.own_heading, found.other_heading]
         ours = np.array([*by_position, found.own_speed, found.other_speed])
         if not np.isnan(slopes).any():
@@ -78,14 +78,14 @@ def test_gradients_are_those_of_finite_differences():
 def test_turning_the_whole_scene_changes_nothing(x, y, own, other, v, w, turn):
     sin, cos = math.sin(turn), math.cos(turn)
     assume(off_the_bow(x, y, own))
-    turned = table_value(TABLES, 1, x * cos + y * sin, y * cos - x * sin, own + turn, other + turn, v, w)
-    assert turned == pytest.approx(table_value(TABLES, 1, x, y, own, other, v, w), abs=1e-5)
+    turned = table_value(TABLES, 1, WHOLE_S, x * cos + y * sin, y * cos - x * sin, own + turn, other + turn, v, w)
+    assert turned == pytest.approx(table_value(TABLES, 1, WHOLE_S, x, y, own, other, v, w), abs=1e-5)
 
 
 @settings(max_examples=80, deadline=None)
 @given(st.floats(0.01, 30.0), FINITE, ANGLE, SPEED, SPEED)
 def test_the_mirrored_scene_has_the_mirrored_gradient(x, y, other, v, w):
-    star, port = table_gradient(TABLES, 1, x, y, 0.0, other, v, w), table_gradient(TABLES, 1, -x, y, 0.0, -other, v, w)
+    star, port = table_gradient(TABLES, 1, WHOLE_S, x, y, 0.0, other, v, w), table_gradient(TABLES, 1, WHOLE_S, -x, y, 0.0, -other, v, w)
     assert port.value_m == pytest.approx(star.value_m, abs=1e-9)
     if math.remainder(other, math.pi / 4.0) != 0.0:  # on a node either side's slope is right
         mirrored = [-port.own_x, port.own_y, -port.own_heading, port.own_speed, -port.other_heading, port.other_speed]
@@ -93,18 +93,18 @@ def test_the_mirrored_scene_has_the_mirrored_gradient(x, y, other, v, w):
 
 
 def test_nearer_than_the_table_the_value_is_the_distance():
-    found = table_gradient(TABLES, 1, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
-    assert found.value_m == pytest.approx(0.5) == table_value(TABLES, 1, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
+    found = table_gradient(TABLES, 1, WHOLE_S, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
+    assert found.value_m == pytest.approx(0.5) == table_value(TABLES, 1, WHOLE_S, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
     assert (found.own_x, found.own_y) == pytest.approx((-0.6, 0.8))
-    assert table_gradient(TABLES, 1, 0.0, 0.0, 1.0, 2.0, 1.0, 1.0)[:3] == (0.0, 0.0, 0.0)
+    assert table_gradient(TABLES, 1, WHOLE_S, 0.0, 0.0, 1.0, 2.0, 1.0, 1.0)[:3] == (0.0, 0.0, 0.0)
 
 
 def test_beyond_the_table_its_edge_holds():
     last = table_range_m(TABLES, 1)
     assert last == pytest.approx(12.0)
-    edge, beyond = (table_value(TABLES, 1, far * 0.6, far * 0.8, 0.0, 1.0, 5.0, -1.0) for far in (last, 3.0 * last))
+    edge, beyond = (table_value(TABLES, 1, WHOLE_S, far * 0.6, far * 0.8, 0.0, 1.0, 5.0, -1.0) for far in (last, 3.0 * last))
     assert edge == pytest.approx(beyond, abs=1e-9)
-    slope = table_gradient(TABLES, 1, 30.0, 40.0, 0.0, 1.0, 5.0, -1.0)
+    slope = table_gradient(TABLES, 1, WHOLE_S, 30.0, 40.0, 0.0, 1.0, 5.0, -1.0)
     assert slope.own_speed == slope.other_speed == 0.0
     assert 30.0 * slope.own_x + 40.0 * slope.own_y == pytest.approx(0.0, abs=1e-9)
 
@@ -114,8 +114,8 @@ def test_beyond_the_table_its_edge_holds():
 def test_what_is_not_finite_gives_nan(place, bad):
     state = [3.0, 4.0, 0.1, 0.2, 1.0, 1.0]
     state[place] = bad
-    assert math.isnan(table_value(TABLES, 1, *state))
-    assert all(math.isnan(part) for part in table_gradient(TABLES, 1, *state))
+    assert math.isnan(table_value(TABLES, 1, WHOLE_S, *state))
+    assert all(math.isnan(part) for part in table_gradient(TABLES, 1, WHOLE_S, *state))
 
 
 def test_no_tables_are_an_empty_set():

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import own_speed_cell, table_value
+from steerclear.shield.tables.lookup import WHOLE_S, own_speed_cell, table_value
 from steerclear.shield.tables.told import ranges_told_m
 
 LEAST_M = 5.0
@@ -25,7 +25,7 @@ def test_beyond_them_a_table_tells_enough(number, beyond_m, bearing, heading, ow
         return
     far = told_m + beyond_m
     place = far * np.sin(bearing), far * np.cos(bearing)
-    assert table_value(TABLES, number, *place, 0.0, heading, own_mps, other_mps) >= LEAST_M - 1e-9
+    assert table_value(TABLES, number, WHOLE_S, *place, 0.0, heading, own_mps, other_mps) >= LEAST_M - 1e-9
 
 
 @pytest.mark.parametrize("number", range(len(KINDS)))
