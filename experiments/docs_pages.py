@@ -17,6 +17,7 @@ from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, bars_table, line, table
 from .played_sets_page import played_page
+from .price_page import is_dial, price_page
 from .reach_show import tables_page
 from .tables import interval_text
 from .tally import RADII_M, breach_column
@@ -81,7 +82,12 @@ def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[
             name, text, picture = write(found, folder)
             pages[name] = text
             pictures += picture
-    for content in (one for one in results if one.get("command") not in POOLED):
+    dials = [content for content in results if is_dial(content)]
+    if dials:
+        name, text, picture = price_page(dials, folder)
+        pages[name] = text
+        pictures += picture
+    for content in (one for one in results if one.get("command") not in POOLED and not is_dial(one)):
         name, text, picture = _page_of(content, folder)
         pages[name] = text
         pictures += picture

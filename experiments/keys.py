@@ -47,6 +47,7 @@ GAME_COLUMNS = {
     "steps": "steps played",
     "duration_s": "game time played, s",
     "captures": "flags captured; captures_against by the other team",
+    "net_captures": "captures - captures_against",
     "captures_against": "flags captured by the other team",
     "grabs": "flags grabbed",
     "grabs_against": "flags grabbed by the other team",

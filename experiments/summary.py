@@ -83,6 +83,8 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
     counts = [
         ("captures", "captures"),
         ("captures_against", "captures against"),
+    ]
+    more = [
         ("grabs", "grabs"),
         ("tags", "tags"),
         ("tags_against", "times tagged"),
@@ -91,6 +93,8 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
     ]
     return [
         *(_counted(name, label) for name, label in counts),
+        Metric("net_captures", "net of captures", partial(_net, seed), _net_captures),
+        *(_counted(name, label) for name, label in more),
         Metric("clean_games", "games without hit", partial(_clean_games, min(radii_m))),
         Metric("closest_m", "closest, mean m", partial(_mean, "closest_m", seed), partial(_number, "closest_m")),
         Metric("closest_of_all_m", "closest of all, m", _closest_of_all),
@@ -146,6 +150,16 @@ def _number(name: str, row: Row) -> float | None:
 
 def _present(name: str, rows: Sequence[Row]) -> list[float]:
     return [value for row in rows if (value := _number(name, row)) is not None]
+
+
+def _net_captures(row: Row) -> float | None:
+    """Captures less those of the other team."""
+    own, other = _number("captures", row), _number("captures_against", row)
+    return None if own is None or other is None else own - other
+
+
+def _net(seed: int, rows: Sequence[Row]) -> Interval:
+    return mean_interval([value for row in rows if (value := _net_captures(row)) is not None], seed)
 
 
 def _count(name: str, rows: Sequence[Row]) -> Interval:

@@ -147,7 +147,6 @@ class BatchedShield:
         which = slice(None) if mask is None else _mask(mask, len(self.reason))
         self._memory.kept[which] = False
         self._memory.escaping[which] = False
-        self._memory.seen[which] = np.nan
         self._pending[which] = np.nan
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:

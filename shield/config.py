@@ -13,6 +13,10 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
+PROFILES = {"players": 9.0, "rammers": math.inf, "hold-course": 0.0}
+"""`ShieldConfig.adversary_s` of each profile, s."""
+
+
 class Unsaid(float):
     """A distance that nobody chose: a game's own, if larger, takes its place. It stays one in copies of settings."""
 
@@ -30,8 +34,11 @@ class ShieldConfig:
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
         solver: QP backend, a name known to qpsolvers.
-        opponent_share: share of its turn rate an opponent is granted against us, with all its acceleration, 0 to 1; 0
-            takes opponents to hold course and speed.
+        adversary_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds its
+            course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and the more
+            commands are changed.
+        profile: whom the opponents are taken for, see `PROFILES`: "players" of the game, "rammers" that are out to hit
+            our boats, or boats that "hold-course".
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         fixed_response_per_s: the same of margins from the edge, obstacles and circles.
@@ -45,10 +52,6 @@ class ShieldConfig:
             are feared (as hunters or by tables), whose own margins are kept beside. Else `margin_cap_m` holds for them.
         tail_s: how long courses are run on straight beyond the horizon, s.
         horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
-        hunt_s: longest time an opponent is taken to hunt a boat, s; None takes the time of such an escape and of
-            gaining top speed again, at most 60 s, and for those no faster than the boat at least 30 s; never less than
-            the escape takes. For a boat that lacks thrust the time until it is back comes on top. Less asks for fewer
-            interventions and promises less, also near in time: hunters lead the boat by a share of it.
         search_limit: what a decision may cost before it searches no further, in clearances of one path from one boat,
             0.2 to 1 microsecond each; it then sends the best that it has verified and says so
             (`Decision.cut_short`). Counted in work, so that the same inputs give the same bits on any machine; at least
@@ -76,9 +79,8 @@ class ShieldConfig:
     certificate: str = "auto"
     coordination: str = "team"
     solver: str = "daqp"
-    opponent_share: float = 1.0
-    adversary_s: float = math.inf
-    floor_s: float = math.inf
+    adversary_s: float | None = None
+    profile: str = "players"
     response_per_s: float = 1.0
     table_response_per_s: float = 0.3
     fixed_response_per_s: float = 2.0
@@ -88,7 +90,6 @@ class ShieldConfig:
     mate_cap_m: float = 0.2
     tail_s: float = 5.0
     horizon_s: float | None = None
-    hunt_s: float | None = None
     search_limit: float = 200_000.0
     hysteresis_m: float = 0.3
     speed_weight: float = 0.1
@@ -109,13 +110,18 @@ class ShieldConfig:
             _check_number(entry.name, value)
             if isinstance(value, Real) and not isinstance(value, Unsaid):  # compiled code knows numbers by their kind
                 object.__setattr__(self, entry.name, float(value))
-        if not 0.0 <= self.opponent_share <= 1.0:
-            raise ConfigError(f"opponent_share is {self.opponent_share}; give a share between 0 and 1")
+        if self.profile not in PROFILES:
+            raise ConfigError(f"unknown profile {self.profile!r}; choose one of {', '.join(PROFILES)}")
         if self.certificate not in CERTIFICATES:
             raise ConfigError(f"unknown certificate {self.certificate!r}; choose one of {', '.join(CERTIFICATES)}")
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
         check_solver(self.solver)
+
+    @property
+    def feared_s(self) -> float:
+        """How long an opponent may do its worst, s: `adversary_s`, or the profile's."""
+        return PROFILES[self.profile] if self.adversary_s is None else self.adversary_s
 
     def said(self, name: str) -> bool:
         """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
@@ -137,23 +143,22 @@ class ShieldConfig:
         return cls(**settings)
 
 
-_TEXTS = {"certificate", "coordination", "solver"}
+_TEXTS = {"certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
-_POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s", "hunt_s"}
+_POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
     "mate_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 1.0),
     "horizon_s": (0.0, 120.0),
-    "hunt_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
     "delay_s": (0.0, 10.0),
     "search_limit": (1e3, math.inf),
 }
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
-_MAY_BE_NONE = {"horizon_s", "hunt_s", "edge_m"}
-_MAY_BE_INFINITE = _RATES | {"adversary_s", "floor_s", "max_track_age_s", "give_way_after_s", "search_limit"}
+_MAY_BE_NONE = {"adversary_s", "horizon_s", "edge_m"}
+_MAY_BE_INFINITE = _RATES | {"adversary_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
 
 def _check_number(name: str, value: object) -> None:

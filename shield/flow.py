@@ -12,7 +12,6 @@ import numpy as np
 
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
-from .certificates.evidence import watch
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .ladder import ladder, mark_answer
@@ -104,7 +103,6 @@ def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) 
 def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> int:
     """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_ESCAPE`."""
     boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
-    watch(state, ours, boats, scene.fixed, tuning, memory, work)
     if screen(state, wanted, margin_m, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan):
         plan.cause[:] = -1
         finish(scene, True, 0, state, ours)

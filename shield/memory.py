@@ -29,8 +29,6 @@ class Memory(NamedTuple):
         blocked_deg: heading the boat alongside had then.
         free_s: time since it was last kept from it, s.
         blocked_by: that boat, -1 for none.
-        seen: (n, 4) position m, heading deg and speed m/s at the last decision, NaN of boats not seen then.
-        odds: log-odds that the boat, an opponent, steers at one of ours, see `certificates.evidence`.
         gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
     """
 
@@ -49,8 +47,6 @@ class Memory(NamedTuple):
     free_s: Array
     blocked_by: IntArray
     gives_way: Array
-    seen: Array
-    odds: Array
 
 
 def new_memory(*shape: int) -> Memory:
@@ -72,8 +68,6 @@ def new_memory(*shape: int) -> Memory:
             free_s=np.zeros(shape),
             blocked_by=np.full(shape, -1, np.int64),
             gives_way=np.zeros(shape),
-            seen=np.full((*shape, 4), np.nan),
-            odds=np.zeros(shape),
         )
     )
 
@@ -96,8 +90,6 @@ def take_memory(games: Memory, game: int, own: Memory) -> None:
     own.free_s[:] = games.free_s[game]
     own.blocked_by[:] = games.blocked_by[game]
     own.gives_way[:] = games.gives_way[game]
-    own.seen[:] = games.seen[game]
-    own.odds[:] = games.odds[game]
 
 
 @kernel
@@ -118,5 +110,3 @@ def put_memory(own: Memory, game: int, games: Memory) -> None:
     games.free_s[game] = own.free_s
     games.blocked_by[game] = own.blocked_by
     games.gives_way[game] = own.gives_way
-    games.seen[game] = own.seen
-    games.odds[game] = own.odds

@@ -26,8 +26,6 @@ _OWN = (
     "blocked_deg",
     "free_s",
     "gives_way",
-    "seen",
-    "odds",
 )
 """What is remembered of a boat alone."""
 

@@ -44,6 +44,7 @@ class Boats(NamedTuple):
         cap_m: margins above this may shrink freely, (n,), m.
         tables: value tables.
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
+        adversary_s: time from now for which an opponent may do its worst before it holds its course, s.
         table_margin_m: added to the radius where a table is looked into, m.
         look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
         joint_decay: factor by which the margin on such runs may shrink in one step.
@@ -77,6 +78,7 @@ class Boats(NamedTuple):
     cap_m: Array
     tables: Tables
     table: IntArray
+    adversary_s: float
     table_margin_m: float
     look: IntArray
     joint_decay: float
@@ -122,8 +124,6 @@ class Tuning(NamedTuple):
         mate_cap_m: margins from team-mates above this may shrink freely, m.
         fixed_decay: factor by which a margin from fixed things may shrink in one step.
         give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
-        adversary_s: time from now for which an opponent may do its worst, s.
-        floor_s: the same of one that gives no sign of steering at a boat of ours, s, see `certificates.evidence`.
         search_limit: cost at which a decision searches no further, see `certificates.effort`.
     """
 
@@ -138,8 +138,6 @@ class Tuning(NamedTuple):
     fixed_decay: float
     give_way_after_s: float
     search_limit: float
-    adversary_s: float
-    floor_s: float
 
 
 class Scene(NamedTuple):

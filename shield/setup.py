@@ -44,11 +44,6 @@ On the boat's quarter they close in for so long on an all but parallel course: o
 either. Of faster ones a run that long says that all is lost, which it is not.
 """
 
-LONGEST_FEAR_S = WHOLE_S
-"""Fear for longer than this says no more, s."""
-LEAST_FEAR_S = 0.1
-"""Least time an opponent is feared for at all, s."""
-
 STATIC_REACTION_S = 0.5
 """Time beyond a half turn over which fixed things are looked at, s."""
 
@@ -68,8 +63,6 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             fixed_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
             search_limit=config.search_limit,
-            adversary_s=min(config.adversary_s, LONGEST_FEAR_S),
-            floor_s=max(min(config.floor_s, config.adversary_s, LONGEST_FEAR_S), LEAST_FEAR_S),
         )
     )
 
@@ -80,7 +73,7 @@ def _mates_are_known(config: ShieldConfig) -> bool:
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    feared = CERTIFICATES[config.certificate].hunters and config.opponent_share > 0.0 and config.adversary_s > 0.0
+    feared = CERTIFICATES[config.certificate].hunters and config.feared_s > 0.0
     return config.coordination == "team" and exact and feared
 
 
@@ -99,7 +92,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    granted = config.opponent_share if certificate.hunters and config.adversary_s > 0.0 else 0.0
+    granted = 1.0 if certificate.hunters and config.feared_s > 0.0 else 0.0
     strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     looked = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
@@ -124,6 +117,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
             tables=looked.tables,
             table=looked.table,
+            adversary_s=min(config.feared_s, WHOLE_S),
             table_margin_m=config.table_margin_m,
             look=np.where(with_table, looked.steps, 0),
             joint_decay=_decay(config.response_per_s, config),
@@ -140,7 +134,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     certificate, sides = CERTIFICATES[config.certificate], np.array(team)
-    wanted = certificate.hunters and config.opponent_share == 1.0
+    wanted = certificate.hunters and config.feared_s > 0.0
     limits = [limits_of(get_platform(name), config.dt_s) for name in platforms]
     looks = np.array([wanted and certificate.looks_up(limit) for limit in limits], dtype=np.bool_)
     found: BoolArray = boats_of(config, platforms, team).table >= 0
@@ -166,8 +160,8 @@ def _horizons(
         static_s.append(min(turn_s, horizon_s[i]))
         thrust_s.append(limit.thrust_s if hunters else 0.0)
         if hunters:
-            hunt_s[i] = max(horizon_s[i], config.hunt_s or certificate.hunt_s(limit))
-    chase = _chases(kinds, team, hunt_s, hunters and config.hunt_s is None, sample_s)
+            hunt_s[i] = max(horizon_s[i], certificate.hunt_s(limit))
+    chase = _chases(kinds, team, hunt_s, hunters, sample_s)
     return {
         "chase_samples": chase,
         "chased_samples": chase.max(axis=1, initial=0),

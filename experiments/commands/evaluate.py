@@ -36,6 +36,7 @@ def evaluate(
     resume: o.Resume = False,
     separation: o.Separation = None,
     certificate: o.Certificate = None,
+    profile: o.Profile = None,
     solver: o.Solver = None,
     shield_set: o.ShieldSet = None,
     no_shield_autopilot: o.NoAutopilot = False,
@@ -56,7 +57,7 @@ def evaluate(
 
     Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
-    wanted = o.shield_settings(separation, certificate, solver, shield_set)
+    wanted = o.shield_settings(separation, certificate, profile, solver, shield_set)
     unused = [name for name in wanted if name != "separation_m"]  # at that radius breaches are counted anyhow
     if unused and not shield:
         raise ConfigError(f"the shield is off, and {', '.join(unused)} would change nothing; add --shield")

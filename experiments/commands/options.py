@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from steerclear.shield.config import PROFILES
 from steerclear.shield.exceptions import ConfigError
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024 or mctf2025.")]
@@ -21,6 +22,9 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on with what an inter
 Quick = Annotated[bool, typer.Option("--quick", help="The small version: fewer and shorter games.")]
 Separation = Annotated[float | None, typer.Option(metavar="M", help="Radius the shield keeps, m.", show_default="2.5")]
 Certificate = Annotated[str | None, typer.Option(metavar="NAME", help="Certificate of the shield.")]
+Profile = Annotated[
+    str | None, typer.Option(metavar="NAME", help=f"Whom opponents are taken for: {', '.join(PROFILES)}.")
+]
 Solver = Annotated[str | None, typer.Option(metavar="NAME", help="QP solver of the shield.")]
 ShieldSet = Annotated[list[str] | None, typer.Option("--shield-set", metavar="KEY=VALUE", help="Any shield setting.")]
 NoAutopilot = Annotated[
@@ -93,14 +97,18 @@ def _value(text: str) -> Any:
 
 
 def shield_settings(
-    separation: float | None, certificate: str | None, solver: str | None, pairs: list[str] | None
+    separation: float | None,
+    certificate: str | None,
+    profile: str | None,
+    solver: str | None,
+    pairs: list[str] | None,
 ) -> dict[str, Any]:
     """Collect the settings of the shield that were given.
 
     Raises:
         ConfigError: one is given twice.
     """
-    named = {"separation_m": separation, "certificate": certificate, "solver": solver}
+    named = {"separation_m": separation, "certificate": certificate, "profile": profile, "solver": solver}
     return _together(named, pairs, "--shield-set")
 
 

@@ -65,6 +65,7 @@ def play(
     save: Save = None,
     separation: o.Separation = None,
     certificate: o.Certificate = None,
+    profile: o.Profile = None,
     solver: o.Solver = None,
     shield_set: o.ShieldSet = None,
     no_shield_autopilot: o.NoAutopilot = False,
@@ -87,7 +88,7 @@ def play(
     if keyboard and own not in ("medium", "keyboard"):
         raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {own}")
     own = "keyboard" if keyboard else own
-    asked = o.shield_settings(separation, certificate, solver, shield_set)
+    asked = o.shield_settings(separation, certificate, profile, solver, shield_set)
     if asked and not shield:
         raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
     spec = MatchSpec(

@@ -3,7 +3,7 @@
 From Python::
 
     from steerclear.experiments.encounters import Conditions, measure
-    outcome = measure("rammer_1", "shield:opponent_share=0.9", own="heron", other="heron", n=200, seed=0,
+    outcome = measure("rammer_1", "shield:adversary_s=9", own="heron", other="heron", n=200, seed=0,
                       conditions=Conditions(radius_m=2.5))
     outcome.summary["breached"], outcome.columns["closest_m"].min()
 

@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import Platform
 from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
+from steerclear.shield.tables.lookup import WHOLE_S
 from steerclear.shield.tables.settings import OtherMay
 
 from ..batch_guard import BatchGuard
@@ -18,7 +19,7 @@ from .decide import decide_games
 from .values import Setup
 
 NAME = "reach"
-SETTINGS = ("response_per_s", "margin_cap_m", "hysteresis_m", "speed_weight", "opponent_share", "buffer_m")
+SETTINGS = ("response_per_s", "margin_cap_m", "hysteresis_m", "speed_weight", "adversary_s", "profile", "buffer_m")
 """Settings of `ShieldConfig` that may be given with the name; separation, position error and step count too."""
 
 
@@ -43,7 +44,7 @@ class ReachGuard(BatchGuard):
     the field's edge are not kept clear of.
 
     Args:
-        config: settings; see `SETTINGS`. ``opponent_share`` is what opponents are granted within a step.
+        config: settings; see `SETTINGS`. Opponents do their worst within a step, and by the tables for `feared_s`.
         games: number of games B.
         platforms: platforms of the n boats.
         team: team of the n boats.
@@ -87,7 +88,7 @@ def _setup(config: ShieldConfig, platforms: list[Platform], team: tuple[int, ...
         decay=math.exp(-config.response_per_s * config.dt_s),
         cap_m=min(config.margin_cap_m, cap_m - radius_m),
         dt_s=config.dt_s,
-        share=config.opponent_share,
+        fear_s=min(config.feared_s, WHOLE_S),
         speed_weight=config.speed_weight,
         hysteresis_m=config.hysteresis_m,
         look=max((round(table.card.dt_s / config.dt_s) for table in tables), default=1),

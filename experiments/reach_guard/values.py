@@ -1,8 +1,8 @@
 """Margins of pairs of boats: the value tables one step on, less the radius to keep.
 
 Boat i's margin to boat j is h_ij = V(x_i, x_j) - R, V the distance that can be kept from now on: against the worst an
-opponent can do, with the help of a team-mate. Opponents move on by one step in each of three ways, straight and with
-the share of full rudder they are granted to either side, and the least of the three values counts: the tables say what
+opponent can do for as long as it is feared, with the help of a team-mate. Opponents move on by one step in each of
+three ways, straight and with full rudder to either side, and the least of the three values counts: the tables say what
 the worst opponent does from then on, not what it does within this step.
 """
 
@@ -15,7 +15,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate
 from steerclear.shield.platforms.usv import turn_of_rudder
-from steerclear.shield.tables.lookup import WHOLE_S, Gradient, Tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import Gradient, Tables, table_gradient, table_range_m, table_value
 
 from ..jit import kernel
 
@@ -34,7 +34,7 @@ class Setup(NamedTuple):
     decay: float
     cap_m: float
     dt_s: float
-    share: float
+    fear_s: float
     speed_weight: float
     hysteresis_m: float
     look: int
@@ -66,7 +66,7 @@ def run_on(setup: Setup, state: Array, steps: int, ways: Array) -> None:
         full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), setup.dt_s)
         for way in range(WAYS):
             ways[j, way] = state[j]
-            turn = setup.share * full * (0.0 if way == 0 else 2.0 * way - 3.0)
+            turn = full * (0.0 if way == 0 else 2.0 * way - 3.0)
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(steps):
                 actuate(params, ways[j, way], speed, turn, setup.dt_s)
@@ -88,13 +88,13 @@ def _seen_from(own: Array, other: Array) -> tuple[float, float, float, float, fl
 @kernel
 def value_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> float:
     """V of the pair, m."""
-    return table_value(setup.tables, setup.table[i, j], WHOLE_S, *_seen_from(own, other))
+    return table_value(setup.tables, setup.table[i, j], setup.fear_s, *_seen_from(own, other))
 
 
 @kernel
 def slope_of(setup: Setup, i: int, j: int, own: Array, other: Array) -> Gradient:
     """V of the pair and its derivatives."""
-    return table_gradient(setup.tables, setup.table[i, j], WHOLE_S, *_seen_from(own, other))
+    return table_gradient(setup.tables, setup.table[i, j], setup.fear_s, *_seen_from(own, other))
 
 
 @kernel

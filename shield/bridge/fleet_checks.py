@@ -65,7 +65,7 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
     """Settings of the shield with this file's step, coordination and ages.
 
     Margins from team-mates shrink no faster than those from others where the file does not say otherwise: hulls on
-    water, links and clocks do what is known of them only roughly.
+    water, links and clocks do what is known of them only roughly. Opponents are taken for rammers, likewise.
 
     Raises:
         FleetFileError: a setting is unknown or contradicts the file's own key.
@@ -79,6 +79,8 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
             raise FleetFileError(f"shield.{key} is {given!r} and {source} says {value!r}; leave shield.{key} out")
     oldest = max(fleet.limits.contact.lost_after_s, fleet.limits.navigation.lost_after_s)
     settings.setdefault("max_track_age_s", oldest + dt_s)
+    if settings.get("adversary_s") is None:  # a real hull is at stake, and nobody knows who is out there
+        settings.setdefault("profile", "rammers")
     settings.setdefault("mate_cap_m", settings.get("margin_cap_m", ShieldConfig.margin_cap_m))
     try:
         config = ShieldConfig.of(**settings)

@@ -147,7 +147,7 @@ def _run_hunter(
         (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
         sample_s,
         samples,
-        _adverse_samples(j, samples, sample_s, work),
+        _adverse_samples(samples, boats),
         closely,
         closing(i, j, state, boats, tuning),
         work.radius[i, j],
@@ -161,11 +161,11 @@ def _run_hunter(
 
 
 @lean_kernel
-def _adverse_samples(j: int, samples: int, sample_s: float, work: Work) -> int:
-    """Sample from which on opponent j holds its course and speed: for as long as it is feared it does its worst."""
-    if work.fear_s[j] >= WHOLE_S:
+def _adverse_samples(samples: int, boats: Boats) -> int:
+    """Sample from which on hunters hold their course and speed: until then they may do their worst."""
+    if boats.adversary_s >= WHOLE_S:
         return samples
-    return int(min(float(samples), math.ceil(work.fear_s[j] / sample_s)))
+    return min(samples, math.ceil(boats.adversary_s / boats.sample_s))
 
 
 @lean_kernel

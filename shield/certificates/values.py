@@ -180,7 +180,7 @@ def margin_when_ready(
     value = table_value(
         boats.tables,
         table,
-        work.fear_s[j],
+        boats.adversary_s,
         x - path[k, 0],
         y - path[k, 1],
         ready[READY_HEADING],
@@ -206,7 +206,7 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boa
         value = table_value(
             boats.tables,
             table,
-            work.fear_s[j],
+            boats.adversary_s,
             other[PLACE_X] - own[PLACE_X],
             other[PLACE_Y] - own[PLACE_Y],
             own[PLACE_HEADING],
@@ -251,7 +251,7 @@ def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
     return table_gradient(
         boats.tables,
         boats.table[i, j],
-        work.fear_s[j],
+        boats.adversary_s,
         other[PLACE_X] - own[PLACE_X],
         other[PLACE_Y] - own[PLACE_Y],
         own[PLACE_HEADING],

@@ -33,8 +33,8 @@ STEPS = 255
 NO_TABLE = -1
 
 LEVELS_S = (3.0, 6.0, 9.0, 12.0, 20.0)
-"""Times T for which a table keeps V(x, T), the distance that can be kept from an other that does its worst for T, besides
-that for the whole play; in between it is interpolated. V(x, 0) is the distance itself."""
+"""Times T for which a table keeps V(x, T), the distance that can be kept from an other that does its worst for T,
+besides that for the whole play; in between it is interpolated. V(x, 0) is the distance itself."""
 WHOLE_S = 90.0
 """Time from which on the whole play counts, s."""
 N_LEVELS = len(LEVELS_S) + 1
@@ -120,9 +120,13 @@ def _angle_places(
 
 
 @lean_kernel
-def _level_of(fear_s: float) -> tuple[int, float]:
-    """The level below a time T, -1 for the distance itself, and the share of the way to the next one."""
-    if fear_s >= WHOLE_S:
+def _level_of(tables: Tables, table: int, fear_s: float) -> tuple[int, float]:
+    """The level below a time T, -1 for the distance itself, and the share of the way to the next one.
+
+    That for the whole play from `WHOLE_S` on, and of tables that keep no other.
+    """
+    level = tables.level[table]
+    if fear_s >= WHOLE_S or level[0] == level[N_LEVELS - 1]:
         return N_LEVELS - 1, 0.0
     low, low_s = -1, 0.0
     for k in range(N_LEVELS - 1):
@@ -157,7 +161,7 @@ def table_value(
         own_speed_mps: own stored speed, m/s; outside the table it is clamped.
         other_speed_mps: the other's stored speed, m/s, likewise.
     """
-    if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps + fear_s):
+    if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
         return math.nan
     axes = tables.axes[table]
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
@@ -165,7 +169,7 @@ def table_value(
         return rho
     psi, beta, _ = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
     own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
-    low, part = _level_of(fear_s)
+    low, part = _level_of(tables, table, fear_s)
     value = 0.0
     for k in range(low, low + (2 if part > 0.0 else 1)):
         share = part if k > low else 1.0 - part
@@ -193,13 +197,13 @@ def table_gradient(
 
     Where an input is clamped the derivative with respect to it is 0; on a cell's edge it is that of one side.
     """
-    total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps + fear_s
+    total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps
     if not math.isfinite(total):
         return Gradient(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
     if rho < tables.axes[table, RHO_FIRST]:
         return _slope_of_distance(math.inf, dx_m, dy_m, rho)
-    low, part = _level_of(fear_s)
+    low, part = _level_of(tables, table, fear_s)
     value = x = y = heading = speed = other_heading = other_speed = 0.0
     for k in range(low, low + (2 if part > 0.0 else 1)):
         share = part if k > low else 1.0 - part

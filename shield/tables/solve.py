@@ -110,9 +110,11 @@ def _keep_level(problem: Problem, state: Progress) -> None:
     """Keep V(x, T) when the iteration passes a time T that tables keep."""
     passed = len(state.levels)
     if passed < len(LEVELS_S) and state.iterations == round(LEVELS_S[passed] / problem.dt_s):
-        state.levels = np.concatenate(
-            [state.levels.reshape(passed, -1), pack(state.values, problem.grid.cap_m)[None]]
-        ) if passed else pack(state.values, problem.grid.cap_m)[None]
+        state.levels = (
+            np.concatenate([state.levels.reshape(passed, -1), pack(state.values, problem.grid.cap_m)[None]])
+            if passed
+            else pack(state.values, problem.grid.cap_m)[None]
+        )
 
 
 class _Solver:

@@ -193,7 +193,7 @@ def test_bad_results_are_refused(tmp_path):
 
 
 def test_guards_are_told_apart_when_colours_run_out():
-    guards = ["none", "shield", *(f"shield:hunt_s={k}" for k in range(20))]
+    guards = ["none", "shield", *(f"shield:adversary_s={k}" for k in range(20))]
     looks = looks_of(guards)
     assert list(looks) == guards
     assert len(set(looks.values())) == len(guards)

@@ -78,7 +78,7 @@ MISTAKES = [
     ("play --side green", "blue"),
     ("play --speed -1", "--speed"),
     ("play --no-shield --separation 5", "would change nothing"),
-    ("play --no-shield --shield-set hunt_s=3", "would change nothing"),
+    ("play --no-shield --shield-set adversary_s=3", "would change nothing"),
     ("play --own sb3:", "sb3"),
     ("play --own keyboard --opponent nobody --headless", "nobody"),
     ("play --save game", ".npz"),

@@ -58,7 +58,7 @@ def test_the_manoeuvre_certificate_gives_up_where_reachability_does(heron, headi
 
 
 def test_opponents_that_only_hold_their_course_leave_a_smaller_set_that_misses_what_the_table_calls_lost(heron):
-    tame = ShieldConfig(separation_m=RADIUS_M, buffer_m=0.0, opponent_share=0.0)
+    tame = ShieldConfig(separation_m=RADIUS_M, buffer_m=0.0, adversary_s=0.0)
     pair = compare_pair(heron, tame, 90.0, 2.0, 2.0)
     assert math.pi * RADIUS_M**2 <= pair.shield_m2 < pair.reach_m2
     assert pair.missed_m2 >= pair.reach_m2 - pair.shield_m2 - 1e-9
@@ -114,7 +114,7 @@ def test_settings_that_would_compare_two_questions_are_refused(setting, tmp_path
 
 
 def test_other_settings_reach_the_shield():
-    assert sets_config(RADIUS_M, {"opponent_share": 0.5}) == ShieldConfig(buffer_m=0.0, opponent_share=0.5)
+    assert sets_config(RADIUS_M, {"adversary_s": 5.0}) == ShieldConfig(buffer_m=0.0, adversary_s=5.0)
     with pytest.raises(ConfigError, match="did you mean 'tail_s'"):
         sets_config(RADIUS_M, {"tail": 1.0})
 

@@ -56,7 +56,7 @@ def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
 @pytest.mark.parametrize("dt_s", [0.1, 0.05])
 @pytest.mark.parametrize(("platform", "spread_m"), [("heron", 12), ("surveyor", 30), ("si", 60)])
 def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
-    config = ShieldConfig(dt_s=dt_s, opponent_share=0.0)
+    config = ShieldConfig(dt_s=dt_s, adversary_s=0.0)
     state = starts(platform, 3, spread_m, 5)
     top = get_platform(platform).max_speed_mps
     state[:, :, L.SPEED] = top

@@ -117,7 +117,7 @@ def test_a_state_that_is_no_number_is_refused(column):
         ({"separation": 2.0}, "did you mean 'separation_m'"),
         ({"separation_m": -1.0}, "must be > 0"),
         ({"separation_m": float("nan")}, "give a number"),
-        ({"opponent_share": 2.0}, "between 0 and 1"),
+        ({"adversary_s": -2.0}, ">= 0"),
         ({"certificate": "magic"}, "turning_circle"),
         ({"solver": "nosuch"}, "installed"),
         ({"coordination": "chaos"}, "team, per_boat"),

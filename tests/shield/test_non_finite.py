@@ -22,7 +22,7 @@ FORMS = st.fixed_dictionaries(
     {
         "certificate": st.sampled_from(["turning_circle", "braking"]),
         "coordination": st.sampled_from(["team", "per_boat"]),
-        "opponent_share": st.sampled_from([0.0, 0.5, 1.0]),
+        "adversary_s": st.sampled_from([0.0, 3.0, math.inf]),
         "response_per_s": st.sampled_from([0.5, math.inf]),
         "separation_m": st.sampled_from([2.5, 4.0, 1e-3]),
     }
@@ -80,7 +80,7 @@ def test_a_command_that_is_none_holds_the_boat(value, column, make):
 def test_a_boat_that_cannot_simply_stop_is_not_left_drifting_in():
     """Without a command and with another boat coming: a stop would be run down, so it gets out of the way."""
     fleet = head_on(7.0)
-    shield = Shield(opponent_share=0.0)
+    shield = Shield(adversary_s=0.0)
     decision = shield.decide(fleet, relative((math.nan, 0.0), (2.0, 0.0)))[0]
     assert decision.intervened
     assert math.isfinite(decision.sent_speed_mps + decision.sent_heading_rad)

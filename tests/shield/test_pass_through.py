@@ -72,7 +72,7 @@ def test_only_the_boat_in_danger_is_changed():
     """A head-on far from a third boat of ours, whose odd command must pass while the first one's is changed."""
     fleet = fleet_of([(0, 0, 0, 2.0), (0, 5.2, 180, 2.0), (300, 0, 0, 1.0)], [0, 1, 0])
     wanted = relative((2.0, 0.0), (2.0, 0.0), (-0.0, 5e-324))
-    decisions = Shield(opponent_share=0.0).decide(fleet, wanted)
+    decisions = Shield(adversary_s=0.0).decide(fleet, wanted)
     assert decisions.intervened.tolist() == [True, False, False]
     assert bits(decisions.sent.values[1:]) == bits(wanted.values[1:])
     assert np.isfinite(decisions.sent.values).all()
@@ -81,7 +81,7 @@ def test_only_the_boat_in_danger_is_changed():
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
 def test_a_change_is_made_in_the_frame_of_the_wanted_command(coordination):
     fleet = head_on(5.2)
-    shield = Shield(opponent_share=0.0, coordination=coordination)
+    shield = Shield(adversary_s=0.0, coordination=coordination)
     turned = shield.decide(fleet, relative((2.0, 0.0), (2.0, 0.0)))
     shield.reset()
     absolute = shield.decide(fleet, Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]]))

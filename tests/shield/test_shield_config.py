@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.certificates import CERTIFICATES
-from steerclear.shield.config import COORDINATION
+from steerclear.shield.config import COORDINATION, PROFILES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
-from steerclear.shield.setup import boats_of
 
-TEXTS = ("certificate", "coordination", "solver")
+TEXTS = ("certificate", "coordination", "profile", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
 NOT_ZERO = [
     "separation_m",
@@ -25,10 +24,10 @@ NOT_ZERO = [
     "search_limit",
     "speed_weight",
     "horizon_s",
-    "hunt_s",
 ]
-MAY_BE_NONE = ["horizon_s", "hunt_s", "edge_m"]
+MAY_BE_NONE = ["adversary_s", "horizon_s", "edge_m"]
 MAY_BE_INFINITE = [
+    "adversary_s",
     "response_per_s",
     "table_response_per_s",
     "fixed_response_per_s",
@@ -78,10 +77,11 @@ def test_none_means_off_only_where_it_says_so(name):
             ShieldConfig(**{name: None})
 
 
-@pytest.mark.parametrize("share", [1.0000001, 2, 50])
-def test_a_share_is_between_none_and_all(share):
-    with pytest.raises(ConfigError, match=r"opponent_share .* between 0 and 1"):
-        ShieldConfig(opponent_share=share)
+def test_profiles_are_names_of_the_time_opponents_are_feared_for():
+    assert {name: ShieldConfig(profile=name).feared_s for name in PROFILES} == PROFILES
+    assert ShieldConfig(profile="rammers", adversary_s=5.0).feared_s == 5.0
+    with pytest.raises(ConfigError, match="unknown profile 'players!'; choose one of players, rammers, hold-course"):
+        ShieldConfig(profile="players!")
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -152,26 +152,11 @@ def test_all_errors_are_of_one_tree():
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(separation=st.floats(0.01, 50.0), share=st.floats(0.0, 1.0), certificate=st.sampled_from(list(CERTIFICATES)))
-def test_sensible_settings_are_taken_as_given(separation, share, certificate):
-    config = ShieldConfig.of(separation_m=separation, opponent_share=share, certificate=certificate)
-    assert (config.separation_m, config.opponent_share, config.certificate) == (separation, share, certificate)
+@given(separation=st.floats(0.01, 50.0), fear=st.floats(0.0, 200.0), certificate=st.sampled_from(list(CERTIFICATES)))
+def test_sensible_settings_are_taken_as_given(separation, fear, certificate):
+    config = ShieldConfig.of(separation_m=separation, adversary_s=fear, certificate=certificate)
+    assert (config.separation_m, config.adversary_s, config.certificate) == (separation, fear, certificate)
     assert Shield(config).config is config
-
-
-def test_hunters_are_followed_as_long_as_asked():
-    def samples_of(**settings):
-        boats = boats_of(ShieldConfig(**settings), ("surveyor", "surveyor"), (0, 1))
-        return boats.hunt_samples[0] * boats.sample_s, boats.samples[0] * boats.sample_s
-
-    by_platform, escape = samples_of()
-    asked, _ = samples_of(hunt_s=25.0)
-    least, _ = samples_of(hunt_s=1.0)
-    assert by_platform > 45.0
-    assert asked == pytest.approx(25.0, abs=0.5)
-    assert least == escape
-    with pytest.raises(ConfigError, match="hunt_s"):
-        ShieldConfig(hunt_s=0.0)
 
 
 def test_numbers_no_float_holds_are_refused():
@@ -193,7 +178,6 @@ def test_whole_numbers_are_kept_as_floats_for_compiled_code():
     [
         ("dt_s", 100),
         ("dt_s", 1e-9),
-        ("hunt_s", 1e9),
         ("horizon_s", 121.0),
         ("tail_s", 1e4),
         ("delay_s", 1e4),

@@ -165,7 +165,7 @@ def test_an_opponent_that_is_overtaken_is_not_given_way_to():
 
 @pytest.mark.parametrize(
     "settings",
-    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"opponent_share": 0.0}],
+    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"adversary_s": 0.0}],
 )
 def test_where_nothing_is_exact_or_feared_team_mates_are_as_others(settings):
     runs = []

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ...config import ShieldConfig
-from ...exceptions import LogError, SteerclearError
+from ...exceptions import ConfigError, LogError, SteerclearError
 from ...platforms import Gains, Platform, get_platform
 from ...surroundings import OPEN_WATER, Surroundings
 from ..frame import FieldFrame
@@ -197,8 +197,21 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _settings(told: dict[str, Any]) -> dict[str, Any]:
-    """Settings of the shield of a log; in those that do not know `mate_cap_m` team-mates' margins had the one cap."""
-    return {"mate_cap_m": told.get("margin_cap_m", ShieldConfig.margin_cap_m), **told}
+    """Settings of the shield of a log, as this version calls them.
+
+    In those that do not know `mate_cap_m` team-mates' margins had the one cap; in those that do not know `adversary_s`
+    opponents did their worst for ever, or held their course.
+
+    Raises:
+        ConfigError: the log's shield granted opponents a part of their turn, or a time, that no setting stands for.
+    """
+    settings = {"mate_cap_m": told.get("margin_cap_m", ShieldConfig.margin_cap_m), **told}
+    share, hunt_s = settings.pop("opponent_share", 1.0), settings.pop("hunt_s", None)
+    if share not in (0.0, 1.0) or hunt_s is not None:
+        raise ConfigError(f"opponent_share {share} and hunt_s {hunt_s} are no settings of this version any more")
+    if "adversary_s" not in settings:
+        settings["profile"] = "rammers" if share == 1.0 else "hold-course"
+    return settings
 
 
 def platform_to_text(kind: Platform) -> str:

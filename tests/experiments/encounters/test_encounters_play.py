@@ -146,9 +146,9 @@ def test_phases_begin_by_time_or_by_distance_and_are_never_left():
 
 
 def test_guards_by_name():
-    assert parse_guards("none,shield:opponent_share=0.5,tail_s=4,parabolic") == [
+    assert parse_guards("none,shield:adversary_s=5,tail_s=4,parabolic") == [
         "none",
-        "shield:opponent_share=0.5,tail_s=4",
+        "shield:adversary_s=5,tail_s=4",
         "parabolic",
     ]
     assert split_name("shield:response_per_s=inf,certificate=distance") == (

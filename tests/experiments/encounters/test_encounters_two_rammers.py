@@ -20,4 +20,4 @@ def test_two_that_close_in_from_both_quarters_are_seen_coming():
 
 
 def test_hunts_of_a_few_seconds_lose_them():
-    assert (closest_m("shield:hunt_s=6.4") < 2.5).mean() > 0.5
+    assert (closest_m("shield:adversary_s=6.4") < 2.5).mean() > 0.5

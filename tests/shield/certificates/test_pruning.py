@@ -32,11 +32,11 @@ def test_no_boat_goes_faster_over_ground_than_the_proof_says(name):
 
 
 @pytest.mark.parametrize("certificate", ["turning_circle", "braking"])
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_decisions_are_the_same_when_no_pair_is_left_out(certificate, share):
+@pytest.mark.parametrize("adversary_s", [0.0, 4.0, np.inf])
+def test_decisions_are_the_same_when_no_pair_is_left_out(certificate, adversary_s):
     """Clusters of boats, far from one another: some pairs matter, some do not."""
     random = np.random.default_rng(11)
-    config = ShieldConfig(certificate=certificate, opponent_share=share)
+    config = ShieldConfig(certificate=certificate, adversary_s=adversary_s)
     platforms, team = ["heron"] * 4 + ["surveyor"] * 3, [0, 0, 1, 1, 0, 1, 1]
     skipped = changed = 0
     for _ in range(60):

@@ -81,7 +81,7 @@ class Linearised:
 
 def linearised(random, name, team, gap_m, tries, surroundings=None):
     """Programs of that many scenes in which the wanted commands are not safe."""
-    config = ShieldConfig(opponent_share=0.0)
+    config = ShieldConfig(adversary_s=0.0)
     for _ in range(tries):
         at = stages_of(config, meeting(random, name, gap_m * random.uniform(0.6, 1.2)), [name] * 2, team, surroundings)
         top = get_platform(name).max_speed_mps

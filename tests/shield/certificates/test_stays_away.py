@@ -104,7 +104,7 @@ def test_a_stride_that_cuts_off_a_way_round_the_hunter_counts():
     assert (np.linalg.norm(np.diff(own, axis=0), axis=1) < closing_m).all()
     assert (np.linalg.norm(own, axis=1) > radius_m + CAP_M + closing_m).all()
     at_rest, out, end = (0.0,) * 6, np.zeros(4), np.zeros(5)
-    hunt = (False, 1.0, 0.2, CHASE_STRIDE, 0, closing_m, radius_m, 1.0, -1e6, CAP_M, False)
+    hunt = (False, 1.0, 0.2, CHASE_STRIDE, CHASE_STRIDE, 0, closing_m, radius_m, 1.0, -1e6, CAP_M, False)
     clear_of_pursuer(own, 0.0, 0.0, 0.0, 1.0, *at_rest, *hunt, end, out)
     assert out[MARGIN] < CAP_M
     assert not stays_away(own, 0.0, 0.0, 0.0, CHASE_STRIDE, closing_m, radius_m, CAP_M)

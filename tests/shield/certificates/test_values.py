@@ -90,10 +90,9 @@ def test_a_gap_between_two_that_lie_still_is_seen_as_one():
     ("fleet", "settings"),
     [
         (apart(1.0, 9.0, 180.0, 2.0, 2.0, "heron"), {}),
-        (apart(1.0, 24.0, 180.0), {"opponent_share": 0.9}),
         (apart(1.0, 24.0, 180.0), {"position_error_m": 1.5}),
     ],
-    ids=["nimble boats", "tamer opponents", "a radius beyond the table"],
+    ids=["nimble boats", "a radius beyond the table"],
 )
 def test_where_no_table_answers_opponents_are_run_through(fleet, settings):
     same = {"table_response_per_s": 1.0, **settings}  # the rate is the boat's, whoever answers
@@ -134,7 +133,7 @@ def test_decisions_name_the_opponents_without_a_table():
     }
     assert [d.no_table for d in told["auto"]] == [("boat_3",), (), (), ()]  # herons are not looked up, opponents never
     assert [d.no_table for d in told["value_table"]] == [("boat_3",), ("boat_3",), (), ()]
-    tame = Shield(opponent_share=0.9).decide(fleet, wanted)  # no table is wanted
+    tame = Shield(profile="hold-course").decide(fleet, wanted)  # no table is wanted
     assert [d.no_table for d in tame] == [()] * 4
 
 

@@ -6,6 +6,7 @@ from steerclear.shield.platforms.proving import reference_models
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.files import pack_values
 from steerclear.shield.tables.grid import Grid
+from steerclear.shield.tables.lookup import LEVELS_S, pack
 from steerclear.shield.tables.settings import OtherMay, Problem
 from steerclear.shield.tables.solve import start
 
@@ -19,10 +20,12 @@ def problem(mode="worst-case", own="heron", other="heron", horizon_s=6.0, dt_s=0
 
 
 def random_table(seed=0, **changes):
-    """A table of random values: no symmetry or smoothness hides a wrong index."""
+    """A table of random values, at shorter times higher ones: no symmetry or smoothness hides a wrong index."""
     one = problem(**changes)
-    state = start(one)
-    state.values = np.random.default_rng(seed).uniform(0.0, 6.0, one.grid.size).astype(np.float32)
+    state, random = start(one), np.random.default_rng(seed)
+    state.values = random.uniform(0.0, 6.0, one.grid.size).astype(np.float32)
+    more = random.uniform(0.0, 1.0, (len(LEVELS_S), one.grid.size))[::-1].cumsum(axis=0)[::-1]
+    state.levels = pack(np.minimum(state.values + more, 6.0), 6.0)
     state.residual_m = 0.0
     return pack_values(one, state)
 

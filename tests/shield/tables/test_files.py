@@ -43,6 +43,7 @@ def test_a_table_comes_back_as_it_was(tmp_path):
     back = read_table(tmp_path / "deep" / "one.npz")
     assert back.card == table.card
     np.testing.assert_array_equal(back.values, table.values)
+    np.testing.assert_array_equal(back.levels, table.levels)
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["one.npz"]
 
 

@@ -1,6 +1,8 @@
 """Values and gradients looked up: against SciPy's interpolation, finite differences and symmetries."""
 
+import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 from steerclear.shield.tables.files import stack_tables
-from steerclear.shield.tables.lookup import WHOLE_S, no_tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import LEVELS_S, WHOLE_S, no_tables, table_gradient, table_range_m, table_value
 from table_scenes import random_table
 
 TABLE = random_table()
@@ -51,7 +53,9 @@ def test_values_are_those_of_another_interpolation(x, y, own, other, v, w):
     state = x, y, own, other, v, w
     assume(off_the_bow(x, y, own))
     assert table_value(TABLES, 1, WHOLE_S, *state) == pytest.approx(scipy_value(TABLE, *state), abs=1e-9)
-    assert table_gradient(TABLES, 1, WHOLE_S, *state).value_m == pytest.approx(table_value(TABLES, 1, WHOLE_S, *state), abs=1e-9)
+    assert table_gradient(TABLES, 1, WHOLE_S, *state).value_m == pytest.approx(
+        table_value(TABLES, 1, WHOLE_S, *state), abs=1e-9
+    )
 
 
 def test_gradients_are_those_of_finite_differences():
@@ -85,7 +89,10 @@ def test_turning_the_whole_scene_changes_nothing(x, y, own, other, v, w, turn):
 @settings(max_examples=80, deadline=None)
 @given(st.floats(0.01, 30.0), FINITE, ANGLE, SPEED, SPEED)
 def test_the_mirrored_scene_has_the_mirrored_gradient(x, y, other, v, w):
-    star, port = table_gradient(TABLES, 1, WHOLE_S, x, y, 0.0, other, v, w), table_gradient(TABLES, 1, WHOLE_S, -x, y, 0.0, -other, v, w)
+    star, port = (
+        table_gradient(TABLES, 1, WHOLE_S, x, y, 0.0, other, v, w),
+        table_gradient(TABLES, 1, WHOLE_S, -x, y, 0.0, -other, v, w),
+    )
     assert port.value_m == pytest.approx(star.value_m, abs=1e-9)
     if math.remainder(other, math.pi / 4.0) != 0.0:  # on a node either side's slope is right
         mirrored = [-port.own_x, port.own_y, -port.own_heading, port.own_speed, -port.other_heading, port.other_speed]
@@ -102,7 +109,9 @@ def test_nearer_than_the_table_the_value_is_the_distance():
 def test_beyond_the_table_its_edge_holds():
     last = table_range_m(TABLES, 1)
     assert last == pytest.approx(12.0)
-    edge, beyond = (table_value(TABLES, 1, WHOLE_S, far * 0.6, far * 0.8, 0.0, 1.0, 5.0, -1.0) for far in (last, 3.0 * last))
+    edge, beyond = (
+        table_value(TABLES, 1, WHOLE_S, far * 0.6, far * 0.8, 0.0, 1.0, 5.0, -1.0) for far in (last, 3.0 * last)
+    )
     assert edge == pytest.approx(beyond, abs=1e-9)
     slope = table_gradient(TABLES, 1, WHOLE_S, 30.0, 40.0, 0.0, 1.0, 5.0, -1.0)
     assert slope.own_speed == slope.other_speed == 0.0
@@ -121,3 +130,33 @@ def test_what_is_not_finite_gives_nan(place, bad):
 def test_no_tables_are_an_empty_set():
     assert stack_tables([]).axes.shape == no_tables().axes.shape
     assert stack_tables([]).data.size == 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(FINITE, FINITE, ANGLE, ANGLE, SPEED, SPEED, st.floats(0.0, WHOLE_S))
+def test_between_two_times_values_are_between_theirs_and_fall_with_time(x, y, own, other, v, w, fear_s):
+    state = (x, y, own, other, v, w)
+    times = [0.0, *LEVELS_S, WHOLE_S]
+    values = [table_value(TABLES, 1, time_s, *state) for time_s in times]
+    if math.hypot(x, y) > TABLE.card.make_grid().rho_first_m:
+        assert values[0] == pytest.approx(min(math.hypot(x, y), 6.0))
+    assert all(sooner >= later - 1e-12 for sooner, later in itertools.pairwise(values[1:]))
+    assert table_value(TABLES, 1, fear_s, *state) == pytest.approx(np.interp(fear_s, times, values), abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(FINITE, FINITE, ANGLE, ANGLE, SPEED, SPEED, st.floats(0.5, 80.0))
+def test_slopes_between_two_times_blend_theirs(x, y, own, other, v, w, fear_s):
+    state = (x, y, own, other, v, w)
+    times = [0.0, *LEVELS_S, WHOLE_S]
+    slopes = np.array([table_gradient(TABLES, 1, time_s, *state) for time_s in times])
+    found = table_gradient(TABLES, 1, fear_s, *state)
+    expected = [np.interp(fear_s, times, slopes[:, k]) for k in range(7)]
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_a_table_without_shorter_times_fears_for_the_whole_play():
+    old = replace(TABLE, card=replace(TABLE.card, levels_s=()), levels=TABLE.levels[:0])
+    tables, state = stack_tables([old]), (4.0, 5.0, 0.3, 2.0, 1.1, 0.7)
+    for fear_s in (0.0, 1.0, 5.0, 50.0):
+        assert table_value(tables, 0, fear_s, *state) == table_value(TABLES, 1, WHOLE_S, *state)

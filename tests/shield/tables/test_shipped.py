@@ -7,6 +7,7 @@ import pytest
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.areas import area_m2, reach_ahead_m, unsafe
 from steerclear.shield.tables.files import SHIPPED, check_parameters, read_table
+from steerclear.shield.tables.lookup import LEVELS_S
 from steerclear.shield.tables.settings import OtherMay, problem_of, table_name
 from steerclear.shield.tables.solve import CONVERGED_M
 
@@ -36,6 +37,14 @@ def test_every_pair_has_its_table(own, other, mode):
         assert card.margin[radius]["runs"] >= 1000
         known = SHORT.get((own, other, radius)) if mode is OtherMay.WORST_CASE else None
         assert card.convergence[radius]["mean"] <= (known or CONVERGED_SHARE)
+
+
+@pytest.mark.parametrize(("own", "other"), list(itertools.product(BOATS, BOATS)))
+def test_worst_cases_are_kept_for_shorter_times_that_tell_of_no_less(own, other):
+    table = shipped(own, other, OtherMay.WORST_CASE)
+    assert table.card.levels_s == LEVELS_S
+    assert (table.levels[:-1] >= table.levels[1:]).all()
+    assert (table.levels[-1] >= table.values).all()
 
 
 @pytest.mark.parametrize("other", BOATS)

@@ -11,7 +11,9 @@ from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.platforms.usv import advance_hull
+from steerclear.shield.tables.files import pack_values
 from steerclear.shield.tables.grid import Grid
+from steerclear.shield.tables.lookup import LEVELS_S, pack
 from steerclear.shield.tables.moves import moves_of, sub_steps
 from steerclear.shield.tables.settings import RUDDERS, OtherMay, Problem, places, problem_of
 from steerclear.shield.tables.solve import Progress, solve, steps_of
@@ -172,7 +174,21 @@ def test_an_interrupted_solve_goes_on_to_the_same_values(tmp_path, steps):
     resumed = solve(problem(), threads=1, checkpoint=kept, notice=lambda done, total, change: seen.append(done))
     assert seen[0] == steps + 1
     np.testing.assert_array_equal(resumed.values, whole.values)
+    np.testing.assert_array_equal(resumed.levels, whole.levels)
     assert (resumed.iterations, resumed.residual_m) == (whole.iterations, whole.residual_m)
+
+
+def test_shorter_times_are_passed_on_the_way_and_tell_of_no_less():
+    """V(x, T) of a longer solve is the value a solve to that time ends with."""
+    short, long = (solve(problem(horizon_s=horizon_s), threads=2) for horizon_s in (LEVELS_S[0], LEVELS_S[1]))
+    assert len(long.levels) == 2
+    np.testing.assert_array_equal(long.levels[0], pack(short.values, 6.0))
+    np.testing.assert_array_equal(long.levels[1], pack(long.values, 6.0))
+    table = pack_values(problem(), long)
+    assert table.card.levels_s == LEVELS_S
+    assert (table.levels[:-1] >= table.levels[1:]).all()
+    assert (table.levels[-1] == table.values).all()
+    assert (table.levels[0] > table.values).any()
 
 
 def test_checkpoints_of_other_problems_and_damaged_ones_are_refused(tmp_path):

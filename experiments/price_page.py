@@ -1,0 +1,119 @@
+"""The page of what safety costs: how long opponents are feared for, against hits and play, from ablations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.config import ShieldConfig
+
+from .markdown import MADE, line, table
+from .tables import interval_text
+from .tally import RADII_M, breach_column
+
+STEM = "price"
+_HEADS = (
+    "feared, s",
+    "changed, %",
+    "hits opp.",
+    "hits mates",
+    "captures",
+    "against",
+    "net, on - off",
+    "tags, on - off",
+    "primary, on - off",
+    "games",
+)
+
+
+def is_dial(content: Mapping[str, Any]) -> bool:
+    """Whether results are of an ablation that was told how long opponents are feared for."""
+    shield = content.get("settings", {}).get("shield") or {}
+    return content.get("command") == "ablate" and bool({"adversary_s", "profile"} & set(shield))
+
+
+def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
+    """Name and text of the page, and its pictures.
+
+    Args:
+        found: results of ablations, see `is_dial`.
+        folder: where the pictures go.
+    """
+    groups = _groups(found)
+    words = (
+        "How long an opponent may do its worst before it holds its course (`adversary_s`) decides what safety costs. "
+        "Hits are entries into the distance kept, per game; differences are paired, shield on less off, same seeds; "
+        "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever."
+    )
+    lines = ["# Safety and its price", "", MADE, "", words, ""]
+    picture = folder / f"{STEM}.png"
+    _plot(groups, picture)
+    lines += [f"![hits against changed commands]({picture.name})", ""]
+    for (preset, radius_m, pairing), runs in groups.items():
+        lines += [f"## {line(preset)}, {radius_m:g} m: {line(pairing)}", ""]
+        lines += [*table(_HEADS, [_row(fear, content, summary, radius_m) for fear, content, summary in runs]), ""]
+    return f"{STEM}.md", "\n".join(lines), [picture]
+
+
+_Run = tuple[float, Mapping[str, Any], Mapping[str, Any]]
+_Groups = dict[tuple[str, float, str], list[_Run]]
+
+
+def _groups(found: Sequence[Mapping[str, Any]]) -> _Groups:
+    """Runs by preset, distance and pairing, each with its time, the least first."""
+    groups: _Groups = {}
+    for content in found:
+        shield = content["settings"]["shield"]
+        fear_s = ShieldConfig.of(**{k: v for k, v in shield.items() if k in ("adversary_s", "profile")}).feared_s
+        radius_m = float(shield.get("separation_m", RADII_M[0]))
+        for summary in content["pairings"]:
+            key = (content["settings"]["preset"], radius_m, summary["pairing"])
+            groups.setdefault(key, []).append((fear_s, content, summary))
+    return {key: sorted(groups[key], key=lambda run: run[0]) for key in sorted(groups)}
+
+
+def _row(fear_s: float, content: Mapping[str, Any], summary: Mapping[str, Any], radius_m: float) -> list[str]:
+    metrics = summary["metrics"]
+
+    def told(name: str, state: str) -> str:
+        return interval_text(metrics[name][state]) if state in metrics.get(name, {}) else "-"
+
+    return [
+        f"{fear_s:g}",
+        told("changed_share", "on"),
+        told(breach_column("opponent", radius_m), "on"),
+        told(breach_column("teammate", radius_m), "on"),
+        told("captures", "on"),
+        told("captures_against", "on"),
+        told("net_captures", "difference"),
+        told("tags", "difference"),
+        told("primary", "difference"),
+        f"{summary['games_on']}",
+    ]
+
+
+def _plot(groups: _Groups, path: Path) -> None:
+    """Hits with opponents and net of captures against commands changed, one line a pairing, its points the times."""
+    from matplotlib.figure import Figure  # without pyplot: no window system is touched
+
+    canvas = Figure(figsize=(10.0, 4.2), layout="constrained", dpi=150)
+    hits, net = canvas.subplots(1, 2)
+    for (preset, radius_m, pairing), runs in groups.items():
+        changed = [summary["metrics"]["changed_share"]["on"]["value"] for _, _, summary in runs]
+        for axis, name, state in (
+            (hits, breach_column("opponent", radius_m), "on"),
+            (net, "net_captures", "difference"),
+        ):
+            values = [summary["metrics"][name][state]["value"] for _, _, summary in runs]
+            axis.plot(changed, values, "o-", ms=4, label=f"{preset} {radius_m:g} m, {pairing}")
+            for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True):
+                axis.annotate(f"{fear_s:g}", (x, y), fontsize=7, xytext=(3, 3), textcoords="offset points")
+    hits.set_ylabel("hits with opponents, per game")
+    net.set_ylabel("net of captures, on - off, per game")
+    for axis in (hits, net):
+        axis.set_xlabel("commands changed, %")
+        axis.axhline(0.0, color="#999999", lw=0.6)
+        axis.spines[["top", "right"]].set_visible(False)
+    hits.legend(fontsize=7, frameon=False)
+    canvas.savefig(path)
