@@ -79,8 +79,8 @@ class Card:
         """
         try:
             content = json.loads(text)
-            for name in ("checked_radii_m", "levels_s"):
-                content[name] = tuple(content.get(name, ()))
+            content["checked_radii_m"] = tuple(content["checked_radii_m"])
+            content["levels_s"] = tuple(content.get("levels_s", ()))
             card = Card(**content)
             card.make_grid()
         except (ValueError, TypeError, KeyError) as error:

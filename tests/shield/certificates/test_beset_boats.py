@@ -29,7 +29,9 @@ def boat(x, y, heading_deg, speed_mps=3.0):
 
 def looked_around(*rows):
     """The first boat is ours, all are surveyors."""
-    at = stages_of(ShieldConfig(), np.array(rows), ["surveyor"] * len(rows), [0] + [1] * (len(rows) - 1))
+    at = stages_of(
+        ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * len(rows), [0] + [1] * (len(rows) - 1)
+    )
     look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
     return at
 
@@ -236,14 +238,14 @@ def test_a_look_up_is_kept_for_its_place_only():
 def test_the_margin_of_runs_is_remembered_once_for_all_opponents():
     """And asked for at the rate of margins of manoeuvres; of each opponent the look-up at once is remembered."""
     rows = boat(0.0, 0.0, 0.0), boat(0.0, 35.0, 180.0), boat(30.0, 0.0, -90.0)
-    at = stages_of(ShieldConfig(), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
+    at = stages_of(ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
     screened(at, np.array([[3.0, -90.0]] * 3))
     decided(at, True)
     assert at.memory.joint_m[0] == at.work.joint_m[0] == pytest.approx(1.0, abs=1.0)
     np.testing.assert_array_equal(at.memory.threat_m[0], at.work.threats_m[0])
     screened(at, np.array([[3.0, -90.0]] * 3))
     assert at.work.joint_target_m[0] == pytest.approx(math.exp(-0.1) * min(at.memory.joint_m[0], at.boats.cap_m[0]))
-    alone = stages_of(ShieldConfig(), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
+    alone = stages_of(ShieldConfig(profile="rammers"), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
     alone.memory.joint_m[0] = 1.0
     decided(alone, screened(alone, np.array([[3.0, -90.0]] * 2)))
     assert alone.memory.joint_m[0] == 0.0

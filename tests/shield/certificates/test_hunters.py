@@ -53,7 +53,10 @@ def chase(platform, own, hunter, side, turn_deg, most, steps):
 def modelled(name, own, hunter, side, turn_deg):
     """Least margin, m, the certificate expects of the same escape, and the steps over which it looks."""
     at = stages_of(
-        ShieldConfig(buffer_m=0.0, certificate="turning_circle"), np.array([own, hunter]), (name, name), (0, 1)
+        ShieldConfig(profile="rammers", buffer_m=0.0, certificate="turning_circle"),
+        np.array([own, hunter]),
+        (name, name),
+        (0, 1),
     )
     look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
     top = get_platform(name).max_speed_mps
@@ -92,7 +95,7 @@ def test_no_hunter_that_steers_at_the_boat_comes_nearer_than_expected(name, most
 
 def test_a_boat_that_regains_its_speed_at_once_is_followed_without_its_loss():
     at = {
-        name: stages_of(ShieldConfig(), np.zeros((2, L.N_STATE)), (name, name), (0, 1))
+        name: stages_of(ShieldConfig(profile="rammers"), np.zeros((2, L.N_STATE)), (name, name), (0, 1))
         for name in ("heron", "surveyor")
     }
     assert at["heron"].boats.granted_loss[1] < 0.1

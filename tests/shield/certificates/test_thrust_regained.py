@@ -39,7 +39,10 @@ def opponent(x, y, heading_deg):
 
 def stages(*rows, other="surveyor", **settings):
     at = stages_of(
-        ShieldConfig(**settings), np.array(rows), ["surveyor"] + [other] * (len(rows) - 1), [0] + [1] * (len(rows) - 1)
+        ShieldConfig(**{"profile": "rammers", **settings}),
+        np.array(rows),
+        ["surveyor"] + [other] * (len(rows) - 1),
+        [0] + [1] * (len(rows) - 1),
     )
     look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
     return at
@@ -117,7 +120,7 @@ def nimble(thrust, speed_mps, *others):
     row = fresh_state(0.0, 0.0, 0.0, speed_mps)
     row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
     rows = np.array([row, *others])
-    at = stages_of(ShieldConfig(), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
+    at = stages_of(ShieldConfig(profile="rammers"), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
     look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
     return at
 
@@ -156,7 +159,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
 def test_it_makes_no_difference_on_which_side_of_enough_the_thrust_is(wanted_mps):
     """Else margins would drop in the step in which a boat that slows down comes to have less."""
     random, drops = np.random.default_rng(5), []
-    enough = stages_of(ShieldConfig(), np.array([slow_boat()]), ["heron"], [0]).boats.ready_thrust[0]
+    enough = stages_of(ShieldConfig(profile="rammers"), np.array([slow_boat()]), ["heron"], [0]).boats.ready_thrust[0]
     for _ in range(300):
         angle, far, heading = (
             random.uniform(-math.pi, math.pi),
@@ -174,7 +177,7 @@ def test_it_makes_no_difference_on_which_side_of_enough_the_thrust_is(wanted_mps
 
 def certificate_m(state, wanted_mps):
     """What a batch of one game tells of its first boat."""
-    shield = BatchedShield(ShieldConfig(), 1, ("heron", "heron"), (0, 1))
+    shield = BatchedShield(ShieldConfig(profile="rammers"), 1, ("heron", "heron"), (0, 1))
     wanted = np.array([[[wanted_mps, 0.0], [2.0, 0.0]]])
     shield.decide(state[None].copy(), wanted, np.array([[True, False]]))
     return min(float(shield.certificate_m[0, 0]), 2.0)
@@ -184,7 +187,7 @@ def test_a_boat_that_is_always_slow_is_at_full_thrust_with_what_it_has():
     slow = replace(get_platform("heron"), name="slow_heron", max_speed_mps=1.7)
     steady = limits_of(slow).thrust
     assert 80.0 < steady < 85.0
-    boats = boats_of(ShieldConfig(), (slow, slow), (0, 1))
+    boats = boats_of(ShieldConfig(profile="rammers"), (slow, slow), (0, 1))
     assert boats.ready_thrust[0] == pytest.approx(0.85 * steady)
 
 
@@ -218,7 +221,7 @@ def chased(certificate, count=40, steps=500):
         game[0] = slow_boat(rng.uniform(0.5, 2.0), 30.0)
         angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(10.0, 60.0)
         game[1] = opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + 180.0)
-    shield = BatchedShield(ShieldConfig(certificate=certificate), count, ("surveyor",) * 2, (0, 1))
+    shield = BatchedShield(ShieldConfig(profile="rammers", certificate=certificate), count, ("surveyor",) * 2, (0, 1))
     ours, closest, first = np.tile([True, False], (count, 1)), np.full(count, math.inf), None
     for _ in range(steps):
         wanted = np.zeros((count, 2, 2))

@@ -31,7 +31,7 @@ def apart(x, y, heading, own_mps=3.0, other_mps=3.0, kind="surveyor", percent=10
 
 
 def answers(fleet, **settings):
-    decisions = Shield(**settings).decide(fleet, relative((3.0, 0.0), (3.0, 0.0)))
+    decisions = Shield(**{"profile": "rammers", **settings}).decide(fleet, relative((3.0, 0.0), (3.0, 0.0)))
     return decisions.sent.values.tolist(), decisions.reason.tolist(), decisions.certificate_m.tolist()
 
 
@@ -77,7 +77,7 @@ def test_a_gap_between_two_that_lie_still_is_seen_as_one():
     """Tables are about one boat at a time: each of the two can be passed, both together cannot."""
     rows = [(0, 0, 0, 3), (-2.4, 25.0, 90, 0), (2.4, 25.0, 90, 0)]
     fleet = at_thrust(fleet_of(rows, [0, 1, 1], "surveyor"), 100.0)
-    shield, state = Shield(), fleet.state.copy()
+    shield, state = Shield(profile="rammers"), fleet.state.copy()
     least = math.inf
     for _ in range(250):
         decisions = shield.decide(replace(fleet, state=state.copy()), relative((3.0, 0.0), (0.0, 0.0), (0.0, 0.0)))
@@ -153,7 +153,7 @@ def chased(count, seed):
         game[0] = fresh_state(0.0, 0.0, rng.uniform(-180, 180), 3.0)
         game[1] = fresh_state(distance * math.sin(bearing), distance * math.cos(bearing), rng.uniform(-180, 180), 3.0)
         game[:, L.THRUST] = 100.0
-    guard = BatchedShield(ShieldConfig(), count, ("surveyor", "surveyor"), (0, 1))
+    guard = BatchedShield(ShieldConfig(profile="rammers"), count, ("surveyor", "surveyor"), (0, 1))
     ours, least = np.tile([True, False], (count, 1)), np.full(count, math.inf)
     for _ in range(450):
         gap = state[:, 0, [L.X, L.Y]] - state[:, 1, [L.X, L.Y]]

@@ -88,7 +88,8 @@ def test_files_cut_short_are_refused(whole, length):
 def rewritten(path, card=TABLE.card, **arrays):
     shape = TABLE.values.shape
     steps = np.diff(TABLE.values.reshape(*shape[:3], -1), axis=2, prepend=np.uint8(0))
-    content = {"card": np.array(card.to_json()), "steps": np.moveaxis(steps, 3, 0)} | arrays
+    more = TABLE.levels - np.concatenate([TABLE.levels[1:], TABLE.values[None]])
+    content = {"card": np.array(card.to_json()), "steps": np.moveaxis(steps, 3, 0), "more": more} | arrays
     np.savez_compressed(path, **content)
     return path
 
@@ -100,6 +101,8 @@ def test_altered_values_are_refused(tmp_path):
         read_table(rewritten(tmp_path / "other.npz", card))
     with pytest.raises(TableError, match="values do not fit its grid"):
         read_table(rewritten(tmp_path / "shape.npz", steps=np.zeros((2, 2), np.uint8)))
+    with pytest.raises(TableError, match="levels do not fit its card"):
+        read_table(rewritten(tmp_path / "levels.npz", more=np.zeros(3, np.uint8)))
     np.savez(tmp_path / "no_card.npz", steps=np.zeros(3))
     with pytest.raises(TableError, match="is no value table"):
         read_table(tmp_path / "no_card.npz")
@@ -184,8 +187,8 @@ def test_cache_folders(monkeypatch, tmp_path, platform, variable, tail):
 
 def test_stacked_tables_keep_their_places():
     tables = stack_tables([random_table(1), TABLE, random_table(2, n_rho=4)])
-    assert tables.offset.tolist() == [0, TABLE.values.size, 2 * TABLE.values.size]
-    assert tables.data.size == int(tables.offset[2] + random_table(2, n_rho=4).values.size)
+    assert tables.level[:, -1].tolist() == [0, 6 * TABLE.values.size, 12 * TABLE.values.size]
+    assert tables.data.size == int(tables.level[2, -1] + 6 * random_table(2, n_rho=4).values.size)
 
 
 def test_arrays_of_something_else_are_no_table(tmp_path):

@@ -180,11 +180,12 @@ def test_an_interrupted_solve_goes_on_to_the_same_values(tmp_path, steps):
 
 def test_shorter_times_are_passed_on_the_way_and_tell_of_no_less():
     """V(x, T) of a longer solve is the value a solve to that time ends with."""
-    short, long = (solve(problem(horizon_s=horizon_s), threads=2) for horizon_s in (LEVELS_S[0], LEVELS_S[1]))
+    boats = {"own": "surveyor", "other": "surveyor", "dt_s": 1.0, "rho_last_m": 40.0}
+    short, long = (solve(problem(horizon_s=time_s, **boats), threads=2) for time_s in LEVELS_S[:2])
     assert len(long.levels) == 2
     np.testing.assert_array_equal(long.levels[0], pack(short.values, 6.0))
     np.testing.assert_array_equal(long.levels[1], pack(long.values, 6.0))
-    table = pack_values(problem(), long)
+    table = pack_values(problem(**boats), long)
     assert table.card.levels_s == LEVELS_S
     assert (table.levels[:-1] >= table.levels[1:]).all()
     assert (table.levels[-1] == table.values).all()

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from steerclear.shield import ShieldConfig
+from steerclear.shield.bridge.blackbox.header import _settings
 from steerclear.shield.bridge.blackbox.numbers import from_json, plain, restored, row_from_json, row_to_json, to_json
-from steerclear.shield.exceptions import LogError
+from steerclear.shield.exceptions import ConfigError, LogError
 
 quick = settings(max_examples=200, deadline=None, derandomize=True)
 
@@ -61,3 +63,13 @@ def test_settings_come_back():
 def test_settings_of_another_kind_are_refused():
     with pytest.raises(TypeError, match="no place in a log"):
         plain({"a": object()})
+
+
+def test_settings_of_older_logs_are_called_as_they_are_now():
+    old = {"separation_m": 2.5, "mate_cap_m": 0.2, "opponent_share": 1.0, "hunt_s": None}
+    assert ShieldConfig.of(**_settings(old)).feared_s == math.inf
+    assert ShieldConfig.of(**_settings(old | {"opponent_share": 0.0})).feared_s == 0.0
+    assert ShieldConfig.of(**_settings({"adversary_s": None, "profile": "players"})).feared_s == 9.0
+    for change in ({"opponent_share": 0.5}, {"hunt_s": 12.0}):
+        with pytest.raises(ConfigError, match="no settings of this version"):
+            _settings(old | change)
