@@ -129,6 +129,6 @@ def test_who_closes_in_from_the_quarter_is_seen_coming_for_half_a_minute(bearing
 
 
 def test_that_decides_of_an_all_but_parallel_course():
-    assert told_m(97.0, 7.0, adversary_s=0.5) > 0.5
+    assert told_m(97.0, 7.0, adversary_s=0.0) > 0.5  # it holds its course
     assert told_m(97.0, 7.0) < 0.0
     assert sailed_m(97.0, 7.0, 0.3 * CHASE_S, CHASE_S) < 2.5
