@@ -38,7 +38,7 @@ def test_a_row_for_each_time_the_least_first(tmp_path):
     rows = [row.split("|")[1:4] for row in near.splitlines() if row.startswith("| ") and "[" in row]
     assert [[cell.strip().split(" ")[0] for cell in row] for row in rows] == [
         ["6", "4.25", "0.50"],
-        ["9", "7.75", "0.25"],
+        ["12", "7.75", "0.25"],
         ["inf", "21.5", "0.00"],
     ]
     assert "12.5" in far

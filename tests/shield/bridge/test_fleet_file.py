@@ -170,6 +170,6 @@ def test_on_the_water_margins_from_team_mates_shrink_as_slowly_as_others():
 
 def test_on_water_opponents_are_taken_for_rammers_unless_the_file_says_otherwise():
     assert parse_fleet(GOOD).shield_config.feared_s == math.inf
-    for setting, feared_s in (("profile: players", 9.0), ("adversary_s: 12.0", 12.0), ("profile: hold-course", 0.0)):
+    for setting, feared_s in (("profile: players", 12.0), ("adversary_s: 12.0", 12.0), ("profile: hold-course", 0.0)):
         told = parse_fleet(GOOD.replace("team: blue", f"team: blue\nshield: {{{setting}}}", 1))
         assert told.shield_config.feared_s == feared_s

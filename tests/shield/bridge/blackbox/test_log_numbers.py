@@ -69,7 +69,7 @@ def test_settings_of_older_logs_are_called_as_they_are_now():
     old = {"separation_m": 2.5, "mate_cap_m": 0.2, "opponent_share": 1.0, "hunt_s": None}
     assert ShieldConfig.of(**_settings(old)).feared_s == math.inf
     assert ShieldConfig.of(**_settings(old | {"opponent_share": 0.0})).feared_s == 0.0
-    assert ShieldConfig.of(**_settings({"adversary_s": None, "profile": "players"})).feared_s == 9.0
+    assert ShieldConfig.of(**_settings({"adversary_s": None, "profile": "players"})).feared_s == 12.0
     for change in ({"opponent_share": 0.5}, {"hunt_s": 12.0}):
         with pytest.raises(ConfigError, match="no settings of this version"):
             _settings(old | change)
