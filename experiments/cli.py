@@ -17,7 +17,9 @@ from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.evaluate import evaluate
+from .commands.fit import fit
 from .commands.parity import parity
+from .commands.platform import app as platform_app
 from .commands.play import play
 from .commands.preflight import preflight
 from .commands.reach import app as reach_app
@@ -50,12 +52,14 @@ for function in (
     preflight,
     replay,
     referee,
+    fit,
     docs,
 ):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
+app.add_typer(platform_app, name="platform")
 
 
 def _show_version(wanted: bool) -> None:

@@ -110,7 +110,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             ready_thrust=_ready_thrust(params, limits, with_table),
             stride=stride,
             sample_s=stride * config.dt_s,
-            plans=np.where(with_table, len(certificate.plans), certificate.nimble),
+            plans=np.array([certificate.ways(*boat) for boat in zip(kinds, with_table, strict=True)], dtype=np.int64),
             decay=np.where(
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
             ),
