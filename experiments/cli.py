@@ -26,6 +26,7 @@ from .commands.reach import app as reach_app
 from .commands.referee import referee
 from .commands.render import render
 from .commands.replay import replay
+from .commands.sea_trial import sea_trial
 from .commands.sim_boats import sim_boats
 from .commands.warm_up import warm_up
 from .provenance import package_version
@@ -57,6 +58,7 @@ for function in (
 ):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
+app.command("sea-trial")(sea_trial)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
 app.add_typer(platform_app, name="platform")

@@ -15,6 +15,7 @@ from .models import MODELS, Seen
 from .runs import Run
 
 DIGITS = 4
+CHOSEN_BY = 0.9
 WORST_M = 3.0
 """Held-out errors 3 s ahead beyond this say that the log is not of one boat obeying these commands."""
 
@@ -35,8 +36,8 @@ def fit_runs(runs: Sequence[Run], kinds: Sequence[str], tell: Callable[[str], No
 
 
 def best_of(found: dict[str, Judged]) -> str:
-    """The kind whose errors, 99th percentiles at all times ahead, are the smallest together."""
-    return min(found, key=lambda kind: float(np.nansum([found[kind].quantile_m(c, COVERED) for c in range(3)])))
+    """The kind whose errors, 90th percentiles at all times ahead, are the smallest together."""
+    return min(found, key=lambda kind: float(np.nansum([found[kind].quantile_m(c, CHOSEN_BY) for c in range(3)])))
 
 
 def platform_file(judged: Judged, name: str) -> PlatformFile:

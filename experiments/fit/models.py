@@ -37,6 +37,9 @@ _USV = (
     ("kd", 0.5, 0.0, 12.0),
     DELAY,
 )
+HELD_S, HELD_MPS, FASTER_MPS = 2.0, 0.06, 0.25
+"""A speed held for so long, s, within so much, m/s, although told to go faster by so much is the top speed."""
+
 SLOW_SHARE = 0.2
 """Of top speed: below it a boat has hardly any way."""
 
@@ -64,7 +67,7 @@ class Seen:
         told = max(float(run.told[:, 0].max()) for run in runs)
         gains = np.concatenate([_slope(run.seen[:, 3], 0.5) for run in runs])
         rates = np.concatenate([np.abs(run.seen[:, 4]) for run in runs])
-        top = max(0.05, min(told, float(np.quantile(speed, 0.999))))
+        top = max(0.05, min(told, *(_held(run) for run in runs)))
         slow = rates[np.abs(speed) < SLOW_SHARE * top]
         bends = np.concatenate([np.abs(_slope(run.seen[:, 4], 0.3)) for run in runs])
         return cls(
@@ -75,6 +78,18 @@ class Seen:
             angular_acc_dps2=max(1.0, float(np.quantile(bends, 0.995))),
             rest_rate_dps=max(0.05, float(np.quantile(slow, 0.99))) if len(slow) else 0.05,
         )
+
+
+def _held(run: Run) -> float:
+    """Speed, m/s, that a boat held although told to go faster: it can do no more; inf: it never did."""
+    over = round(HELD_S / STEP_S)
+    if len(run.seen) <= over:
+        return np.inf
+    gained = np.abs(run.seen[over:, 3] - run.seen[:-over, 3])
+    told = np.min([run.told[k : len(run.told) - over + k, 0] for k in range(0, over + 1, 5)], axis=0)
+    turned = np.abs(run.seen[over:, 2] - run.seen[:-over, 2])
+    held = (gained < HELD_MPS) & (turned < 5.0) & (told > run.seen[over:, 3] + FASTER_MPS) & (run.seen[over:, 3] > 0.3)
+    return float(np.median(run.seen[over:, 3][held])) if held.sum() >= 5 else np.inf
 
 
 def _slope(values: Array, over_s: float) -> Array:

@@ -88,9 +88,10 @@ def boats_of_rows(rows: ArrayLike) -> list[Boat]:
     """Read boats from the simulator's parameter rows.
 
     Args:
-        rows: (n, 38): kind 0 usv, 1 single, 2 double integrator, 3 rate; top speed, speed factor, max thrust, max rudder,
-            turn loss, turn rate, max acc, max dec, rotate speed; speed kp, ki, kd, integral limit, gain; heading kp, ki,
-            kd, integral limit; max turn rate, max angular acc; points of the thrust map, 8 thrusts, 8 speeds.
+        rows: (n, 38): kind 0 usv, 1 single, 2 double integrator, 3 rate; top speed, speed factor, max thrust, max
+            rudder, turn loss, turn rate, max acc, max dec, rotate speed; speed kp, ki, kd, integral limit, gain;
+            heading kp, ki, kd, integral limit; max turn rate, max angular acc; points of the thrust map, 8 thrusts, 8
+            speeds.
 
     Raises:
         OracleError: another shape, or values no boat can have.

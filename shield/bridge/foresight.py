@@ -1,8 +1,8 @@
 """What the model misses, measured while boats are steered: every turn what was foreseen is held against what came.
 
 The place that a boat is seen at now is compared with the one its model foretold 1, 2 and 3 s ago under the commands
-that were really sent since. Quantiles of these errors become the boat's margin, within bounds: a model that is off, a delay
-longer than declared, wind and waves all show there, whatever the cause.
+that were really sent since. Quantiles of these errors become the boat's margin, within bounds: a model that is off, a
+delay longer than declared, wind and waves all show there, whatever the cause.
 """
 
 from __future__ import annotations
