@@ -19,7 +19,7 @@ from .files import check_ending
 app = typer.Typer(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
 Named = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")]
 Begin = Annotated[str, typer.Option("--from", metavar="NAME", help="The platform to begin with.")]
-Out = Annotated[Path | None, typer.Option(metavar="FILE", help="Write there.", show_default="NAME.yaml")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write there.", show_default="NAME.yaml")]
 
 
 def file_of(name: str) -> PlatformFile:

@@ -98,7 +98,9 @@ def test_every_entry_of_a_platform_has_a_unit_and_a_word():
 @settings(max_examples=40, deadline=None, derandomize=True)
 def test_what_is_written_is_read_back_bit_for_bit(values):
     with reference_models():
-        platform = replace(get_platform("blueboat"), name='a "b" \\c', heading_pid=Gains(kp=values["max_acc"]), **values)
+        platform = replace(
+            get_platform("blueboat"), name='a "b" \\c', heading_pid=Gains(kp=values["max_acc"]), **values
+        )
         file = PlatformFile(platform, {"delay_s": values["turn_lag_s"]})
         assert parse_platform(to_text(file, "a head\nof two lines")) == file
 
