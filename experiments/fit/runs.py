@@ -19,6 +19,8 @@ SHORTEST_S = 3.0
 RATE_OVER_S = 0.2
 """Turn rates are taken over this time, s."""
 FASTEST_MPS = 40.0
+SAME_S = 1e-4
+"""Times closer together are the same."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,12 @@ def _grid(name: str, time_s: Array, seen: Array, told: Array) -> Run | None:
     time_s, seen, told = time_s[keep], seen[keep], told[keep]
     if len(time_s) < 4 or time_s[-1] - time_s[0] < SHORTEST_S:
         return None
+    time_s = time_s - time_s[0]  # seconds since 1970 leave no room for fractions
     grid = np.arange(time_s[0], time_s[-1], STEP_S)
     columns = [
         np.interp(grid, time_s, column) for column in (seen[:, 0], seen[:, 1], _unwrapped(seen[:, 2]), seen[:, 3])
     ]
-    last = np.searchsorted(time_s, grid + 1e-9, side="right") - 1  # commands hold until the next one
+    last = np.searchsorted(time_s, grid + SAME_S, side="right") - 1  # commands hold until the next one
     heading = _unwrapped(told[:, 1])
     heading = heading + 360.0 * np.round((columns[2][0] - heading[0]) / 360.0)
     commands = np.column_stack([told[last, 0], heading[last]])

@@ -8,7 +8,7 @@ import numpy as np
 from steerclear.shield.jit import Array
 
 from .errors import FitError
-from .runs import Run, runs_of
+from .runs import SAME_S, Run, runs_of
 
 SPENT_S = 1.0
 """A command not repeated for this long is no longer in force."""
@@ -76,6 +76,6 @@ def _between(stream: Array, times: Array, angle: bool) -> Array:
 
 def _held(stream: Array, times: Array, holds_s: float) -> Array:
     """The last value told before each time, NaN where that is too long ago."""
-    last = np.searchsorted(stream[0], times + 1e-9, side="right") - 1
+    last = np.searchsorted(stream[0], times + SAME_S, side="right") - 1
     known = (last >= 0) & (times - stream[0][np.maximum(last, 0)] <= holds_s)
     return np.where(known, stream[1][np.maximum(last, 0)], np.nan)

@@ -239,5 +239,5 @@ def _check_limits(fleet: FleetSettings) -> None:
     for name, first, second in later:
         if second < first:
             raise FleetFileError(
-                f"limits.{name} is {second} s, before the first response, {first} s; give it at least that"
+                f"limits.{name} is {second} s, before {'after_s' if name.startswith('model') else 'max_age_s'}, {first} s; give it at least that"
             )

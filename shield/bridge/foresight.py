@@ -34,6 +34,8 @@ WIDEN_MPS = 0.1
 """A margin changes no faster, m/s: a jump of it would look like a breach."""
 WORTH_TELLING_M = 0.15
 """Margins beyond what was declared by more than this are told."""
+ROUNDING_M = 0.05
+"""Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
 FRESH_S = 0.3
 """Places older than this are no measurement, s."""
 
@@ -113,7 +115,9 @@ class Foresight:
                 outside = missed > self._limit.outside_m
                 change = self._dt_s if outside else -self._dt_s
                 self._outside_s[i] = max(0.0, self._outside_s[i] + change)
-            goal = max(float(self._declared_m[i]), min(self.quantile_m(name), self._limit.widest_m))
+            missed_m = self.quantile_m(name)
+            missed_m = missed_m if missed_m > ROUNDING_M else 0.0
+            goal = max(float(self._declared_m[i]), min(missed_m, self._limit.widest_m))
             step = WIDEN_MPS * self._dt_s
             self.margin_m[name] += min(max(goal - self.margin_m[name], -step), step)
 
