@@ -17,13 +17,16 @@ from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.evaluate import evaluate
+from .commands.fit import fit
 from .commands.parity import parity
+from .commands.platform import app as platform_app
 from .commands.play import play
 from .commands.preflight import preflight
 from .commands.reach import app as reach_app
 from .commands.referee import referee
 from .commands.render import render
 from .commands.replay import replay
+from .commands.sea_trial import sea_trial
 from .commands.sim_boats import sim_boats
 from .commands.warm_up import warm_up
 from .provenance import package_version
@@ -50,12 +53,15 @@ for function in (
     preflight,
     replay,
     referee,
+    fit,
     docs,
 ):
     app.command()(function)
 app.command("sim-boats")(sim_boats)
+app.command("sea-trial")(sea_trial)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
+app.add_typer(platform_app, name="platform")
 
 
 def _show_version(wanted: bool) -> None:

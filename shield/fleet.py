@@ -16,6 +16,7 @@ from .hints import look_at_headings, look_at_positions
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform, get_platform
 from .platforms import layout as L
+from .platforms.files import is_path
 
 _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
 
@@ -301,7 +302,7 @@ def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tupl
         if not isinstance(kind, (str, Platform)):
             raise FleetError(f"platforms holds {kind!r}; give names of platforms, or Platform objects")
         get_platform(kind)
-    return kinds
+    return tuple(get_platform(kind) if isinstance(kind, str) and is_path(kind) else kind for kind in kinds)
 
 
 def _yes_or_no(name: str, value: ArrayLike, n: int) -> BoolArray:

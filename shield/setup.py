@@ -110,7 +110,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             ready_thrust=_ready_thrust(params, limits, with_table),
             stride=stride,
             sample_s=stride * config.dt_s,
-            plans=np.where(with_table, len(certificate.plans), certificate.nimble),
+            plans=np.array([certificate.ways(*boat) for boat in zip(kinds, with_table, strict=True)], dtype=np.int64),
             decay=np.where(
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
             ),
@@ -136,7 +136,10 @@ def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], 
     certificate, sides = CERTIFICATES[config.certificate], np.array(team)
     wanted = certificate.hunters and config.feared_s > 0.0
     limits = [limits_of(get_platform(name), config.dt_s) for name in platforms]
-    looks = np.array([wanted and certificate.looks_up(limit) for limit in limits], dtype=np.bool_)
+    kinds = [get_platform(name) for name in platforms]
+    looks = np.array(
+        [wanted and _looks_up(config, kind, limit) for kind, limit in zip(kinds, limits, strict=True)], dtype=np.bool_
+    )
     found: BoolArray = boats_of(config, platforms, team).table >= 0
     missing: BoolArray = looks[:, None] & (sides[:, None] != sides[None]) & ~found
     missing.setflags(write=False)  # all shields of such a fleet tell the same one
@@ -216,7 +219,7 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
     found: dict[tuple[Platform, Platform], int] = {}
     tables: list[ValueTable] = []
     for i, own in enumerate(kinds):
-        if not CERTIFICATES[config.certificate].looks_up(limits_of(own, config.dt_s)):
+        if not _looks_up(config, own, limits_of(own, config.dt_s)):
             continue
         for j, other in enumerate(kinds):
             if team[i] == team[j]:
@@ -231,6 +234,11 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
     steps = max((round(table.card.dt_s / config.dt_s) for table in tables), default=1)
     enough_m = _widest_m(config) + config.table_margin_m + config.margin_cap_m
     return _LookedUp(stack_tables(tables), looked.table, max(1, steps), ranges_told_m(tables, enough_m))
+
+
+def _looks_up(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:
+    """Whether a boat looks opponents up where there is a table; there is none for boats that turn by a rate loop."""
+    return kind.kind != "rate" and CERTIFICATES[config.certificate].looks_up(limit)
 
 
 @lru_cache(maxsize=64)

@@ -20,7 +20,7 @@ from steerclear.shield.platforms import layout as L
 
 from .assembly import build_boats, build_world, check_boats
 from .boat import Boat, Setting
-from .from_file import as_fleet, boats_of, settings_of
+from .from_file import Hulls, as_fleet, boats_of, settings_of
 from .hub import PositionHub
 from .hull import STEP_S
 from .pace import Pace
@@ -109,12 +109,15 @@ class SimFleet:
         self._world.record_radius_m = separation_m if record else None
 
     @classmethod
-    def from_file(cls, fleet: FleetFile | str | Path, *, opponents: str = "medium", **settings: Any) -> SimFleet:
+    def from_file(
+        cls, fleet: FleetFile | str | Path, *, opponents: str = "medium", hulls: Hulls | None = None, **settings: Any
+    ) -> SimFleet:
         """The boats of a FLEET.yaml: those with a link obey it, the others are driven.
 
         Args:
             fleet: the file, read or to be read.
             opponents: scripted policy of the boats of the game that the file's runner does not command.
+            hulls: what a boat, by its name and its platform of the file, really is; None: what the file says.
             **settings: of `SimFleet`, beside or instead of what the file says.
 
         Raises:
@@ -122,7 +125,7 @@ class SimFleet:
             ConfigError: a setting cannot be used.
         """
         file = as_fleet(fleet)
-        return cls(boats_of(file, opponents), **{**settings_of(file), **settings})
+        return cls(boats_of(file, opponents, hulls), **{**settings_of(file), **settings})
 
     @property
     def addresses(self) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,14 @@ from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.fleet_settings import BoatSettings
 from steerclear.shield.bridge.mavlink.signing import read_key
+from steerclear.shield.platforms import Platform
 
 from .hull import STEP_S
 from .settings import SimBoat
 
 _APART_M = 6.0
+
+Hulls = Callable[[str, Platform], Platform]
 
 
 def as_fleet(fleet: FleetFile | str | Path) -> FleetFile:
@@ -25,19 +29,21 @@ def as_fleet(fleet: FleetFile | str | Path) -> FleetFile:
     return fleet if isinstance(fleet, FleetFile) else load_fleet(fleet)
 
 
-def boats_of(fleet: FleetFile, opponents: str) -> list[SimBoat]:
+def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> list[SimBoat]:
     """The boats of a file; those of the game that the file's runner does not command are driven by ``opponents``.
 
-    One of these that has a link tells where it is there, and obeys it as soon as it is commanded.
+    One of these that has a link tells where it is there, and obeys it as soon as it is commanded. ``hulls`` says what a
+    boat, by its name and its platform of the file, really is.
     """
     boats = []
     commanded = {boat.name for boat in _commanded(fleet)}
     for i, boat in enumerate(fleet.boats):
+        platform = fleet.platform_of[boat.name]
         driven = boat.agent is not None and boat.name not in commanded
         boats.append(
             SimBoat(
                 name=boat.name,
-                platform=fleet.platform_of[boat.name],
+                platform=platform if hulls is None else hulls(boat.name, platform),
                 team=fleet.team_of[boat.name],
                 system_id=0 if boat.link is None else boat.link.system_id,
                 address=None if boat.link is None else boat.link.address,

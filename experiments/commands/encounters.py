@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import PLATFORMS, get_platform
+from steerclear.shield.platforms.files import is_path
 
 from ..encounters.campaign import Campaign, Pair, Settings
 from ..encounters.families import FAMILIES
@@ -124,13 +126,27 @@ def platform_pairs(text: str) -> tuple[Pair, ...]:
     """
     pairs = []
     for piece in filter(None, (part.strip() for part in text.split(","))):
-        own, _, other = piece.partition("/")
-        if not own or "/" in other or piece.endswith("/"):
-            raise ConfigError(f"--platform holds {piece!r}; write a name, or own/other")
-        pairs.append((own, other or own))
+        pairs.append(_pair(piece))
     if not pairs:
         raise ConfigError("--platform names no platform; write e.g. heron,surveyor")
     return tuple(dict.fromkeys(pairs))
+
+
+def _pair(piece: str) -> Pair:
+    """One pair; a platform may be a file, whose path may have slashes of its own."""
+    if is_path(piece) and Path(piece).is_file():
+        return piece, piece
+    for k in (k for k, letter in enumerate(piece) if letter == "/"):
+        own, other = piece[:k], piece[k + 1 :]
+        known = [name in PLATFORMS or (is_path(name) and Path(name).is_file()) for name in (own, other)]
+        if all(known):
+            return own, other
+    own, _, other = piece.partition("/")
+    if is_path(piece):
+        get_platform(piece)  # says why it cannot be read
+    if not own or "/" in other or piece.endswith("/"):
+        raise ConfigError(f"--platform holds {piece!r}; write a name, a file, or own/other")
+    return own, other or own
 
 
 def family_names(text: str) -> tuple[str, ...]:

@@ -15,10 +15,13 @@ from rich.text import Text
 from steerclear.env.record import save
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.exceptions import BridgeError, ConfigError
+from steerclear.shield.platforms import Platform, get_platform
 
 from ..boats import AutopilotSettings, RadioSettings, SimFleet, Water
 from ..boats.demo import demo_fleet
+from ..boats.from_file import Hulls
 from ..boats.incidents import Plan, parse_incident
+from ..boats.off import off_platform
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from ..deploy.lifeline import end_with_parent
 from ..store import write_json
@@ -53,6 +56,10 @@ Fault = Annotated[
 RecordFile = Annotated[
     Path | None, typer.Option("--record", metavar="FILE", help="Write what really happened (.npz) for render.")
 ]
+Really = Annotated[
+    str | None, typer.Option(metavar="NAME|FILE", help="What our boats really are, whatever their platforms say.")
+]
+Off = Annotated[float, typer.Option(metavar="SHARE", help="Our boats' parameters are off by this, 0.2: 20 %.")]
 Remote = Annotated[bool, typer.Option("--allow-remote", help="Let links and feed leave this machine.")]
 Check = Annotated[
     bool, typer.Option("--check", help="Exit with status 1 after a breach of team-mates or an avoidable one.")
@@ -80,6 +87,8 @@ def sim_boats(
     record: RecordFile = None,
     allow_remote: Remote = False,
     check: Check = False,
+    really: Really = None,
+    off: Off = 0.0,
     with_parent: d.WithParent = False,
     json_file: o.JsonFile = None,
 ) -> None:
@@ -94,7 +103,7 @@ def sim_boats(
         "fleet": None if fleet is None else str(fleet),
         **{"speed": speed, "wind": wind, "current": current, "noise": noise, "loss": loss, "delay": delay},
         **{"jitter": jitter, "seed": seed, "duration": duration, "boot": boot, "opponents": opponents},
-        **{"no_wait": no_wait, "random_start": random_start, "fault": fault or []},
+        **{"really": really, "off": off, "no_wait": no_wait, "random_start": random_start, "fault": fault or []},
     }
     check_ending(record, "--record", (".npz",))
     if duration is not None and not 0.0 < duration < math.inf:
@@ -113,6 +122,7 @@ def sim_boats(
         waits=not no_wait,
         random_start=random_start,
         allow_remote=allow_remote,
+        hulls=_hulls(file, really, off, seed),
     )
     started = time.perf_counter()
     try:
@@ -136,6 +146,21 @@ def _file(path: Path | None, demo: bool) -> FleetFile:
     if (path is None) != demo:
         raise ConfigError("give a FLEET.yaml, or --demo for the one that comes with the package")
     return demo_fleet() if path is None else load_fleet(path)
+
+
+def _hulls(file: FleetFile, really: str | None, off: float, seed: int) -> Hulls | None:
+    """What boats of our team really are."""
+    if really is None and off == 0.0:
+        return None
+    ours = {boat.name for boat in file.ours}
+    true = None if really is None else get_platform(really)
+
+    def hull(name: str, platform: Platform) -> Platform:
+        return off_platform(true or platform, off, name, seed) if name in ours else platform
+
+    for name in ours:
+        hull(name, file.platform_of[name])  # what cannot be is refused before anything is opened
+    return hull
 
 
 def _water(wind: str, current: str) -> Water:

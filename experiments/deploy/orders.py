@@ -108,7 +108,7 @@ class Surface:
 
 
 def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
-    """The file, with the delay the last drill measured where it declares none, and its text.
+    """The file, with the delay the last drill or a fit measured where it declares none, and its text.
 
     Raises:
         FleetFileError: it cannot be used, or there is nothing to command.
@@ -122,9 +122,17 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)
     if "delay_s" not in fleet.shield:
-        measured = measured_delay_s(fleet, orders.boat)
-        fleet = fleet.with_shield(delay_s=fleet.dt_s if measured is None else measured)
+        fleet = fleet.with_shield(delay_s=_delay_s(fleet, orders.boat))
     return fleet, text
+
+
+def _delay_s(fleet: FleetFile, boat: str | None) -> float:
+    """What the last drill measured, else the longest that the platforms' files say; one step where nobody says."""
+    drilled = measured_delay_s(fleet, boat)
+    if drilled is not None:
+        return drilled
+    told = [fleet.measured_of(entry.name).get("delay_s", 0.0) for entry in fleet.commanded(boat)]
+    return max(fleet.dt_s, *told)
 
 
 def check_accepted(checks: Sequence[Check], accept: Sequence[str], elsewhere: Sequence[str] = ()) -> None:

@@ -105,6 +105,7 @@ def _run(
             outcome.ended = loop.run(None if orders.minutes is None else 60.0 * orders.minutes)
         outcome.near = loop.near
         outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
+        outcome.figures |= {f"margin_{name}_m": margin for name, margin in loop.foresight.margin_m.items()}
         outcome.figures |= {f"delay_{name}_s": delay for name, delay in loop.delays.measured_s().items()}
 
 

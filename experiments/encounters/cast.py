@@ -35,7 +35,8 @@ class Cast:
     """
 
     def __init__(self, own: str, other: str, conditions: Conditions, seed: int, family: str, number: int) -> None:
-        self.own, self.other = get_platform(own).name, get_platform(other).name
+        get_platform(own), get_platform(other)  # unknown ones are refused here
+        self.own, self.other = own, other
         self.radius_m = conditions.radius_m
         tag = crc32(f"{family}|{own}|{other}".encode())
         self.rng = np.random.default_rng([seed, tag, number])

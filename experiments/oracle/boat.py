@@ -18,7 +18,7 @@ N_STATE = 11
 turn rate."""
 MEMORY = (6, 8)
 """Columns that are NaN as long as the controller has not run."""
-KINDS = ("usv", "single_integrator", "double_integrator")
+KINDS = ("usv", "single_integrator", "double_integrator", "rate")
 _N_ROW = 38
 _N_PLAIN = 21
 _MAP_POINTS = 8
@@ -29,7 +29,9 @@ class Boat:
     """A boat and its autopilot. Speeds m/s, accelerations m/s2, angles deg, thrust and rudder percent.
 
     Attributes:
-        kind: "usv" (thrust and rudder), "single_integrator" or "double_integrator".
+        kind: "usv" (thrust and rudder), "single_integrator", "double_integrator" or "rate" (turns by a rate loop: max
+            rudder is its turn rate at rest, deg/s, turn rate what it gains with speed, deg/s per m/s, the heading
+            controller's kp what is asked for per deg of error, 1/s; kd of both controllers are lags, s).
         max_speed_mps: top speed.
         speed_factor: thrust per commanded speed; 0: a speed controller changes the thrust instead.
         max_thrust: largest thrust.
@@ -86,9 +88,10 @@ def boats_of_rows(rows: ArrayLike) -> list[Boat]:
     """Read boats from the simulator's parameter rows.
 
     Args:
-        rows: (n, 38): kind 0 usv, 1 single, 2 double integrator; top speed, speed factor, max thrust, max rudder, turn
-            loss, turn rate, max acc, max dec, rotate speed; speed kp, ki, kd, integral limit, gain; heading kp, ki,
-            kd, integral limit; max turn rate, max angular acc; points of the thrust map, 8 thrusts, 8 speeds.
+        rows: (n, 38): kind 0 usv, 1 single, 2 double integrator, 3 rate; top speed, speed factor, max thrust, max
+            rudder, turn loss, turn rate, max acc, max dec, rotate speed; speed kp, ki, kd, integral limit, gain;
+            heading kp, ki, kd, integral limit; max turn rate, max angular acc; points of the thrust map, 8 thrusts, 8
+            speeds.
 
     Raises:
         OracleError: another shape, or values no boat can have.

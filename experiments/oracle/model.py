@@ -82,12 +82,45 @@ def _hull(p: Array, s: Array, dt_s: float) -> None:
 def _integrate(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
     if p[0] == 1.0:
         speed, rate = within(speed_mps, p[1]), within(error_deg / dt_s, p[19])
+    elif p[0] == 3.0:
+        speed, rate = _rate_loop(p, s, speed_mps, _asked(p, error_deg - 0.5 * dt_s * s[10]), dt_s)
+        s[10] = rate
     else:
         speed = within(s[3] + dt_s * within((speed_mps - s[3]) / dt_s, p[7]), p[1])
         rate = within(s[10] + dt_s * within((error_deg / dt_s - s[10]) / dt_s, p[20]), p[19])
         s[10] = rate
     _go(s, 0.5 * (speed + s[3]), rate * dt_s, dt_s)
     s[3] = max(0.0, min(speed, p[1]))
+
+
+@compiled
+def _lag(lag_s: float, dt_s: float) -> float:
+    return 1.0 if lag_s <= 0.0 else 1.0 - math.exp(-dt_s / lag_s)
+
+
+@compiled
+def _turns(p: Array, speed_mps: float) -> float:
+    """Highest turn rate at a speed, deg/s."""
+    return max(0.0, min(p[19], p[4] + p[6] * speed_mps))
+
+
+@compiled
+def _asked(p: Array, error_deg: float) -> float:
+    """Turn rate that a heading error asks for: kp e, beyond a corner its square root (ArduPilot)."""
+    corner = p[20] / p[15] ** 2
+    rate = p[15] * abs(error_deg)
+    if abs(error_deg) > corner:
+        rate = math.sqrt(p[20] * (2.0 * abs(error_deg) - corner))
+    return math.copysign(rate, error_deg)
+
+
+@compiled
+def _rate_loop(p: Array, s: Array, speed_mps: float, asked_dps: float, dt_s: float) -> tuple[float, float]:
+    """Speed and turn rate of a rate-controlled boat after a step."""
+    rate = s[10] + within(_lag(p[17], dt_s) * (within(asked_dps, _turns(p, s[3])) - s[10]), p[20] * dt_s)
+    wanted = max(0.0, min(speed_mps, p[1])) * max(0.0, 1.0 - p[5] * abs(rate) / p[19])
+    change = _lag(p[12], dt_s) * (wanted - s[3])
+    return s[3] + max(-p[8] * dt_s, min(p[7] * dt_s, change)), rate
 
 
 @compiled
@@ -144,6 +177,12 @@ def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> t
         speed = s[4] / p[2] if p[0] == 0.0 and p[2] != 0.0 else s[3]
     else:
         speed = 0.0 if choice == DOWN else p[1]
+    if p[0] == 3.0:
+        asked = rudder * _turns(p, s[3])
+        error = abs(asked) / p[15]
+        if error > p[20] / p[15] ** 2:
+            error = 0.5 * (asked**2 / p[20] + p[20] / p[15] ** 2)
+        return speed, within(math.copysign(error, asked) + 0.5 * dt_s * s[10], LARGEST_ERROR_DEG)
     if p[0] != 0.0:
         return speed, within(rudder * p[19] * dt_s, LARGEST_ERROR_DEG)
     return speed, within(_error_for(p, s, rudder * min(p[4], 100.0), dt_s), LARGEST_ERROR_DEG)

@@ -37,6 +37,9 @@ SPENT_S = 1.0
 LONGEST_GAP_STEPS = 50
 """Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
 
+RATE_AGE_S, RATE_ROUNDING_DPS, RATE_GAIN = 0.15, 2.0, 0.3
+"""Turn rates told are taken when no older, s; smaller differences, deg/s, are left alone; of larger ones this share."""
+
 _SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
 
 
@@ -67,6 +70,7 @@ class Estimator:
     def __init__(self, platform: Platform, dt_s: float, delay_s: float) -> None:
         self._params = platform.pack()
         self._dt_s, self._delay_s = dt_s, delay_s
+        self._turns_by_rate = self._params[L.KIND] == L.KIND_RATE
         self._row: Array | None = None
         self._deaf: Array | None = None
         self._last_heard: tuple[float, float] | None = None
@@ -124,14 +128,25 @@ class Estimator:
         difference[np.abs(difference) <= ROUNDING] = 0.0
         if difference.any():
             self._shift(GAIN * difference)
+        self._correct_rate(reading)
         self._fixed_s = np.maximum(self._fixed_s, fixed_s)
         self._deaf, self._last_heard = self._row.copy(), self._in_effect(self._time_s)
+
+    def _correct_rate(self, reading: BoatReading) -> None:
+        """Bring the turn rate of a rate-controlled boat, all that its steering remembers, nearer to telemetry."""
+        if self._row is None or not self._turns_by_rate or not reading.turn_rate_age_s <= RATE_AGE_S:
+            return
+        off = math.degrees(reading.turn_rate_rads) - self._row[L.TURN_RATE]
+        if abs(off) > RATE_ROUNDING_DPS:
+            self._row[L.TURN_RATE] += RATE_GAIN * off
 
     def start(self, reading: BoatReading) -> None:
         """Begin afresh where the reading says: the boat is taken to hold its course and speed."""
         x, y, heading_deg, speed = _run_on(_measured(reading), reading.read_s - _times(reading))
         row = fresh_state(x, y, heading_deg, speed)
         row[L.THRUST] = thrust_at(self._params, speed)
+        if self._turns_by_rate and math.isfinite(reading.turn_rate_rads):
+            row[L.TURN_RATE] = math.degrees(reading.turn_rate_rads)
         self._row, self._deaf = row, row.copy()
         self._fixed_s, self._time_s = _times(reading), reading.read_s
         self._last_heard = self._in_effect(self._time_s)

@@ -235,8 +235,11 @@ def _check_limits(fleet: FleetSettings) -> None:
     later: tuple[tuple[str, float, float], ...] = (
         ("navigation.lost_after_s", limits.navigation.max_age_s, limits.navigation.lost_after_s),
         ("contact.lost_after_s", limits.contact.max_age_s, limits.contact.lost_after_s),
+        ("model.give_up_after_s", limits.model.after_s, limits.model.give_up_after_s),
         ("policy.give_up_after_s", limits.policy.max_age_s, limits.policy.give_up_after_s),
     )
     for name, first, second in later:
         if second < first:
-            raise FleetFileError(f"limits.{name} is {second} s, before max_age_s, {first} s; give it at least that")
+            raise FleetFileError(
+                f"limits.{name} is {second} s, before {'after_s' if name.startswith('model') else 'max_age_s'}, {first} s; give it at least that"
+            )

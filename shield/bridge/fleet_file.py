@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from ..config import ShieldConfig
 from ..exceptions import FleetFileError
 from ..platforms import Platform
+from ..platforms.files import is_path, load_platform
 from ..surroundings import Surroundings
 from .fleet_checks import check_fleet, platform_of, shield_config
 from .fleet_messages import explain
@@ -84,7 +85,13 @@ class FleetFile(FleetSettings):
     def kind_of(self) -> Mapping[str, str | Platform]:
         """Platform of each boat as fleets have it: its name, or the platform itself when the file describes it."""
         kinds = {boat.name: boat.platform for boat in self.boats}
-        return {name: self.platform_of[name] if kind in self.platforms else kind for name, kind in kinds.items()}
+        described = {name: kind in self.platforms or is_path(kind) for name, kind in kinds.items()}
+        return {name: self.platform_of[name] if described[name] else kind for name, kind in kinds.items()}
+
+    def measured_of(self, name: str) -> Mapping[str, float]:
+        """What a fit measured of a boat, from its platform's file; empty: nothing."""
+        kind = self.boat(name).platform
+        return load_platform(kind).measured if is_path(kind) and kind not in self.platforms else {}
 
     @cached_property
     def team_of(self) -> Mapping[str, int]:
@@ -234,4 +241,10 @@ def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:
     update: dict[str, Any] = {"log_dir": folder / fleet.log_dir}
     if fleet.signing is not None:
         update["signing"] = fleet.signing.model_copy(update={"key_file": folder / fleet.signing.key_file})
-    return fleet.model_copy(update=update)
+    boats = tuple(_with_root(boat, folder) if boat.platform not in fleet.platforms else boat for boat in fleet.boats)
+    return fleet.model_copy(update={**update, "boats": boats})
+
+
+def _with_root(boat: BoatSettings, folder: Path) -> BoatSettings:
+    """The boat with the path of its platform's file rooted."""
+    return boat.model_copy(update={"platform": str(folder / boat.platform)}) if is_path(boat.platform) else boat

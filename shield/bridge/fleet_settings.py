@@ -88,7 +88,7 @@ class BoatSettings(Section):
     name: Name
     agent: Annotated[str, Field(pattern=r"^agent_[0-9]{1,4}$", description="give agent_0, agent_1, ...")] | None = None
     team: Literal["blue", "red"] | None = Field(None, description="give blue or red")
-    platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron")]
+    platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron, or its file")]
     link: LinkSettings | None = None
     contact: Literal["feed", "telemetry"] | None = Field(None, description="give feed or telemetry")
     commanded: bool = True
@@ -164,6 +164,21 @@ class LogLimit(Section):
     then: LogResponse = "hold_station"
 
 
+class ModelLimit(Section):
+    """What a boat's model may miss, see `foresight`.
+
+    ``widest_m``: bound on the margin that measured errors give a boat. A boat more than ``outside_m`` from where it was
+    foreseen 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.
+    """
+
+    widest_m: Annotated[float, Field(ge=0.0, le=10.0, description="give metres, 0 to 10")] = 1.0
+    outside_m: Length = 1.5
+    after_s: Seconds = 3.0
+    then: Response = "slow"
+    give_up_after_s: Seconds = 15.0
+    give_up_then: Response = "stop"
+
+
 class Limits(Section):
     """How old things may be, s, and what happens beyond."""
 
@@ -174,6 +189,7 @@ class Limits(Section):
     game: AgeLimit = AgeLimit(max_age_s=2.0, then="hold_station")
     geofence: FenceLimit = FenceLimit()
     log: LogLimit = LogLimit()
+    model: ModelLimit = ModelLimit()
 
 
 class End(Section):

@@ -37,6 +37,7 @@ class Seen:
         log_fault: why ticks can no longer be recorded; empty: they are.
         overrides: in force.
         alarms: what is wrong with those who tell where boats are.
+        outside_s: how long each own boat has been far outside its model, s.
     """
 
     readings: Mapping[str, BoatReading]
@@ -50,6 +51,7 @@ class Seen:
     log_fault: str = ""
     overrides: tuple[Override, ...] = ()
     alarms: tuple[Alarm, ...] = ()
+    outside_s: Mapping[str, float] = field(default_factory=dict)
 
     def overridden(self, condition: str, subject: str) -> bool:
         """Whether the operator switched this response off."""
@@ -132,10 +134,23 @@ def _judge_own(fleet: FleetFile, roster: Roster, seen: Seen, boat: str, verdict:
     if boat in seen.rivals and not seen.overridden("commander", boat):
         text = f"{boat}: somebody else commands it too, or its steering fails"
         verdict.due(Action(boat, "commander", limits.link.then, text), (boat,))
+    _judge_model(fleet, seen, boat, verdict)
     track = roster.track(boat)
     outside = track is not None and not fleet.geofence.holds(float(track.row[0]), float(track.row[1]))
     if outside and not seen.overridden("geofence", boat):
         verdict.due(Action(boat, "geofence", limits.geofence.then, f"{boat} is outside the geofence"), (boat,))
+
+
+def _judge_model(fleet: FleetFile, seen: Seen, boat: str, verdict: Verdict) -> None:
+    limit, lasts_s = fleet.limits.model, seen.outside_s.get(boat, 0.0)
+    if lasts_s < limit.after_s or seen.overridden("model", boat):
+        return
+    text = f"{boat} is more than {limit.outside_m:g} m from where its platform says, for {lasts_s:.0f} s"
+    if lasts_s < limit.give_up_after_s:
+        verdict.due(Action(boat, "model", limit.then, text), (boat,))
+        return
+    text += ": handed over, take it by hand, and fit its platform anew"
+    verdict.due(Action(boat, "model", limit.give_up_then, text), (boat,))
 
 
 def _judge_policy(fleet: FleetFile, seen: Seen, boat: str, verdict: Verdict) -> None:

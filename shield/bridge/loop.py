@@ -12,6 +12,7 @@ from .assemble import seen_now
 from .clock import Clock
 from .contact import Contact, alarms_of, heard_from
 from .fleet_file import FleetFile
+from .foresight import Foresight
 from .freshness import RIVAL_S, Seen, Verdict, judge
 from .handover import at_rest, nearing
 from .helm import Helm, Steered
@@ -61,6 +62,7 @@ class Loop:
         self.roster = Roster(fleet, parts.links)
         chosen = Shield(fleet.shield_config, fleet.surroundings) if shield is None else shield
         self.delays = Delays({name: fleet.platform_of[name] for name in parts.links}, fleet.shield_config)
+        self.foresight = Foresight(fleet, tuple(parts.links))
         self._helm = Helm(fleet, chosen, parts.links, clock, Water(fleet, parts.grounds))
         self._watch = PolicyWatch(fleet, tuple(parts.links))
         self._has_referee = fleet.feed is not None and fleet.feed.referee is not None
@@ -147,6 +149,8 @@ class Loop:
         self._retaking.look(self.operator.take_requests(), readings, began, self._no_taking())
         contacts = self._contacts()
         self.roster.update(began, readings, contacts)
+        self.foresight.update(self.roster.own_rows(), readings)
+        self.roster.margin_m = self.foresight.margin_m
         answer, policy_age, fault = _latest(self.parts.policy)
         self._watch.update(began, answer, policy_age, fault)
         game, game_age = self._game()
@@ -154,6 +158,7 @@ class Loop:
         steered = self._steer(answer, verdict, game, game_age)
         self.roster.sent(began, steered.sent)
         self.delays.update(readings, steered.sent)
+        self.foresight.sent(steered.sent)
         tick = Tick(
             number=self._number,
             due_s=due_s,
@@ -174,6 +179,7 @@ class Loop:
                 *verdict.actions,
                 *steered.actions,
                 *self.delays.actions(),
+                *self.foresight.actions(),
             ),
             game={} if game is None else game.as_dict(),
         )
@@ -211,6 +217,7 @@ class Loop:
             game_over=game is not None and game.over,
             log_fault=self._recorder.fault,
             overrides=self.operator.active(now_s),
+            outside_s={name: self.foresight.outside_s(name) for name in readings},
             alarms=(*self.roster.alarms(), *(alarm for each in self.parts.contacts for alarm in alarms_of(each))),
         )
 

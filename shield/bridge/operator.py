@@ -20,6 +20,7 @@ DISABLES = {
     "game": "the response to an old state of the game; the policy goes on with what it last saw",
     "geofence": "the response to leaving the geofence; the shield still turns boats back at the edge",
     "log": "the response to a black box that cannot be written; what follows is not recorded",
+    "model": "the response to a boat far outside its model; the shield foretells it wrongly",
     "commander": "the response to a second commander; both steer the boat",
 }
 """What can be overridden, and what that switches off. The shield itself, own navigation and lost links cannot be."""

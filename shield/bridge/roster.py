@@ -68,6 +68,8 @@ class Roster:
         self._faults: dict[str, str] = {}
         self._told_s: dict[tuple[str, str], float] = {}
         self._now_s = -math.inf
+        self.margin_m: Mapping[str, float] = {}
+        """Margins of own boats for what their models miss, m, see `foresight`."""
 
     @property
     def faults(self) -> Mapping[str, str]:
@@ -103,6 +105,15 @@ class Roster:
             if own is None or (seen is not None and seen.age_s < own.age_s):
                 return seen
         return own
+
+    def own_rows(self) -> dict[str, Array | None]:
+        """State of each own boat as its model and telemetry have it; None: not known, or its telemetry is old."""
+        found: dict[str, Array | None] = {}
+        for name, estimator in self._estimators.items():
+            estimate = estimator.estimate(self._now_s)
+            old = self.navigation_age_s(name) > self.fleet.limits.navigation.max_age_s
+            found[name] = None if estimate is None or old or name in self._faults else estimate.row
+        return found
 
     def navigation_age_s(self, name: str) -> float:
         """Age of an own boat's telemetry, s; inf: nothing yet."""
@@ -140,7 +151,8 @@ class Roster:
         estimate = None if estimator is None else estimator.estimate(self._now_s)
         if estimate is None:
             return None
-        error = max(self.fleet.shield_config.position_error_m, self._fed_m.get(name, 0.0))
+        declared_m = max(self.fleet.shield_config.position_error_m, self.margin_m.get(name, 0.0))
+        error = max(declared_m, self._fed_m.get(name, 0.0))
         stale = estimate.age_s > self.fleet.limits.navigation.max_age_s
         return Track(estimate.row, 0.0, estimate.age_s, error + estimate.spread_m * stale)
 

@@ -22,6 +22,10 @@ GENTLE_TURNS_DEG = (30.0, 90.0, 180.0)
 GENTLE_SHARES = (0.75, 0.5, 0.25)
 """Turns and rudders that boats with a value table look at besides: a hard turn costs speed, and with it room."""
 
+SLOWING_TURNS_DEG = (45.0, 90.0, 180.0)
+SLOWING_SPEEDS = (0.5, 0.0)
+"""Turns made at less than full speed, which boats that steer without thrust look at besides, see `Certificate.ways`."""
+
 SLOW_TO_REGAIN_S = 5.0
 """Boats that take longer than this to be up to speed again are looked up under the certificate "auto".
 
@@ -47,6 +51,7 @@ class Certificate:
         braking: whether the horizon is the stopping time rather than the time of a turn.
         hunters: whether opponents are granted a turn against us.
         tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
+        slowing: number of manoeuvres, the last ones, for boats that steer without thrust.
     """
 
     name: str
@@ -55,16 +60,22 @@ class Certificate:
     braking: bool
     hunters: bool
     tables: str = "none"
+    slowing: int = 0
 
     def horizon_s(self, platform: Platform, dt_s: float) -> float:
         """Time over which the manoeuvres are followed, s."""
         limits = limits_of(platform, dt_s)
         return limits.stop_s + 1.0 if self.braking else limits.half_turn_s + REACTION_S
 
-    @property
-    def nimble(self) -> int:
-        """Number of manoeuvres, the first ones, that boats without a value table look at."""
-        return int((np.abs(self.plans[:, 0]) == 1.0).sum())
+    def ways(self, platform: Platform, with_table: bool) -> int:
+        """Number of manoeuvres, the first ones, that a boat looks at.
+
+        The last ones, ``slowing``, are for boats that turn whatever their thrust: others lose their rudder with it.
+        """
+        if platform.kind == "rate":
+            return len(self.plans)
+        tabled = len(self.plans) - self.slowing
+        return tabled if with_table else int((np.abs(self.plans[:tabled, 0]) == 1.0).sum())
 
     def looks_up(self, limits: Limits) -> bool:
         """Whether a boat looks opponents up where there is a table."""
@@ -77,6 +88,10 @@ class Certificate:
         return min(LONGEST_HUNT_S, limits.half_turn_s + REACTION_S + regain_s)
 
 
+SLOWING = [(1.0, 0.0, 0.5)]
+SLOWING += [(side, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for side in (1.0, -1.0)]
+
+
 def _turning_family(gentle: bool = False) -> Array:
     rows = [(1.0, 0.0, COMMANDED)]
     for turn in TURNS_DEG:
@@ -85,7 +100,7 @@ def _turning_family(gentle: bool = False) -> Array:
     for share in GENTLE_SHARES if gentle else ():
         for turn in GENTLE_TURNS_DEG:
             rows += [(share, turn, 1.0), (-share, turn, 1.0)]
-    return np.array(rows)
+    return np.array(rows + SLOWING)
 
 
 BRAKING = Certificate(
@@ -102,6 +117,7 @@ TURNING_CIRCLE = Certificate(
     _turning_family(),
     braking=False,
     hunters=True,
+    slowing=len(SLOWING),
 )
 
 VALUE_TABLE = Certificate(
@@ -111,6 +127,7 @@ VALUE_TABLE = Certificate(
     braking=False,
     hunters=True,
     tables="all",
+    slowing=len(SLOWING),
 )
 
 AUTO = replace(

@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import Array, lean_kernel
 from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
+from .rate import error_for_rate, rate_after, run_rate, turn_limit, wanted_for_turn
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
 FARTHEST_DEG = 179.0
@@ -32,6 +35,10 @@ def largest_turn(params: Array, state: Array, dt_s: float) -> float:
         return abs(turn_of_rudder(params, state[L.THRUST], held_rudder(params), dt_s))
     if params[L.KIND] == L.KIND_SINGLE_INTEGRATOR:
         return params[L.MAX_TURN_RATE] * dt_s
+    if params[L.KIND] == L.KIND_RATE:
+        rate = abs(state[L.TURN_RATE])
+        wanted = wanted_for_turn(params, rate, np.inf, FARTHEST_DEG, dt_s)
+        return rate_after(params, state[L.SPEED], rate, wanted, dt_s) * dt_s
     reach = abs(state[L.TURN_RATE]) + params[L.MAX_ANGULAR_ACC] * dt_s
     return min(reach, params[L.MAX_TURN_RATE]) * dt_s
 
@@ -51,6 +58,8 @@ def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> flo
     if params[L.KIND] == L.KIND_USV:
         thrust = thrust_after(params, state, speed_mps, dt_s)
         return turn_of_rudder(params, thrust, held_rudder(params), dt_s)
+    if params[L.KIND] == L.KIND_RATE:
+        return turn_limit(params, state[L.SPEED]) * dt_s
     return params[L.MAX_TURN_RATE] * dt_s
 
 
@@ -69,6 +78,9 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
         actuate_usv(params, state, speed_mps, rudder, dt_s)
     elif kind == L.KIND_SINGLE_INTEGRATOR:
         step_single_integrator(params, state, speed_mps, turn_deg, dt_s)
+    elif kind == L.KIND_RATE:
+        wanted = wanted_for_turn(params, state[L.TURN_RATE], turn_deg, FARTHEST_DEG, dt_s)
+        run_rate(params, state, speed_mps, wanted, dt_s)
     else:
         step_double_integrator(params, state, speed_mps, turn_deg, dt_s)
 
@@ -81,6 +93,11 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
     the controller's memory (derivative 0 when it has none). Without thrust there is no rudder to command and the
     error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there: the turn is then the nearest one possible.
     """
+    if params[L.KIND] == L.KIND_RATE:
+        rate = state[L.TURN_RATE]
+        limit = turn_limit(params, state[L.SPEED])
+        wanted = clamp(wanted_for_turn(params, rate, turn_deg, FARTHEST_DEG, dt_s), -limit, limit)
+        return clamp(error_for_rate(params, wanted) + 0.5 * dt_s * rate, -FARTHEST_DEG, FARTHEST_DEG)
     if params[L.KIND] != L.KIND_USV:
         return clamp(turn_deg, -FARTHEST_DEG, FARTHEST_DEG)
     full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)

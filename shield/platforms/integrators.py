@@ -10,7 +10,7 @@ from .usv import clamp, wrap_degrees
 
 
 @lean_kernel
-def _move(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
+def move_boat(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
     """Mean speed along the mean heading; the *new* speed is what is stored, unlike the thrust boats."""
     mean_speed = 0.5 * (speed_mps + state[L.SPEED])
     mean_heading = math.radians(0.5 * (state[L.HEADING] + heading_deg))
@@ -28,7 +28,7 @@ def step_single_integrator(
     speed = clamp(desired_speed_mps, -params[L.MAX_SPEED], params[L.MAX_SPEED])
     limit = params[L.MAX_TURN_RATE]
     turn_rate = clamp(heading_error_deg / dt_s, -limit, limit)
-    _move(params, state, speed, state[L.HEADING] + turn_rate * dt_s, dt_s)
+    move_boat(params, state, speed, state[L.HEADING] + turn_rate * dt_s, dt_s)
 
 
 @lean_kernel
@@ -43,4 +43,4 @@ def step_double_integrator(
     limit = params[L.MAX_TURN_RATE]
     turn_rate = clamp(state[L.TURN_RATE] + angular * dt_s, -limit, limit)
     state[L.TURN_RATE] = turn_rate
-    _move(params, state, speed, state[L.HEADING] + turn_rate * dt_s, dt_s)
+    move_boat(params, state, speed, state[L.HEADING] + turn_rate * dt_s, dt_s)

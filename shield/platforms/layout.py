@@ -29,7 +29,7 @@ HEADING_ERROR = 8
 HEADING_INTEGRAL = 9
 """Integral memory of the heading controller."""
 TURN_RATE = 10
-"""Turn rate, deg/s (memory of the double integrator only)."""
+"""Turn rate, deg/s (memory of the double integrator and of rate-controlled boats)."""
 N_STATE = 11
 
 # --- parameter row ---------------------------------------------------------------------------------
@@ -64,3 +64,14 @@ N_PARAM = MAP_SPEED + MAP_CAPACITY
 KIND_USV = 0
 KIND_SINGLE_INTEGRATOR = 1
 KIND_DOUBLE_INTEGRATOR = 2
+KIND_RATE = 3
+
+# --- columns that boats of `KIND_RATE` use for values of their own ----------------------------------
+TURN_AT_REST = MAX_RUDDER
+"""Turn rate without way, deg/s."""
+TURN_PER_SPEED = TURN_GAIN
+"""Turn rate gained with speed, deg/s per m/s; below 0: lost."""
+SPEED_LAG = SPEED_KD
+"""Lag of the speed, s."""
+TURN_LAG = HEADING_KD
+"""Lag of the turn rate, s."""

@@ -110,6 +110,8 @@ def _any_rudder(params: Array, state: Array) -> tuple[Array, Array]:
 
 def _turn_rate(platform: Platform, dt_s: float) -> float:
     """Highest turn rate, deg/s: the speed controller answers the speed lost in a turn with thrust, and so with turn."""
+    if platform.kind == "rate":
+        return max(platform.max_turn_rate_at(0.0), platform.max_turn_rate_at(platform.max_speed_mps))
     params, state = _any_rudder(*cruise(platform, dt_s))
     fastest = 0.0
     for _ in range(int(LONGEST_S / dt_s)):

@@ -17,6 +17,7 @@ KINDS = {
     "usv": L.KIND_USV,
     "single_integrator": L.KIND_SINGLE_INTEGRATOR,
     "double_integrator": L.KIND_DOUBLE_INTEGRATOR,
+    "rate": L.KIND_RATE,
 }
 
 
@@ -56,6 +57,9 @@ class Platform:
     ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg and the
     steady speed is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``; a limit of 0 on acceleration or
     deceleration means none. Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``.
+    ``kind="rate"`` turns by a rate loop, see `rate`: besides those it uses ``max_dec`` (0: as ``max_acc``),
+    ``turn_rate_at_rest_dps``, ``turn_rate_per_mps``, ``turn_lag_s``, ``speed_lag_s``, ``turn_loss`` and, of its
+    ``heading_pid``, ``kp`` in 1/s. `schema` has a word on each.
 
     When it is built it is run in its own model, once: it must come to its top speed, turn and stop.
 
@@ -81,6 +85,10 @@ class Platform:
     heading_pid: Gains = field(default_factory=Gains)
     max_turn_rate_dps: float = 0.0
     max_angular_acc_dps2: float = 0.0
+    turn_rate_at_rest_dps: float = 0.0
+    turn_rate_per_mps: float = 0.0
+    turn_lag_s: float = 0.0
+    speed_lag_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -90,7 +98,7 @@ class Platform:
         who = f"platform {self.name!r}"
         for entry in fields(self):
             if entry.name not in ("name", "kind", "thrust_map", "speed_pid", "heading_pid"):
-                low = -math.inf if entry.name == "rotate_speed_dps" else 0.0
+                low = -math.inf if entry.name in ("rotate_speed_dps", "turn_rate_per_mps") else 0.0
                 _check_number(who, entry.name, getattr(self, entry.name), low)
         if self.max_speed_mps == 0:
             raise PlatformError(f"{who}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
@@ -105,6 +113,7 @@ class Platform:
             raise PlatformError(f"{who}: thrust_map is {self.thrust_map!r}; give (thrust, speed) points") from None
         object.__setattr__(self, "thrust_map", points)
         self._check_thrust_map()
+        self._check_rate()
         fault = fault_of(self)
         if fault is not None:
             raise PlatformError(f"{who} is no boat that can be steered: in its own model, {fault}")
@@ -121,6 +130,19 @@ class Platform:
                 f"platform {self.name!r}: thrust_map needs 2 to {L.MAP_CAPACITY} (thrust, speed) points "
                 f"with rising thrust, got {self.thrust_map}"
             )
+
+    def _check_rate(self) -> None:
+        who = f"platform {self.name!r}"
+        if self.kind == "rate":
+            for name in ("max_acc", "max_turn_rate_dps", "max_angular_acc_dps2"):
+                if getattr(self, name) == 0:
+                    raise PlatformError(f"{who}: {name} is 0; a boat of kind 'rate' needs one above 0")
+            if self.heading_pid.kp == 0:
+                raise PlatformError(f"{who}: heading_pid.kp is 0; give deg/s asked for per deg of heading error")
+            return
+        for name in ("turn_rate_at_rest_dps", "turn_rate_per_mps", "turn_lag_s", "speed_lag_s"):
+            if getattr(self, name) != 0:
+                raise PlatformError(f"{who}: {name} is for boats of kind 'rate', this is a {self.kind!r}; leave it out")
 
     def pack(self) -> NDArray[np.float64]:
         """Parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
@@ -142,6 +164,10 @@ class Platform:
         row[L.HEADING_KP : L.HEADING_LIMIT + 1] = heading.kp, heading.ki, heading.kd, heading.integral_limit
         row[L.MAX_TURN_RATE] = self.max_turn_rate_dps
         row[L.MAX_ANGULAR_ACC] = self.max_angular_acc_dps2
+        if self.kind == "rate":
+            row[L.MAX_DEC] = self.max_dec or self.max_acc
+            row[L.TURN_AT_REST], row[L.TURN_PER_SPEED] = self.turn_rate_at_rest_dps, self.turn_rate_per_mps
+            row[L.TURN_LAG], row[L.SPEED_LAG] = self.turn_lag_s, self.speed_lag_s
         row[L.MAP_SIZE] = len(self.thrust_map)
         for i, (thrust, speed_mps) in enumerate(self.thrust_map):
             row[L.MAP_THRUST + i] = thrust
@@ -164,6 +190,9 @@ class Platform:
 
     def max_turn_rate_at(self, speed_mps: float) -> float:
         """Highest steady turn rate, deg/s, at a straight-line speed (m/s): full rudder at that speed's thrust."""
+        if self.kind == "rate":
+            free = self.turn_rate_at_rest_dps + self.turn_rate_per_mps * speed_mps
+            return min(max(free, 0.0), self.max_turn_rate_dps)
         if self.kind != "usv":
             return self.max_turn_rate_dps
         thrusts, speeds = np.asarray(self.thrust_map).T

@@ -65,6 +65,8 @@ def _fault_of(packed: bytes) -> str | None:
     off_deg = _turn(params, state, top_mps)
     if not off_deg <= NEAR_DEG:
         remedy = "turn_gain, max_rudder and heading_pid" if usv else "max_turn_rate_dps and max_angular_acc_dps2"
+        if params[L.KIND] == L.KIND_RATE:
+            remedy = "turn_rate_at_rest_dps or turn_rate_per_mps, and max_turn_rate_dps"
         left = f"{off_deg:.3g} of {TURN_DEG:g} deg are left after {WITHIN_S:g} s"
         return f"told to turn, {left}; give its {remedy}"
     _run(params, state, 0.0, 0.0)

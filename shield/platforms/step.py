@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..jit import Array, lean_kernel
 from . import layout as L
 from .integrators import step_double_integrator, step_single_integrator
+from .rate import step_rate
 from .usv import step_usv
 
 
@@ -24,5 +25,7 @@ def step_boat(params: Array, state: Array, desired_speed_mps: float, heading_err
         step_usv(params, state, desired_speed_mps, heading_error_deg, dt_s)
     elif kind == L.KIND_SINGLE_INTEGRATOR:
         step_single_integrator(params, state, desired_speed_mps, heading_error_deg, dt_s)
+    elif kind == L.KIND_RATE:
+        step_rate(params, state, desired_speed_mps, heading_error_deg, dt_s)
     else:
         step_double_integrator(params, state, desired_speed_mps, heading_error_deg, dt_s)

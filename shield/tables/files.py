@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..exceptions import TableError
 from ..platforms.platform import Platform
-from ..platforms.registry import get_platform
+from ..platforms.registry import PLATFORMS, get_platform
 from .card import Card, platform_digest
 from .lookup import LEVELS_S, N_LEVELS, STEPS, Tables, no_tables, pack
 from .settings import OtherMay, Problem, read_other_may, table_name
@@ -162,7 +162,8 @@ def read_table(path: Path) -> ValueTable:
 
 def remedy(own: str, other: str, other_may: OtherMay) -> str:
     """The command that makes a table."""
-    return f"steerclear reach solve --own {own} --other {other} --other-may {other_may.value}"
+    boats = [name if name in PLATFORMS else f"{name}.yaml" for name in (own, other)]  # others come from files
+    return f"steerclear reach solve --own {boats[0]} --other {boats[1]} --other-may {other_may.value}"
 
 
 def find_table(own: str, other: str, other_may: OtherMay) -> Path | None:

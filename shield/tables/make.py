@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import TableError
+from ..platforms.platform import Platform
+from ..platforms.registry import get_platform
 from .areas import HEADINGS_DEG, SPEED_SHARES, area_m2, area_table, reach_ahead_m
 from .files import ValueTable, pack_values, with_figures
 from .margin import model_error, value_loss
@@ -54,7 +56,7 @@ def make_table(
         pack_values(part, solve(part, threads=threads, notice=begin(name), checkpoint=kept))
         for name, part, kept in parts
     )
-    complete = with_figures(table, **figures(table, coarse, radii_m, runs, begin("runs")))
+    complete = with_figures(table, **figures(table, coarse, radii_m, runs, begin("runs"), (problem.own, problem.other)))
     for _name, _part, kept in parts:
         if kept is not None:
             kept.unlink(missing_ok=True)
@@ -88,19 +90,26 @@ def coarser(problem: Problem, factor: float) -> Problem:
 
 
 def figures(
-    table: ValueTable, coarse: ValueTable, radii_m: tuple[float, ...], runs: int, notice: Notice
+    table: ValueTable,
+    coarse: ValueTable,
+    radii_m: tuple[float, ...],
+    runs: int,
+    notice: Notice,
+    boats: tuple[Platform, Platform] | None = None,
 ) -> dict[str, Any]:
-    """What a card says about a table: convergence, areas, model error and margin."""
-    problem_boats = {"own": table.card.own, "other": table.card.other}
+    """What a card says about a table: convergence, areas, model error and margin; ``boats`` that have no name here."""
+    own, other = boats or (get_platform(table.card.own), get_platform(table.card.other))
     margins = {}
     for done, radius in enumerate(radii_m):
-        margins[f"{radius:g}"] = value_loss(table, radius, runs, min(table.card.horizon_s, 60.0))
+        margins[f"{radius:g}"] = value_loss(table, radius, runs, min(table.card.horizon_s, 60.0), boats=(own, other))
         notice(done + 1, len(radii_m), 0.0)
     return {
         "checked_radii_m": radii_m,
         "convergence": {f"{radius:g}": convergence(table, coarse, radius) for radius in radii_m},
         "areas_m2": area_table(table, radii_m) | {"reach_ahead_m": reaches(table, radii_m)},
-        "model_error": {role: model_error(name, table.card.dt_s, 500) for role, name in problem_boats.items()},
+        "model_error": {
+            role: model_error(boat, table.card.dt_s, 500) for role, boat in (("own", own), ("other", other))
+        },
         "margin": margins,
     }
 

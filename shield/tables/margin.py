@@ -76,7 +76,14 @@ def _follow(params: Array, state: Array, target_deg: float) -> None:
     step_boat(params, state, params[L.MAX_SPEED], error, SUB_STEP_S)
 
 
-def value_loss(table: ValueTable, radius_m: float, runs: int, run_s: float, seed: int = 0) -> dict[str, Any]:
+def value_loss(
+    table: ValueTable,
+    radius_m: float,
+    runs: int,
+    run_s: float,
+    seed: int = 0,
+    boats: tuple[Platform, Platform] | None = None,
+) -> dict[str, Any]:
     """Runs of the full model from random states of value between the radius and `BAND_M` more.
 
     The own boat always takes the rudder of the highest value, decided anew every 0.1 s; the other one plays
@@ -87,7 +94,7 @@ def value_loss(table: ValueTable, radius_m: float, runs: int, run_s: float, seed
         and how far below its first value a run came: median and largest (``loss_m``).
     """
     card = table.card
-    boats = get_platform(card.own), get_platform(card.other)
+    boats = boats or (get_platform(card.own), get_platform(card.other))
     tables, cooperative = stack_tables([table]), card.other_may == OtherMay.COOPERATIVE.value
     params, random = np.stack([boat.pack() for boat in boats]), np.random.default_rng(seed)
     manners = [GREEDY] if cooperative else list(MANNERS.values())

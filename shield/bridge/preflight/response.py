@@ -174,12 +174,13 @@ def _fault(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Pla
         faster = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
         return (
             f"it turns {faster} than {platform.name} ({fit.measured_dps:.0f} against {fit.foretold_dps:.0f} deg/s, "
-            f"{fit.heading_deg:.0f} deg rms); give the platform that fits it, or tune its steering"
+            f"{fit.heading_deg:.0f} deg rms); give the platform that fits it (steerclear fit LOG "
+            "--out boat.yaml, of a sea-trial's log), or tune its steering"
         )
     if not fit.speed_mps <= SPEED_MPS:
         return (
-            f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; give the platform that fits it, "
-            "or tune its speed"
+            f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; give the platform that fits it "
+            "(steerclear fit LOG --out boat.yaml, of a sea-trial's log), or tune its speed"
         )
     if delay_s > LONGEST_DELAY_S:
         return f"commands take {delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that"

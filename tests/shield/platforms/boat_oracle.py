@@ -128,6 +128,37 @@ class Integrator:
         self.speed = float(np.clip(new, 0.0, 10.0))
 
 
+RATE_BOATS = {  # top, acc, dec, speed lag, most turn, angular acc, turn at rest, turn per speed, turn lag, loss, gain
+    "ardurover_boat": (3.0, 1.059, 1.143, 0.04515, 108.5, 104.9, 2.398, 66.79, 0.1787, 0.01376, 1.699),
+    "blueboat": (3.0, 0.8, 0.8, 0.4, 45.0, 45.0, 45.0, -8.0, 0.25, 0.15, 1.5),
+    "otter": (3.2, 1.2, 1.31, 0.5, 12.0, 6.0, 12.0, -1.5, 0.6, 0.2, 0.225),
+}
+
+
+class RateBoat:
+    """A turn-rate loop behind ArduPilot's square-root controller, and a speed with limits and a lag."""
+
+    def __init__(self, name, x, y, heading, speed):
+        self.numbers, self.x, self.y, self.heading, self.speed, self.rate = RATE_BOATS[name], x, y, heading, speed, 0.0
+
+    def step(self, speed, error, dt):
+        """Turn rate, then speed, then the move along their means."""
+        top, acc, dec, speed_lag, most, angular, rest, per_speed, turn_lag, loss, gain = self.numbers
+        error -= dt * self.rate / 2
+        corner = angular / gain**2
+        asked = gain * error
+        if abs(error) > corner:
+            asked = math.copysign(math.sqrt(2 * angular * (abs(error) - corner / 2)), error)
+        limit = np.clip(rest + per_speed * self.speed, 0, most)
+        change = (1 - math.exp(-dt / turn_lag)) * (np.clip(asked, -limit, limit) - self.rate)
+        self.rate += float(np.clip(change, -angular * dt, angular * dt))
+        wanted = np.clip(speed, 0, top) * (1 - loss * abs(self.rate) / most)
+        change = (1 - math.exp(-dt / speed_lag)) * (wanted - self.speed)
+        new = self.speed + float(np.clip(change, -dec * dt, acc * dt))
+        _move(self, new, self.heading + self.rate * dt, dt)
+        self.speed = float(np.clip(new, 0, top))
+
+
 def _move(boat, new_speed, new_heading, dt):
     """Mean speed along the mean heading; headings stay within 180 deg."""
     mean, course = (new_speed + boat.speed) / 2, math.radians((boat.heading + new_heading) / 2)
@@ -138,4 +169,6 @@ def _move(boat, new_speed, new_heading, dt):
 
 def oracle(name, x, y, heading, speed):
     """A boat of either sort."""
+    if name in RATE_BOATS:
+        return RateBoat(name, x, y, heading, speed)
     return (Integrator if name in ("si", "di") else ThrustBoat)(name, x, y, heading, speed)

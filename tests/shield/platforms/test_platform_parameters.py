@@ -94,7 +94,10 @@ def test_an_unknown_kind_is_told_the_known_ones():
 
 @pytest.mark.parametrize("name", ["hron", "", "HERON", 3, None, ["heron"]])
 def test_an_unknown_name_is_told_the_known_ones(name):
-    with pytest.raises(PlatformError, match="known platforms: di, heron, large_usv, mctf2024_sim, si, surveyor"):
+    with pytest.raises(
+        PlatformError,
+        match="known platforms: ardurover_boat, blueboat, di, heron, large_usv, mctf2024_sim, otter, si, surveyor",
+    ):
         get_platform(name)
 
 

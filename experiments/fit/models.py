@@ -1,0 +1,206 @@
+"""The models that are tried, each a vector of numbers that least squares changes, and the platform of such a vector."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import Gains, Platform
+from steerclear.shield.platforms.proving import reference_models
+
+from .runs import STEP_S, Run
+
+DELAY = ("delay_s", 0.15, 0.0, 1.0)
+_RATE = (
+    ("max_acc", 0.8, 0.02, 8.0),
+    ("max_dec", 0.8, 0.02, 8.0),
+    ("speed_lag_s", 0.3, 0.01, 6.0),
+    ("max_turn_rate_dps", 40.0, 1.0, 360.0),
+    ("max_angular_acc_dps2", 60.0, 1.0, 1500.0),
+    ("turn_rate_at_rest_dps", 10.0, 0.01, 360.0),
+    ("turn_rate_per_mps", 20.0, -60.0, 180.0),
+    ("turn_lag_s", 0.1, 0.005, 3.0),
+    ("turn_loss", 0.1, 0.0, 0.95),
+    ("kp", 1.5, 0.05, 6.0),
+    DELAY,
+)
+_USV = (
+    ("half_speed", 0.5, 0.2, 0.85),
+    ("max_acc", 0.4, 0.02, 8.0),
+    ("max_dec", 0.4, 0.02, 8.0),
+    ("speed_kp", 1.0, 0.02, 40.0),
+    ("turn_loss", 0.5, 0.0, 0.95),
+    ("turn_gain", 30.0, 1.0, 200.0),
+    ("kp", 0.8, 0.05, 10.0),
+    ("kd", 0.5, 0.0, 12.0),
+    DELAY,
+)
+HELD_S, HELD_MPS, FASTER_MPS = 2.0, 0.06, 0.25
+"""A speed held for so long, s, within so much, m/s, although told to go faster by so much is the top speed."""
+
+SLOW_SHARE = 0.2
+"""Of top speed: below it a boat has hardly any way."""
+
+Bound = tuple[str, float, float, float]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a boat did at its hardest in its runs: m/s, m/s2, deg/s, deg/s2; ``rest_rate_dps`` with hardly any way.
+
+    A boat that was never seen to turn without way is not believed to.
+    """
+
+    top_mps: float
+    acc_mps2: float
+    dec_mps2: float
+    turn_rate_dps: float
+    angular_acc_dps2: float
+    rest_rate_dps: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Run]) -> Seen:
+        """Of some runs: highest values, single odd ones left out."""
+        speed = np.concatenate([run.seen[:, 3] for run in runs])
+        told = max(float(run.told[:, 0].max()) for run in runs)
+        gains = np.concatenate([_slope(run.seen[:, 3], 0.5) for run in runs])
+        rates = np.concatenate([np.abs(run.seen[:, 4]) for run in runs])
+        top = max(0.05, min(told, *(_held(run) for run in runs)))
+        slow = rates[np.abs(speed) < SLOW_SHARE * top]
+        bends = np.concatenate([np.abs(_slope(run.seen[:, 4], 0.3)) for run in runs])
+        return cls(
+            top_mps=round(top, 2),
+            acc_mps2=max(0.02, float(np.quantile(gains, 0.99))),
+            dec_mps2=max(0.02, float(-np.quantile(gains, 0.01))),
+            turn_rate_dps=max(1.0, float(np.quantile(rates, 0.998))),
+            angular_acc_dps2=max(1.0, float(np.quantile(bends, 0.995))),
+            rest_rate_dps=max(0.05, float(np.quantile(slow, 0.99))) if len(slow) else 0.05,
+        )
+
+
+def _held(run: Run) -> float:
+    """Speed, m/s, that a boat held although told to go faster: it can do no more; inf: it never did."""
+    over = round(HELD_S / STEP_S)
+    if len(run.seen) <= over:
+        return np.inf
+    gained = np.abs(run.seen[over:, 3] - run.seen[:-over, 3])
+    told = np.min([run.told[k : len(run.told) - over + k, 0] for k in range(0, over + 1, 5)], axis=0)
+    turned = np.abs(run.seen[over:, 2] - run.seen[:-over, 2])
+    held = (gained < HELD_MPS) & (turned < 5.0) & (told > run.seen[over:, 3] + FASTER_MPS) & (run.seen[over:, 3] > 0.3)
+    return float(np.median(run.seen[over:, 3][held])) if held.sum() >= 5 else np.inf
+
+
+def _slope(values: Array, over_s: float) -> Array:
+    """Change per second over a time."""
+    apart = max(1, round(over_s / STEP_S))
+    return np.asarray((values[apart:] - values[:-apart]) / (apart * STEP_S))
+
+
+@dataclass(frozen=True)
+class Model:
+    """A kind of boat to be fitted.
+
+    Attributes:
+        kind: of the platform.
+        bounds: name, first guess, lowest and highest value of each number.
+        guesses: other first guesses, each some of the numbers.
+        build: the platform of named values, its name and its top speed.
+    """
+
+    kind: str
+    bounds: tuple[Bound, ...]
+    guesses: tuple[dict[str, float], ...]
+    build: Callable[[dict[str, float], str, float], Platform]
+
+    @property
+    def low(self) -> Array:
+        """Lowest values."""
+        return np.array([bound[2] for bound in self.bounds])
+
+    @property
+    def high(self) -> Array:
+        """Highest values."""
+        return np.array([bound[3] for bound in self.bounds])
+
+    def around(self, seen: Seen) -> Model:
+        """The model with first guesses and bounds from what was seen of the boat."""
+        twice = 2.0 if self.kind == "usv" else 1.0  # such a hull stores the mean of old and new speed: half as quick
+        told = {
+            "max_acc": (twice * seen.acc_mps2, 0.5, 4.0),
+            "max_dec": (twice * seen.dec_mps2, 0.5, 4.0),
+            "max_turn_rate_dps": (seen.turn_rate_dps, 0.9, 1.1),
+            "max_angular_acc_dps2": (seen.angular_acc_dps2, 0.5, 8.0),
+            "turn_rate_at_rest_dps": (seen.rest_rate_dps, 0.0, 1.1),
+        }
+        bounds, guess = [], {}
+        for name, value, low, high in self.bounds:
+            if name in told:
+                middle, below, above = told[name]
+                value = guess[name] = min(max(middle, low), high)
+                low, high = max(low, below * value), min(high, above * value + 1e-3)
+            bounds.append((name, value, low, high))
+        guesses = tuple({**other, **guess} for other in self.guesses)
+        return replace(self, bounds=tuple(bounds), guesses=guesses)
+
+    def starts(self) -> list[Array]:
+        """First guesses."""
+        return [np.array([guess.get(name, value) for name, value, *_ in self.bounds]) for guess in ({}, *self.guesses)]
+
+    def values(self, vector: Array) -> dict[str, float]:
+        """Named values of a vector."""
+        return {name: float(value) for (name, *_), value in zip(self.bounds, vector, strict=True)}
+
+    def platform(self, vector: Array, name: str, top_mps: float, proved: bool = False) -> Platform:
+        """The platform of a vector; while fitting it need not be a boat.
+
+        Raises:
+            PlatformError: ``proved``, and it cannot be steered.
+        """
+        if proved:
+            return self.build(self.values(vector), name, top_mps)
+        with reference_models():
+            return self.build(self.values(vector), name, top_mps)
+
+
+def _rate(v: dict[str, float], name: str, top_mps: float) -> Platform:
+    gains = Gains(kp=v["kp"])
+    rest = {key: value for key, value in v.items() if key not in ("kp", "delay_s")}
+    return Platform(name=name, kind="rate", max_speed_mps=top_mps, heading_pid=gains, **rest)
+
+
+def _usv(v: dict[str, float], name: str, top_mps: float) -> Platform:
+    return Platform(
+        name=name,
+        kind="usv",
+        max_speed_mps=top_mps,
+        thrust_map=((-100.0, -top_mps), (0.0, 0.0), (50.0, v["half_speed"] * top_mps), (100.0, top_mps)),
+        turn_loss=v["turn_loss"],
+        turn_gain=v["turn_gain"],
+        max_acc=v["max_acc"],
+        max_dec=v["max_dec"],
+        speed_pid=Gains(kp=v["speed_kp"]),
+        heading_pid=Gains(kp=v["kp"], kd=v["kd"]),
+    )
+
+
+RATE = Model(
+    "rate",
+    _RATE,
+    (
+        {"max_turn_rate_dps": 90.0, "max_angular_acc_dps2": 120.0, "max_acc": 1.2, "max_dec": 1.2},
+        {"max_turn_rate_dps": 12.0, "max_angular_acc_dps2": 10.0, "kp": 0.5, "turn_rate_at_rest_dps": 8.0},
+    ),
+    _rate,
+)
+USV = Model(
+    "usv",
+    _USV,
+    (
+        {"turn_gain": 10.0, "kp": 1.2, "kd": 3.0, "max_acc": 0.15, "max_dec": 0.25, "turn_loss": 0.85},
+        {"turn_gain": 60.0, "kp": 0.9, "kd": 0.6, "max_dec": 0.5, "max_acc": 4.0, "turn_loss": 0.85},
+    ),
+    _usv,
+)
+MODELS = {"rate": RATE, "usv": USV}

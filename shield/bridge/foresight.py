@@ -1,0 +1,153 @@
+"""What the model misses, measured while boats are steered: every turn what was foreseen is held against what came.
+
+The place that a boat is seen at now is compared with the one its model foretold 1, 2 and 3 s ago under the commands
+that were really sent since. Quantiles of these errors become the boat's margin, within bounds: a model that is off, a
+delay longer than declared, wind and waves all show there, whatever the cause.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..jit import Array, BoolArray
+from ..platforms import layout as L
+from ..tracks import run_on_commands, steps_of_delay
+from .fleet_file import FleetFile
+from .link import BoatReading, Sent
+from .tick import Action
+
+AHEAD_S = (1.0, 2.0, 3.0)
+"""How long ago what is compared was foreseen, s."""
+TOLD_BY = 1
+"""Place in `AHEAD_S` of the errors that make the margin: an escape is chosen anew long before it is carried out."""
+SHARE = 0.95
+"""Quantile of the errors that a margin covers."""
+MEMORY_S = 60.0
+"""Errors are remembered for so long, s."""
+ENOUGH_S = 5.0
+"""Errors of at least so long are needed before they count, s."""
+WIDEN_MPS = 0.1
+"""A margin changes no faster, m/s: a jump of it would look like a breach."""
+WORTH_TELLING_M = 0.15
+"""Margins beyond what was declared by more than this are told."""
+ROUNDING_M = 0.05
+"""Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
+FRESH_S = 0.3
+"""Places older than this are no measurement, s."""
+
+
+class Foresight:
+    """Follows the boats of a process.
+
+    Args:
+        fleet: the file: platforms, what was measured of them, and the bounds ``limits.model``.
+        boats: names of those commanded.
+    """
+
+    def __init__(self, fleet: FleetFile, boats: tuple[str, ...]) -> None:
+        config = fleet.shield_config
+        self._boats, self._limit = boats, fleet.limits.model
+        self._dt_s = config.dt_s
+        self._steps = [max(1, round(ahead / config.dt_s)) for ahead in AHEAD_S]
+        self._late = steps_of_delay(config)
+        self._params = np.array([fleet.platform_of[name].pack() for name in boats]).reshape(-1, L.N_PARAM)
+        self._declared_m = np.array(
+            [max(config.position_error_m, fleet.measured_of(name).get("position_error_m", 0.0)) for name in boats]
+        )
+        longest = max(self._steps) + self._late + 1
+        self._rows: deque[Array] = deque(maxlen=longest)
+        self._told: deque[Array] = deque(maxlen=longest)
+        self._errors = np.full((round(MEMORY_S / config.dt_s), len(boats), len(AHEAD_S)), np.nan)
+        self._number = 0
+        self._outside_s = np.zeros(len(boats))
+        self.margin_m = {name: float(margin) for name, margin in zip(boats, self._declared_m, strict=True)}
+        """Bound on the error of each boat's place that the shield is to count on, m."""
+
+    def update(self, rows: Mapping[str, Array | None], readings: Mapping[str, BoatReading]) -> None:
+        """Take the boats as they are believed to be now, before this turn's decision.
+
+        Args:
+            rows: state of each boat as estimated; None: not known.
+            readings: their telemetry.
+        """
+        now = np.full((len(self._boats), L.N_STATE), np.nan)
+        for i, name in enumerate(self._boats):
+            row, reading = rows.get(name), readings[name]
+            if row is not None and reading.position_age_s <= FRESH_S and reading.ready:
+                now[i] = row
+        self._rows.append(now)
+        errors = self._errors[self._number % len(self._errors)]
+        errors[:] = np.nan
+        for k, steps in enumerate(self._steps):
+            errors[:, k] = self._missed_m(now, steps)
+        self._number += 1
+        self._judge(errors)
+
+    def sent(self, sent: Mapping[str, Sent]) -> None:
+        """Note what left at this turn."""
+        told = np.full((len(self._boats), 2), np.nan)
+        for i, name in enumerate(self._boats):
+            command = sent.get(name)
+            if command is not None and command.delivered and math.isfinite(command.heading_rad):
+                told[i] = command.speed_mps, math.degrees(command.heading_rad)
+        self._told.append(told)
+
+    def _missed_m(self, now: Array, steps: int) -> Array:
+        """Distances between boats now and where they were foreseen so many steps ago, m; NaN: no telling."""
+        if len(self._rows) <= steps or len(self._told) < steps + self._late:
+            return np.full(len(self._boats), np.nan)
+        then = self._rows[-1 - steps].copy()
+        told = np.array(list(self._told)[len(self._told) - steps - self._late : len(self._told) - self._late])
+        known: BoolArray = np.asarray(np.isfinite(then[:, : L.SPEED + 1]).all(axis=1))
+        known = np.asarray(known & np.isfinite(told).all(axis=(0, 2)))
+        run_on_commands(then, known, self._params, told, self._dt_s)
+        missed = np.hypot(then[:, L.X] - now[:, L.X], then[:, L.Y] - now[:, L.Y])
+        return np.where(known, missed, np.nan)
+
+    def _judge(self, latest: Array) -> None:
+        for i, name in enumerate(self._boats):
+            missed = latest[i, TOLD_BY]
+            if math.isfinite(missed):
+                outside = missed > self._limit.outside_m
+                change = self._dt_s if outside else -self._dt_s
+                self._outside_s[i] = max(0.0, self._outside_s[i] + change)
+            missed_m = self.quantile_m(name)
+            missed_m = missed_m if missed_m > ROUNDING_M else 0.0
+            goal = max(float(self._declared_m[i]), min(missed_m, self._limit.widest_m))
+            step = WIDEN_MPS * self._dt_s
+            self.margin_m[name] += min(max(goal - self.margin_m[name], -step), step)
+
+    def quantile_m(self, boat: str, ahead: int = TOLD_BY, share: float = SHARE) -> float:
+        """Quantile of a boat's errors so far ahead (place in `AHEAD_S`), m; 0 while too little was seen."""
+        errors = self._errors[:, self._boats.index(boat), ahead]
+        errors = errors[np.isfinite(errors)]
+        if len(errors) < ENOUGH_S / self._dt_s:
+            return 0.0
+        return float(np.partition(errors, int(share * (len(errors) - 1)))[int(share * (len(errors) - 1))])
+
+    def outside_s(self, boat: str) -> float:
+        """How long a boat has been far outside its model, s."""
+        return float(self._outside_s[self._boats.index(boat)])
+
+    def actions(self) -> list[Action]:
+        """Boats whose margin was widened, with what their model misses."""
+        return [
+            Action(name, "tracking", "none", self._words(name))
+            for name, declared in zip(self._boats, self._declared_m, strict=True)
+            if self.margin_m[name] > declared + WORTH_TELLING_M
+        ]
+
+    def _words(self, name: str) -> str:
+        missed = "/".join(f"{self.quantile_m(name, k):.1f}" for k in range(len(AHEAD_S)))
+        bound = " (the most that limits.model.widest_m allows)" if self._is_bounded(name) else ""
+        return (
+            f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {self.margin_m[name]:.2f} m{bound}"
+            "; steerclear fit this run's log"
+        )
+
+    def _is_bounded(self, name: str) -> bool:
+        return self.quantile_m(name) > self._limit.widest_m

@@ -1,0 +1,85 @@
+"""A boat behind an autopilot that turns by a rate loop: ArduPilot's rovers and boats, and boats with two propellers.
+
+The heading error asks for a turn rate, by a square-root controller, the rate is reached within an angular acceleration,
+and the speed within acceleration limits and a lag (ArduPilot: AR_AttitudeControl, AC_P_1D::sqrt_controller). How fast
+the boat can turn hangs on its speed: a rudder needs way (``turn_rate_per_mps`` > 0), two propellers turn a boat at
+rest and have the less left for it the faster it goes (``turn_rate_at_rest_dps`` > 0, ``turn_rate_per_mps`` < 0).
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import Array, lean_kernel
+from . import layout as L
+from .integrators import move_boat
+from .usv import clamp
+
+
+@lean_kernel
+def turn_limit(params: Array, speed_mps: float) -> float:
+    """Highest turn rate, deg/s, that the boat can hold at a speed."""
+    return clamp(params[L.TURN_AT_REST] + params[L.TURN_PER_SPEED] * speed_mps, 0.0, params[L.MAX_TURN_RATE])
+
+
+@lean_kernel
+def rate_for_error(params: Array, error_deg: float) -> float:
+    """Turn rate, deg/s, asked for by a heading error: linear near 0, beyond it what a steady braking still ends."""
+    gain, braking = params[L.HEADING_KP], params[L.MAX_ANGULAR_ACC]
+    linear, size = braking / (gain * gain), abs(error_deg)
+    rate = gain * size if size <= linear else math.sqrt(2.0 * braking * (size - 0.5 * linear))
+    return math.copysign(rate, error_deg)
+
+
+@lean_kernel
+def error_for_rate(params: Array, rate_dps: float) -> float:
+    """Heading error, deg, that asks for a turn rate: the inverse of `rate_for_error`."""
+    gain, braking = params[L.HEADING_KP], params[L.MAX_ANGULAR_ACC]
+    size = abs(rate_dps)
+    error = size / gain
+    if error > braking / (gain * gain):
+        error = 0.5 * size * size / braking + 0.5 * braking / (gain * gain)
+    return math.copysign(error, rate_dps)
+
+
+@lean_kernel
+def share_of_step(lag_s: float, dt_s: float) -> float:
+    """Share of a difference that a first-order lag makes good in one step."""
+    return 1.0 - math.exp(-dt_s / lag_s) if lag_s > 0.0 else 1.0
+
+
+@lean_kernel
+def rate_after(params: Array, speed_mps: float, rate_dps: float, wanted_dps: float, dt_s: float) -> float:
+    """Turn rate, deg/s, at the end of a step in which ``wanted_dps`` is asked for."""
+    limit = turn_limit(params, speed_mps)
+    reach = params[L.MAX_ANGULAR_ACC] * dt_s
+    change = share_of_step(params[L.TURN_LAG], dt_s) * (clamp(wanted_dps, -limit, limit) - rate_dps)
+    return rate_dps + clamp(change, -reach, reach)
+
+
+@lean_kernel
+def wanted_for_turn(params: Array, rate_dps: float, turn_deg: float, farthest_deg: float, dt_s: float) -> float:
+    """Turn rate, deg/s, to ask for so that the step turns by ``turn_deg``; no more than the largest error asks for."""
+    most = rate_for_error(params, farthest_deg - 0.5 * dt_s * abs(rate_dps))
+    wanted = rate_dps + (turn_deg / dt_s - rate_dps) / share_of_step(params[L.TURN_LAG], dt_s)
+    return clamp(wanted, -most, most)
+
+
+@lean_kernel
+def run_rate(params: Array, state: Array, desired_speed_mps: float, wanted_dps: float, dt_s: float) -> None:
+    """One step in which the rate loop is asked for ``wanted_dps``. Changes ``state`` in place."""
+    speed = state[L.SPEED]
+    rate = rate_after(params, speed, state[L.TURN_RATE], wanted_dps, dt_s)
+    lost = params[L.TURN_LOSS] * abs(rate) / params[L.MAX_TURN_RATE]
+    target = clamp(desired_speed_mps, 0.0, params[L.MAX_SPEED]) * (1.0 - min(lost, 1.0))
+    change = share_of_step(params[L.SPEED_LAG], dt_s) * (target - speed)
+    state[L.TURN_RATE] = rate
+    speed += clamp(change, -params[L.MAX_DEC] * dt_s, params[L.MAX_ACC] * dt_s)
+    move_boat(params, state, speed, state[L.HEADING] + rate * dt_s, dt_s)
+
+
+@lean_kernel
+def step_rate(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
+    """One full step. The heading told is held while the boat turns: the error of the middle of the step counts."""
+    middle_deg = heading_error_deg - 0.5 * dt_s * state[L.TURN_RATE]
+    run_rate(params, state, desired_speed_mps, rate_for_error(params, middle_deg), dt_s)

@@ -1,0 +1,80 @@
+"""The sea trial's manoeuvres on a boat without sockets: all are driven, inside the geofence, and can be fitted."""
+
+import math
+import types
+
+import numpy as np
+import pytest
+from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
+from steerclear.experiments.fit.runs import runs_of
+from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.platforms import fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+
+TEXT = """
+version: 1
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
+geofence: {xmin_m: -40, ymin_m: -30, xmax_m: 120, ymax_m: 70}
+team: blue
+boats:
+  - {name: one, team: blue, platform: PLATFORM, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 1}}
+  - {name: two, team: blue, platform: PLATFORM, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 2}}
+"""
+
+
+def driven(platform, boats=("one",), start=(10.0, 0.0)):
+    """A trial driven to its end; rows (time, x, y, heading, speed, told speed, told heading) of the first boat."""
+    fleet = parse_fleet(TEXT.replace("PLATFORM", platform))
+    told, rows, names = [], [], fleet.names
+    trial = SeaTrial(fleet, boats, tell=told.append)
+    params = get_platform(platform).pack()
+    states = [fresh_state(*start, 0.0), fresh_state(100.0, 60.0, 0.0)]
+    for k in range(round(longest_s(len(boats)) / 0.1)):
+        seen = np.array([[s[L.X], s[L.Y], s[L.HEADING], s[L.SPEED]] for s in states])
+        trial.offer(Snapshot(k, 0.1 * k, seen))
+        values = trial.latest().commands.values
+        rows.append((0.1 * k, *seen[0], values[0, 0], math.degrees(values[0, 1])))
+        for i in range(len(names)):
+            error = math.remainder(math.degrees(values[i, 1]) - states[i][L.HEADING], 360.0)
+            step_boat(params, states[i], values[i, 0], error, 0.1)
+        if trial.done:
+            break
+    return trial, told, np.array(rows)
+
+
+@pytest.mark.parametrize("platform", ["ardurover_boat", "otter", "heron"])
+def test_every_manoeuvre_is_driven_inside_the_geofence(platform):
+    trial, told, rows = driven(platform)
+    assert trial.done
+    assert [text.partition(": ")[2] for text in told] == [name for name, *_ in MANOEUVRES]
+    assert rows[:, 1].min() > -40.0
+    assert rows[:, 1].max() < 120.0
+    assert rows[:, 2].min() > -30.0
+    assert rows[:, 2].max() < 70.0
+    assert len(rows) * 0.1 < 15 * 60.0
+
+
+def test_the_trial_shows_turns_and_stops_of_both_sides():
+    _, _, rows = driven("ardurover_boat")
+    turn = np.diff(np.unwrap(rows[:, 3], period=360.0)) / 0.1
+    assert turn.max() > 30.0
+    assert turn.min() < -30.0
+    assert rows[:, 4].max() > 2.8
+    runs = runs_of("trial", rows[:, 0], rows[:, 1:5], rows[:, 5:7])
+    assert sum(run.seconds for run in runs) > 120.0
+
+
+def test_boats_are_driven_one_after_the_other():
+    trial, told, _ = driven("ardurover_boat", ("one", "two"))
+    assert trial.done
+    owners = [text.partition(": ")[0] for text in told]
+    assert owners == ["one"] * len(MANOEUVRES) + ["two"] * len(MANOEUVRES)
+
+
+def test_commands_the_shield_changed_are_counted():
+    trial = SeaTrial(parse_fleet(TEXT.replace("PLATFORM", "heron")), ("one",))
+    for changed in (True, False, True):
+        fleet = types.SimpleNamespace(names=("one", "two"))
+        trial.take(types.SimpleNamespace(decisions=types.SimpleNamespace(intervened=[changed, False]), fleet=fleet))
+    assert trial.changed == {"one": [2, 3]}

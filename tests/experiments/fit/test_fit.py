@@ -1,0 +1,69 @@
+"""What is fitted foretells the boat, and its margin covers what it misses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.experiments.fit.fitting import measured_of, platform_file
+from steerclear.experiments.fit.judge import judge
+from steerclear.experiments.fit.models import RATE, Seen
+from steerclear.experiments.fit.reading import read_logs
+from steerclear.experiments.fit.rollout import distance_m, errors_of
+from steerclear.shield.platforms.files import parse_platform, to_text
+
+STEPS = Path(__file__).parents[2] / "data" / "boat_steps"
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return read_logs(sorted(STEPS.glob("*.csv")))
+
+
+@pytest.fixture(scope="module")
+def judged(runs):
+    return judge(RATE, runs, Seen.of(runs))
+
+
+def test_the_recorded_boat_is_foretold_on_runs_that_were_held_out(judged):
+    """The bar: half a metre at 3 s, as a median, for turns and for stops."""
+    assert judged.median_of_kind("turn") < 0.5
+    assert judged.median_of_kind("slower") < 0.5
+    assert judged.held_out.all()
+
+
+def test_the_margin_covers_99_of_100_held_out_errors(judged):
+    begin, growth = judged.margin()
+    for column, ahead_s in enumerate((1.0, 3.0, 6.0)):
+        errors = judged.errors_m[:, column]
+        errors = errors[np.isfinite(errors)]
+        assert (errors <= begin + growth * (ahead_s - 1.0) + 1e-9).mean() >= 0.99
+    assert begin > 0.01
+
+
+def test_the_file_is_the_boat(judged, runs):
+    file = platform_file(judged, "rover")
+    assert parse_platform(to_text(file)) == file
+    assert file.measured == measured_of(judged)
+    assert file.platform.max_speed_mps == pytest.approx(3.0)
+    params = file.platform.pack()
+    errors = np.concatenate([distance_m(errors_of(params, run, file.delay_s, 3, 30))[:, -1] for run in runs])
+    assert np.median(errors) < 0.5
+
+
+def test_a_boat_is_not_believed_to_turn_without_way_unless_it_was_seen_to(judged):
+    assert judged.fit.model.values(judged.fit.vector)["turn_rate_at_rest_dps"] < 10.0
+
+
+def test_another_boat_is_foretold_worse(judged, runs):
+    """A test that can fail: the same runs by a boat that turns half as fast are missed by much more."""
+    vector = judged.fit.vector.copy()
+    names = [name for name, *_ in judged.fit.model.bounds]
+    for name in ("max_turn_rate_dps", "max_angular_acc_dps2", "turn_rate_per_mps"):
+        vector[names.index(name)] *= 0.5
+    turns = [run for run in runs if run.kind == "turn"]
+
+    def missed(numbers):
+        params = RATE.platform(numbers, "x", judged.seen.top_mps).pack()
+        return max(float(distance_m(errors_of(params, run, judged.fit.delay_s, 3, 30))[:, -1].max()) for run in turns)
+
+    assert missed(vector) > 2.0 * missed(judged.fit.vector)
