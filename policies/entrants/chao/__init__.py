@@ -1,0 +1,10 @@
+"""Chao-NIWC-PAC: one boat plans on a grid, its mates sail circles.
+
+The paper: PDDL+ planning on a grid, four moves, grabs and contacts as events, opponents static, the goal a capture or to
+be back in the own zone, planned anew as the game goes on; only the middle boat plans. In the entry's public code
+team-mates are obstacles to it and sail constant turns. Filled in: about 16 x 8 cells; a cell is watched where an
+untagged opponent that may tag could reach it before it is left; a plan is asked for every `REPLAN_S` and taken over
+`TAKEN_S` later; without the planner (extra ``[plan]``), and where it has no plan, A* searches the same grid.
+"""
+
+from .team import Chao as Chao
