@@ -13,6 +13,7 @@ from .commands.ablate import ablate
 from .commands.attack import attack
 from .commands.bench import bench
 from .commands.console import leave_failed
+from .commands.demonstrate import demonstrate
 from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
@@ -25,6 +26,7 @@ from .commands.referee import referee
 from .commands.render import render
 from .commands.replay import replay
 from .commands.sim_boats import sim_boats
+from .commands.tournament import tournament
 from .commands.warm_up import warm_up
 from .provenance import package_version
 from .terminal import prepare
@@ -41,6 +43,8 @@ for function in (
     play,
     evaluate,
     ablate,
+    tournament,
+    demonstrate,
     encounters,
     attack,
     parity,

@@ -64,7 +64,9 @@ def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Bu
         if not name or not name.replace("_", "").replace("-", "").isalnum():
             raise PolicyError(f"an entrant cannot be named {name!r}; use letters, digits, _ and -")
         if before is not None and before.build.__qualname__ != build.__qualname__:
-            raise PolicyError(f"there is an entrant {name!r} already ({before.build.__qualname__}); choose another name")
+            raise PolicyError(
+                f"there is an entrant {name!r} already ({before.build.__qualname__}); choose another name"
+            )
         _ENTRANTS[name] = Entrant(name, description, team, build)
         return build
 

@@ -1,9 +1,9 @@
 """Meo-Indep: man-to-man defence.
 
-The paper: the intercept points of every pair of defender and attacker are computed, pairs are chosen for the least total
-distance, each boat drives to its point at full speed and stops there; where paths of team-mates cross, one heading is
-turned to the opposite. Filled in: an intercept point is where the defender at full speed meets the attacker going on as
-it does, moved into the own half; of two boats whose paths cross the later one is turned, once.
+The paper: the intercept points of every pair of defender and attacker are computed, pairs are chosen for the least
+total distance, each boat drives to its point at full speed and stops there; where paths of team-mates cross, one
+heading is turned to the opposite. Filled in: an intercept point is where the defender at full speed meets the attacker
+going on as it does, moved into the own half; of two boats whose paths cross the later one is turned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .plane import STOP_MPS, Order, clip, cross, distance, heading_to, meeting_p
 from .play import EntrantTeam
 from .sight import Point, Sight
 
-ARRIVED_M = 1.5
+ARRIVED_M = 3.0
 MARGIN_M = 2.0
 """Points are kept this far off the dividing line and the edges."""
 

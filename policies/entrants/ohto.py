@@ -12,7 +12,7 @@ from .play import EntrantTeam
 from .posts import arc, assign
 from .sight import Point, Sight
 
-ARRIVED_M, DRIVEN_OFF_M = 1.5, 6.0
+ARRIVED_M, DRIVEN_OFF_M = 2.0, 6.0
 
 
 @entrant("ohto", "stationary defence: holds before its base (Ohto-Indep)", "Ohto-Indep")

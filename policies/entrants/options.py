@@ -1,8 +1,8 @@
 """Crowley-BU-LL's primitives as options, and a team that plays fixed ones.
 
 The paper: the entry learned to choose among attack, flank, avoid, retreat, guard, tag and no-op. Here they are options
-(Sutton, Precup and Singh 1999): each says when it may begin, what it does, and when it ends. What a learner chooses with
-is its own affair; `OptionsTeam` plays given ones, and a person chooses in ``steerclear demonstrate``.
+(Sutton, Precup and Singh 1999): each says when it may begin, what it does, and when it ends. What a learner chooses
+with is its own affair; `OptionsTeam` plays given ones, and a person chooses in ``steerclear demonstrate``.
 """
 
 from __future__ import annotations
@@ -208,7 +208,9 @@ class OptionsTeam(EntrantTeam):
             PolicyError: neither one nor one per boat.
         """
         if len(self._given) not in (1, len(sight.own)):
-            raise PolicyError(f"boats names {len(self._given)} options for {len(sight.own)} boats; give one or one each")
+            raise PolicyError(
+                f"boats names {len(self._given)} options for {len(sight.own)} boats; give one or one each"
+            )
         self._wishes = self._given * len(sight.own) if len(self._given) == 1 else self._given
         self._choices = [Choice("no_op", -math.inf) for _ in sight.own]
 
@@ -219,4 +221,3 @@ class OptionsTeam(EntrantTeam):
             if choice.ended(sight, number) or wanted != choice.option:
                 self._choices[number] = Choice(wanted, sight.time)
         return [OPTIONS[choice.option].steer(sight, number) for number, choice in enumerate(self._choices)]
-

@@ -9,6 +9,8 @@ from .sight import Boat, Point
 Order = tuple[float, float]
 """Speed m/s and absolute heading rad in the own-end frame."""
 STOP_MPS = 0.0
+SLOWING_M, SLOWEST = 10.0, 0.25
+"""Way over which a boat slows down before a point, m, and the least share of its top speed on it."""
 
 
 def distance(a: Point, b: Point) -> float:
@@ -36,10 +38,12 @@ def clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-def go(boat: Boat, point: Point, near_m: float = 1.0) -> Order:
-    """Full speed to a point, and a stop within ``near_m`` of it."""
-    towards = heading_to(boat.at, point)
-    return (boat.top, towards) if distance(boat.at, point) > near_m else (STOP_MPS, boat.heading)
+def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
+    """Full speed to a point, slower on the last `SLOWING_M` (fast boats circle near points), a stop at ``near_m``."""
+    towards, way_m = heading_to(boat.at, point), distance(boat.at, point)
+    if way_m <= near_m:
+        return STOP_MPS, boat.heading
+    return boat.top * clip(way_m / SLOWING_M, SLOWEST, 1.0), towards
 
 
 def meeting_point(hunter: Boat, target: Boat) -> Point:
@@ -65,11 +69,3 @@ def cross(a: Point, b: Point, c: Point, d: Point) -> bool:
         return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 
     return side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0
-
-
-def nearest_on_path(point: Point, a: Point, b: Point) -> Point:
-    """The point of the straight path from a to b that is nearest to a point."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    length = dx * dx + dy * dy
-    share = 0.0 if length == 0.0 else clip(((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / length, 0.0, 1.0)
-    return a[0] + share * dx, a[1] + share * dy

@@ -10,12 +10,13 @@ from ..catalogue import entrant
 from ..plane import STOP_MPS, Order, heading_to
 from ..play import EntrantTeam
 from ..sight import Boat, Sight
-from .grid import Cell, cell_at, middle_of, problem_at
+from .grid import Cell, GridProblem, cell_at, middle_of, problem_at
 from .pddl import available
 from .search import search, way_home
 from .thinking import Thinking, solver_named
 
-REPLAN_S, TAKEN_S = 1.0, 0.5
+LOOK_S, REPLAN_S, TAKEN_S = 1.0, 5.0, 0.5
+"""How often the boat looks whether its plan still holds, makes a new one anyhow, and how long it thinks, s."""
 CONTACT_M = 6.0
 """Less than the tag radius: with all of it, two boats before a base leave no way to the flag."""
 CIRCLE_DEG = 45.0
@@ -55,7 +56,8 @@ class Chao(EntrantTeam):
         self.close()
         self._thinking = Thinking(solver_named(self.planner))
         self._middle, self._plan, self._step = len(sight.own) // 2, [], -1
-        self._every, self._later = max(round(REPLAN_S / self.dt_s), 2), max(round(TAKEN_S / self.dt_s), 1)
+        self._planned_s, self._carried = -math.inf, False
+        self._every, self._later = max(round(LOOK_S / self.dt_s), 2), max(round(TAKEN_S / self.dt_s), 1)
         self._later = min(self._later, self._every - 1)
 
     def decide(self, sight: Sight) -> list[Order]:
@@ -86,7 +88,10 @@ class Chao(EntrantTeam):
         assert self._thinking is not None  # begin() made it
         phase = self._step % self._every
         if phase == 0 and not sight.own[self._middle].tagged:
-            self._thinking.ask(problem_at(sight, self._middle, self._contact_m))
+            problem = problem_at(sight, self._middle, self._contact_m)
+            if not self._plan_holds(problem) or sight.time - self._planned_s >= REPLAN_S:
+                self._planned_s = sight.time
+                self._thinking.ask(problem)
         elif phase == self._later:
             answered = self._thinking.answer(self._plan or None)
             if answered is not None:
@@ -94,6 +99,11 @@ class Chao(EntrantTeam):
                 # no way to a capture: the planner proves it or gives up, A* looks again, else the goal is the own zone
                 plan = plan if plan is not None else search(problem)
                 self._plan = list(plan if plan is not None else way_home(problem) or [])
+
+    def _plan_holds(self, problem: GridProblem) -> bool:
+        """Whether the plan goes on and through open cells, with the flag in the same hands as when it was made."""
+        same, self._carried = self._carried == problem.carrying, problem.carrying
+        return bool(self._plan) and same and all(problem.open_to(cell) for cell in self._plan)
 
     def _follow(self, sight: Sight) -> Order:
         boat, here = sight.own[self._middle], cell_at(sight, sight.own[self._middle].at)

@@ -12,9 +12,9 @@ from . import pddl
 from .grid import Cell, GridProblem
 from .search import search
 
-DEADLINE_S = 0.5
-"""Time a plan has from the question on, beside the game's, s: far beyond what one takes, so that none is missed on a busy
-machine and games come out the same everywhere; a missed one is counted."""
+DEADLINE_S = 2.0
+"""Time a plan has from the question on, s: far beyond what one takes, so that none is missed on a busy machine and
+games come out the same everywhere; a missed one is counted."""
 KEPT = 4096
 Solver = Callable[[GridProblem], list[Cell] | None]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from steerclear.shield.jit import IntArray
 
-from .model import ForwardModel
 from ...rollout import N_MOVES, STOP
+from .model import ForwardModel
 
 MUTATED = 3.0
 """Macro-actions of a plan that a mutation changes, on average."""

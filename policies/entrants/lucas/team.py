@@ -8,13 +8,13 @@ import time
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
+from ...rollout import HEADINGS, STOP
 from ..catalogue import entrant
 from ..plane import STOP_MPS, Order, distance, heading_to, wrap
 from ..play import EntrantTeam
 from ..sight import Boat, Sight
 from .evolution import Plans
 from .model import ForwardModel, Weights
-from ...rollout import HEADINGS, STOP
 
 MOVE_S = 1.2
 HORIZON = 15
