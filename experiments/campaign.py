@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .match import play_row
-from .pool import Outcome, run_all
+from .pool import Engine, Outcome, run_all
 from .spec import MatchSpec
 from .store import ResultStore
 
@@ -36,7 +36,7 @@ class Campaign:
     Args:
         specs: the games.
         store: where results go and where finished ones come from.
-        processes: how many games at once.
+        processes: how many games at once, or the engine that plays them.
         play: from a spec to its row; importable by name.
     """
 
@@ -44,7 +44,7 @@ class Campaign:
         self,
         specs: Sequence[MatchSpec],
         store: ResultStore,
-        processes: int = 1,
+        processes: int | Engine = 1,
         play: Callable[[MatchSpec], Row] = play_row,
     ) -> None:
         self.specs = list(specs)

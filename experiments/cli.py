@@ -13,6 +13,7 @@ from .commands.ablate import ablate
 from .commands.attack import attack
 from .commands.bench import bench
 from .commands.console import leave_failed
+from .commands.demonstrate import demonstrate
 from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
@@ -28,6 +29,7 @@ from .commands.render import render
 from .commands.replay import replay
 from .commands.sea_trial import sea_trial
 from .commands.sim_boats import sim_boats
+from .commands.tournament import tournament
 from .commands.warm_up import warm_up
 from .provenance import package_version
 from .terminal import prepare
@@ -44,6 +46,8 @@ for function in (
     play,
     evaluate,
     ablate,
+    tournament,
+    demonstrate,
     encounters,
     attack,
     parity,

@@ -21,12 +21,13 @@ from .price_page import is_dial, price_page
 from .reach_show import tables_page
 from .tables import interval_text
 from .tally import RADII_M, breach_column
+from .tournament.pages import write_markdown
 from .unsafe_sets_page import sets_page
 from .verdicts import HEADS, verdict_rows
 
 Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
-SOURCES = "ablate, evaluate, bench, encounters, reach compare or reach play"
+SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare or reach play"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -68,7 +69,7 @@ def check_source(content: Mapping[str, Any]) -> None:
         ConfigError: they are of another command.
     """
     command = content.get("command")
-    if not isinstance(command, str) or command not in (*POOLED, "bench", "ablate", "evaluate"):
+    if not isinstance(command, str) or command not in (*POOLED, "bench", "ablate", "evaluate", "tournament"):
         raise ConfigError(f"no page can be made of results of {command!r}; give results of {SOURCES}")
 
 
@@ -112,6 +113,8 @@ def _page_of(content: Mapping[str, Any], folder: Path) -> Page:
     command = content.get("command")
     if command == "bench":
         return "bench.md", bench_page(content), []
+    if command == "tournament":
+        return write_markdown(content, folder)
     stem = f"{'ablation' if command == 'ablate' else 'evaluation'}_{content['settings']['preset']}"
     stem += _apart(content["settings"].get("conditions") or {})
     if re.fullmatch(r"[\w.+-]{1,200}", stem) is None:  # it becomes the name of a file

@@ -16,6 +16,7 @@ from .deploy.deploy_keys import DEPLOY as _DEPLOY
 from .deploy.referee_keys import REFEREE as _REFEREE
 from .deploy.replay_keys import REPLAY as _REPLAY
 from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
+from .tournament.keys import TOURNAMENT as _TOURNAMENT
 
 BREACH = {
     "step": "first step inside the radius",
@@ -258,6 +259,7 @@ REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for n
 KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
+    "tournament": _TOURNAMENT,
     "play": PLAY,
     "parity": PARITY,
     "bench": BENCH,

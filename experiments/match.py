@@ -91,6 +91,12 @@ class Match:
                 break
         return self._result(time.perf_counter() - started)
 
+    def seat(self, team: int, policy: Any) -> None:
+        """Let a policy object play a team, 0 blue or 1 red, in place of the named one; before the game begins."""
+        size = self.env.config.team_size
+        self.teams[team].close()
+        self.teams[team] = Seat(policy, self.env, self.env.possible_agents[team * size : (team + 1) * size])
+
     def close(self) -> None:
         """Close the window and let the policies give back what they hold."""
         for team in self.teams:
@@ -204,10 +210,14 @@ class Match:
             for suffix, team in (("", own), ("_against", 1 - own))
         }
 
+    def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
+        """Judge the breaches of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
+        if self._log is None:
+            return None
+        return judge_game(self._log, self.env.core.params, record, team, self.shielding.motion)
+
     def _verdict_columns(self, record: Record) -> dict[str, Any]:
-        breaches = None
-        if self._log is not None:
-            breaches = judge_game(self._log, self.env.core.params, record, self.spec.own_team, self.shielding.motion)
+        breaches = self.breaches(record, self.spec.own_team)
         return {**verdict_columns(breaches, self.shielding.separation_m), "breaches": breaches}
 
     def _decision_columns(self) -> dict[str, float | None]:

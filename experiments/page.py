@@ -49,10 +49,10 @@ def html_page(name: str, parts: Mapping[str, str], sources: str = "") -> str:
     return fill(template("page.html"), {**parts, "BODY": body, "SOURCES": sources})
 
 
-def report_page(name: str, parts: Mapping[str, str]) -> str:
+def report_page(name: str, parts: Mapping[str, str], sources: str = "") -> str:
     """As `html_page`, for reports: their title, warnings, headlines, replays and bars stand at ``TOP``."""
     parts = {"WARNINGS": "", **parts}
-    return html_page(name, {**parts, "TOP": fill(template("report_top.html"), parts).removesuffix("\n")})
+    return html_page(name, {**parts, "TOP": fill(template("report_top.html"), parts).removesuffix("\n")}, sources)
 
 
 def as_json(content: Any) -> str:

@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
@@ -58,8 +58,15 @@ def check_jobs(jobs: int | None) -> int:
     return jobs or available_cores()
 
 
+class Engine(Protocol):
+    """Runs jobs elsewhere, see `engines`."""
+
+    def run(self, function: Callable[[Job], Answer], jobs: Sequence[Job]) -> Iterator[Outcome[Job, Answer]]:
+        """Yield one outcome per job in the order they end."""
+
+
 def run_all(
-    function: Callable[[Job], Answer], jobs: Sequence[Job], processes: int = 1
+    function: Callable[[Job], Answer], jobs: Sequence[Job], processes: int | Engine = 1
 ) -> Iterator[Outcome[Job, Answer]]:
     """Run ``function`` on every job and yield the outcomes as they come.
 
@@ -69,11 +76,14 @@ def run_all(
     Args:
         function: importable by name (workers are spawned, not forked), as is every job's data.
         jobs: what to run it on.
-        processes: 1 runs everything in this process.
+        processes: 1 runs everything in this process; an engine runs it elsewhere.
 
     Yields:
         One `Outcome` per job, in the order they end.
     """
+    if not isinstance(processes, int):
+        yield from processes.run(function, jobs)
+        return
     processes = min(processes, len(jobs))
     if processes <= 1:
         yield from (attempt(function, job) for job in jobs)

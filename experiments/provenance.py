@@ -12,7 +12,19 @@ from typing import Any
 
 from .pool import available_cores
 
-PACKAGES = ("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch")
+PACKAGES = (
+    "steerclear",
+    "numpy",
+    "scipy",
+    "numba",
+    "qpsolvers",
+    "daqp",
+    "osqp",
+    "gymnasium",
+    "pettingzoo",
+    "torch",
+    "kairos-planner",
+)
 
 NO_GAME = ("shield/bridge", "env/render", "experiments/boats", "experiments/commands", "experiments/deploy")
 """Folders whose code changes no result that is kept on disk."""

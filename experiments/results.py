@@ -11,7 +11,7 @@ from .ablation import AblationSettings, ablation_bars, most_instructive, spec_of
 from .campaign import Played
 from .failure_words import failure_warnings, held_games
 from .match import play_match
-from .pool import run_all
+from .pool import Engine, run_all
 from .provenance import machine, versions
 from .replay_html import write_replay
 from .report_html import write_report
@@ -90,7 +90,7 @@ def write_results(folder: Path, results: dict[str, Any], rows: Sequence[Row], re
 
 
 def replay_of(
-    rows: Sequence[Row], specs: Sequence[MatchSpec], separation_m: float, processes: int
+    rows: Sequence[Row], specs: Sequence[MatchSpec], separation_m: float, processes: int | Engine
 ) -> tuple[dict[str, Any], list[Any]] | None:
     """Play the most instructive pair of games again, for its records.
 

@@ -129,8 +129,9 @@ def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
         if settings is not None:
             told = spec.conditions if side == spec.side else replace(spec.conditions, delay_s=0.0)
             _add(shielding, side, {**told.shield_settings(env.config.dt_s), **settings}, spec.shield_autopilot)
-    if spec.shield is not None:
-        shielding.separation_m = float(spec.shield.get("separation_m", RADII_M[0]))
+    given = spec.shield if spec.shield is not None else spec.opponent_shield
+    if given is not None:
+        shielding.separation_m = float(given.get("separation_m", RADII_M[0]))
     return shielding
 
 

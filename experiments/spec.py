@@ -93,7 +93,8 @@ class MatchSpec:
     @property
     def judged(self) -> bool:
         """Whether the oracle judges this game's breaches."""
-        return self.judge == "all" or (self.judge == "shielded" and self.shield is not None)
+        shielded = self.shield is not None or self.opponent_shield is not None
+        return self.judge == "all" or (self.judge == "shielded" and shielded)
 
     def config(self) -> GameConfig:
         """Build the game's settings.

@@ -6,6 +6,7 @@ take objects and functions. `make_batch` builds the scripted ones for a `Batched
 
 from .actions import HOLD, ActionReader, to_command
 from .adapters import from_agents, from_callable
+from .entrants import Entrant, entrant, entrants
 from .fingerprint import fingerprint
 from .guard import GuardedTeam
 from .protocol import Action, BatchPolicy, TeamPolicy
@@ -19,12 +20,15 @@ __all__ = [
     "Action",
     "ActionReader",
     "BatchPolicy",
+    "Entrant",
     "Failure",
     "GuardedTeam",
     "PolicyReport",
     "TeamPolicy",
     "check",
     "describe",
+    "entrant",
+    "entrants",
     "fingerprint",
     "from_agents",
     "from_callable",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from steerclear.shield.exceptions import PolicyError
 
+from .entrants.catalogue import entrants
 from .registry import SB3_PREFIX, names
 
 RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"
@@ -24,13 +25,15 @@ def fingerprint(name_or_path: str | Path) -> str:
         name_or_path: as for `make`; of a ``solution.py`` all the folder it lies in counts.
 
     Returns:
-        16 hexadecimal digits; empty for the named policies and where there is no file.
+        16 hexadecimal digits; empty for our named policies and where there is no file.
 
     Raises:
         PolicyError: a file cannot be read.
     """
     text = str(name_or_path)
     path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
+    if text in entrants():
+        return entrants()[text].files()
     if text in names() or not path.exists():
         return ""
     alone = text.startswith(SB3_PREFIX) or (path.is_file() and path.suffix != ".py")

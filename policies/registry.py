@@ -11,6 +11,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import PolicyError
 
+from .entrants.catalogue import entrants
 from .keyboard import KeyboardTeam, Keys
 from .protocol import BatchPolicy, TeamPolicy
 from .scripted.batch import ScriptedBatch
@@ -107,7 +108,7 @@ ENTRIES: dict[str, Entry] = {
     "waypoints": Entry("seeded random waypoints, or given ones (points=..., speed_fraction=...)", _waypoints),
     "mixed": Entry("any mix of the scripted boats (boats='medium_attack,rammer,hold')", _mixed),
 }
-"""The scripted policies; "keyboard" is the one named policy that is not scripted."""
+"""The scripted policies; beside them there are the competition's `entrants` and "keyboard"."""
 
 KEYBOARD = "keyboard"
 HIDDEN = "hidden"
@@ -117,12 +118,13 @@ KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..
 
 def names() -> list[str]:
     """Names `make` knows, besides paths of submissions and ``sb3:PATH.zip``."""
-    return [*ENTRIES, KEYBOARD]
+    return [*ENTRIES, *entrants(), KEYBOARD]
 
 
 def describe() -> dict[str, str]:
     """What each named policy does, in a line."""
-    return {name: entry.description for name, entry in ENTRIES.items()} | {KEYBOARD: KEYBOARD_DESCRIPTION}
+    named = {**ENTRIES, **entrants()}
+    return {name: entry.description for name, entry in named.items()} | {KEYBOARD: KEYBOARD_DESCRIPTION}
 
 
 def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> TeamPolicy:
@@ -142,6 +144,8 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
         options["composition"] = composition_of(game)
     if text in ENTRIES:
         return ScriptedTeam(text, _plan(text, options))
+    if text in entrants():
+        return _call(entrants()[text].build, text, options)
     if text == KEYBOARD:
         return _call(_keyboard, KEYBOARD, options)
     if text.startswith(SB3_PREFIX):
@@ -179,7 +183,7 @@ def make_batch(name: str, **options: Any) -> BatchPolicy:
     """
     if name in ENTRIES:
         return ScriptedBatch(name, _plan(name, options))
-    if name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
+    if name in entrants() or name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
         raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)}")
     raise unknown_policy(name)
 

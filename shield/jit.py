@@ -20,7 +20,7 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
-COMPILE_NOTHING = ("shield/bridge", "shield/wrappers", "env/render", "policies/submissions")
+COMPILE_NOTHING = ("shield/bridge", "shield/wrappers", "env/render", "policies/submissions", "policies/entrants")
 """Folders that hold no compiled function, nor anything that one uses: changes there leave machine code as it is."""
 
 

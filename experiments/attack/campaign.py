@@ -14,7 +14,7 @@ from ..encounters.play import play
 from ..encounters.replays import records_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import scenes_of
-from ..pool import run_all
+from ..pool import Engine, run_all
 from ..provenance import machine, versions
 from ..replay_html import write_replay
 from ..store import LINES_FILE, ResultStore, write_json
@@ -30,7 +30,7 @@ def searches_of(first: Search, restarts: int) -> list[Search]:
 
 
 def run_searches(
-    searches: Sequence[Search], store: ResultStore, processes: int, notice: Callable[[int], None]
+    searches: Sequence[Search], store: ResultStore, processes: int | Engine, notice: Callable[[int], None]
 ) -> list[dict[str, Any]]:
     """Run what is not in the store yet; return what failed."""
     before, failed = store.load(), []

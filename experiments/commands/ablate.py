@@ -8,6 +8,7 @@ from typing import Any
 from ..ablation import AblationSettings
 from ..ablation import quick as small_version
 from ..conditions import Conditions
+from ..engines import engine_of
 from ..score import DEFAULT_PENALTY
 from ..spec import ANSWER_S
 from ..store import write_json
@@ -29,6 +30,8 @@ def ablate(
     out: o.Out = None,
     quick: o.Quick = False,
     jobs: o.Jobs = None,
+    engine: o.Engine = "pool",
+    address: o.Address = None,
     resume: o.Resume = False,
     separation: o.Separation = None,
     certificate: o.Certificate = None,
@@ -72,7 +75,7 @@ def ablate(
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
-    results = run_games("ablate", settings, out, jobs, resume, quick)
+    results = run_games("ablate", settings, out, engine_of(engine, address, jobs), resume, quick)
     end_run(results, check, json_file)
 
 

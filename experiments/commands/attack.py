@@ -13,7 +13,8 @@ from ..attack.campaign import passed, run_searches, searches_of, searches_table,
 from ..attack.search import Search
 from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
-from ..pool import check_jobs
+from ..engines import Workers as Engines
+from ..engines import engine_of
 from ..store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
@@ -38,6 +39,8 @@ def attack(
     seed: Annotated[int, typer.Option(metavar="N", help="Of the searches.")] = 0,
     folder: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder.")] = None,
     workers: Workers = None,
+    engine: o.Engine = "pool",
+    address: o.Address = None,
     resume: o.Resume = False,
     replay: Annotated[
         list[Path] | None, typer.Option("--replay", metavar="FILE", help="Play found scenes again instead.")
@@ -60,7 +63,7 @@ def attack(
     conditions = Conditions(radius, delay, noise, current)
     first = Search(*pairs[0], attackers, own, guards[0], conditions, seed, 0, population, generations)
     first.duel()
-    results = _run(searches_of(first, restarts), folder, workers, resume)
+    results = _run(searches_of(first, restarts), folder, engine_of(engine, address, workers), resume)
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
@@ -68,14 +71,14 @@ def attack(
     finish(passed(results))
 
 
-def _run(searches: list[Search], folder: Path | None, workers: int | None, resume: bool) -> dict[str, Any]:
+def _run(searches: list[Search], folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
     if resume and folder is None:
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder("attack")
-    processes, store, started = check_jobs(workers), ResultStore(folder, resume, "attack"), time.perf_counter()
+    store, started = ResultStore(folder, resume, "attack"), time.perf_counter()
     try:
         with progress("searches", len(searches)) as notice:
-            failed = run_searches(searches, store, processes, notice)
+            failed = run_searches(searches, store, workers, notice)
     except KeyboardInterrupt:
         results = write_all(folder, searches, store, [], time.perf_counter() - started)
         kept = f"{len(results['searches'])} of {len(searches)} searches kept in {folder / LINES_FILE}"

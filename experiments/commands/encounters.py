@@ -16,7 +16,8 @@ from ..encounters.families import FAMILIES
 from ..encounters.guards import parse_guards
 from ..encounters.results import cells_table, heads_legend, results_of, write_all
 from ..encounters.scenes import Conditions
-from ..pool import check_jobs
+from ..engines import Workers as Engines
+from ..engines import engine_of
 from ..store import LINES_FILE, ResultStore, write_json
 from ..tables import bars_table
 from . import options as o
@@ -60,6 +61,8 @@ def encounters(
     seed: Annotated[int, typer.Option(metavar="N", help="Of the scenes, the same for every guard.")] = 0,
     folder: Folder = None,
     workers: Workers = None,
+    engine: o.Engine = "pool",
+    address: o.Address = None,
     resume: o.Resume = False,
     no_judge: NoJudge = False,
     scene: SceneFiles = None,
@@ -97,7 +100,7 @@ def encounters(
         conditions=Conditions(radius, delay, noise, current),
         judge=not no_judge,
     )
-    results = _run(settings, folder, workers, resume)
+    results = _run(settings, folder, engine_of(engine, address, workers), resume)
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
@@ -161,12 +164,11 @@ def family_names(text: str) -> tuple[str, ...]:
     return tuple(FAMILIES) if names == ("all",) else names
 
 
-def _run(settings: Settings, folder: Path | None, workers: int | None, resume: bool) -> dict[str, Any]:
+def _run(settings: Settings, folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
     if resume and folder is None:
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder("encounters")
-    processes = check_jobs(workers)
-    campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), processes)
+    campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), workers)
     started = time.perf_counter()
     try:
         with progress("encounters", campaign.encounters) as notice:

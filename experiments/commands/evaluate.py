@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..ablation import AblationSettings
 from ..ablation import quick as small_version
 from ..conditions import Conditions
+from ..pool import check_jobs
 from ..score import DEFAULT_PENALTY
 from ..spec import ANSWER_S
 from . import options as o
@@ -80,4 +81,4 @@ def evaluate(
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
-    end_run(run_games("evaluate", settings, out, jobs, resume, quick), False, json_file)
+    end_run(run_games("evaluate", settings, out, check_jobs(jobs), resume, quick), False, json_file)

@@ -13,8 +13,8 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
 from ..conditions import words_of
+from ..engines import Workers
 from ..judging import check_judge
-from ..pool import check_jobs
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..sea import check_current
@@ -58,11 +58,19 @@ def run_games(
     command: str,
     settings: AblationSettings,
     folder: Path | None,
-    jobs: int | None = None,
+    workers: Workers = 1,
     resume: bool = False,
     quick: bool = False,
 ) -> dict[str, Any]:
     """Play all games of the settings, write everything, show the tables.
+
+    Args:
+        command: which command this is.
+        settings: of the run.
+        folder: for results.
+        workers: processes here, or a cluster.
+        resume: go on with what the folder holds.
+        quick: whether this is the small version.
 
     Returns:
         The content of results.json.
@@ -71,18 +79,17 @@ def run_games(
         SteerclearError: bad input; what was played before stays on disk.
         Interrupted: by Ctrl-C; what is finished has been written.
     """
-    processes = check_jobs(jobs)
     check_settings(settings)
     if resume and folder is None:
         raise ConfigError("--resume needs the --out folder of the run to go on with")
     folder = folder or default_folder(command)
-    campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), processes)
+    campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), workers)
     if resume:
         warn(campaign.words_of_before)
     started = time.perf_counter()
     try:
-        played = _play(campaign, processes)
-        replay = replay_of(played.rows, campaign.specs, settings.separation_m, processes)
+        played = _play(campaign, workers)
+        replay = replay_of(played.rows, campaign.specs, settings.separation_m, workers)
     except KeyboardInterrupt:
         _write(command, settings, folder, campaign.so_far(), time.perf_counter() - started, quick)
         raise Interrupted(_how_to_go_on(folder, campaign)) from None
@@ -129,10 +136,10 @@ def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
         raise PolicyError("; ".join(results["held"]))
 
 
-def _play(campaign: Campaign, processes: int) -> Played:
-    if processes > 1 and len(campaign.specs) > 1:
+def _play(campaign: Campaign, workers: Workers) -> Played:
+    if isinstance(workers, int) and workers > 1 and len(campaign.specs) > 1:
         with progress("compiling; the first time a minute or two", WARMED) as notice:
-            warm_up(campaign.specs, processes, notice)
+            warm_up(campaign.specs, workers, notice)
     with progress("games", len(campaign.specs)) as notice:
         return campaign.run(notice)
 

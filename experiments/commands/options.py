@@ -18,6 +18,12 @@ Games = Annotated[int | None, typer.Option(metavar="N", help="Games per pairing 
 Seed = Annotated[int, typer.Option(metavar="N", help="Game g is played from seed + g.")]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for results.", show_default="results/...")]
 Jobs = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
+Engine = Annotated[
+    str, typer.Option("--engine", metavar="NAME", help="Where games run: pool (this machine) or ray (a cluster).")
+]
+Address = Annotated[
+    str | None, typer.Option("--address", metavar="HOST:PORT", help="Ray cluster to use.", show_default="one here")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with what an interrupted run left in --out.")]
 Quick = Annotated[bool, typer.Option("--quick", help="The small version: fewer and shorter games.")]
 Separation = Annotated[float | None, typer.Option(metavar="M", help="Radius the shield keeps, m.", show_default="2.5")]

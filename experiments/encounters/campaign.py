@@ -10,7 +10,7 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-from ..pool import run_all
+from ..pool import Engine, run_all
 from ..spec import check_seed
 from ..store import ResultStore, key_of
 from .families import draw, get_family
@@ -130,10 +130,10 @@ class Campaign:
     Args:
         settings: what to play.
         store: where results go and where finished ones come from.
-        processes: how many at once.
+        processes: how many at once, or the engine that plays them.
     """
 
-    def __init__(self, settings: Settings, store: ResultStore, processes: int = 1) -> None:
+    def __init__(self, settings: Settings, store: ResultStore, processes: int | Engine = 1) -> None:
         self.settings, self.store, self.processes = settings, store, processes
         self.jobs = list(jobs_of(settings))
         self.failed: list[dict[str, Any]] = []

@@ -25,7 +25,10 @@ def test_every_name_builds_a_policy_that_names_itself(name):
     assert team.name == name
 
 
-@pytest.mark.parametrize("name", [name for name in policies.names() if name != "keyboard"])
+SINGLE = {"keyboard", *policies.entrants()}
+
+
+@pytest.mark.parametrize("name", [name for name in policies.names() if name not in SINGLE])
 def test_every_scripted_name_builds_a_batch_policy(name):
     assert isinstance(policies.make_batch(name), BatchPolicy)
 
@@ -67,7 +70,7 @@ def test_an_unknown_option_is_explained():
 
 
 def test_a_batch_takes_no_single_game_policies(tmp_path):
-    for name in ("keyboard", "sb3:model.zip", str(tmp_path)):
+    for name in ("keyboard", "lucas", "sb3:model.zip", str(tmp_path)):
         with pytest.raises(PolicyError, match="single games only"):
             policies.make_batch(name)
 

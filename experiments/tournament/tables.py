@@ -1,0 +1,161 @@
+"""The tables of a tournament as heads and rows of text, for terminal, report and documentation alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..tables import number_text
+from .paper import paper_row
+
+Table = tuple[str, list[str], list[list[str]]]
+"""Title, heads, rows."""
+Results = Mapping[str, Any]
+
+
+def all_tables(results: Results) -> list[Table]:
+    """Every table, in order."""
+    found: list[Table] = []
+    if results["qualifying"]:
+        found.append(qualifying(results))
+    for state in results["states"]:
+        if state["standings"]:
+            found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
+    if results["prices"]:
+        found.append(price(results))
+    return found
+
+
+def shown(state: str) -> str:
+    """A state in words."""
+    return {"off": "no shields", "all": "all shielded"}.get(state, f"{state} shielded")
+
+
+def table_3(state: Mapping[str, Any]) -> Table:
+    """Ranks with the penalty beside the paper's Table 3."""
+    rows = []
+    for line in state["standings"]:
+        paper = paper_row(line["team"])
+        rows.append(
+            [
+                line["team"],
+                f"{line['rank']}{_limits(line, 'rank', 0)}",
+                f"{line['score']:.2f}{_limits(line, 'score', 2)}",
+                f"{line['score_0.025']:.2f}",
+                f"{line['collisions']:.1f}{_limits(line, 'collisions', 1)}",
+                "-" if paper is None else f"{paper.rank}",
+                "-" if paper is None else f"{paper.score:g}",
+                "-" if paper is None else f"{paper.collisions}",
+            ]
+        )
+    heads = ["team", "rank", "score", "at 0.025", "collisions", "paper: rank", "score", "collisions"]
+    return f"Table 3, with the penalty: {shown(state['state'])}", heads, rows
+
+
+def table_4(state: Mapping[str, Any]) -> Table:
+    """Ranks without the penalty beside the paper's Table 4."""
+    rows = []
+    for line in sorted(state["standings"], key=lambda line: (line["rank_free"], line["team"])):
+        paper = paper_row(line["team"])
+        rows.append(
+            [
+                line["team"],
+                f"{line['rank_free']}",
+                f"{line['net_captures']:.1f}{_limits(line, 'net_captures', 1)}",
+                f"{line['captures']:.1f}",
+                f"{line['captures_against']:.1f}",
+                "-" if paper is None else f"{paper.rank_free}",
+                "-" if paper is None else f"{paper.captures}",
+            ]
+        )
+    heads = ["team", "rank", "net captures", "captures", "against", "paper: rank", "captures"]
+    return f"Table 4, penalty off: {shown(state['state'])}", heads, rows
+
+
+def counts(state: Mapping[str, Any]) -> Table:
+    """What else was counted."""
+    names = ("grabs", "grabs_against", "tags", "tags_against", "hits_teammate", "hits_opponent")
+    rows = [[line["team"], *(f"{line[name]:.1f}" for name in names)] for line in state["standings"]]
+    heads = ["team", "grabs", "grabbed", "tags", "tagged", "hits of mates", "hits of opponents"]
+    return f"Counts: {shown(state['state'])}", heads, rows
+
+
+def wins(state: Mapping[str, Any]) -> Table:
+    """Share of games the row's team won against the column's, %."""
+    rows = [
+        [team, *("-" if share is None or share != share else f"{100 * share:.0f}" for share in row)]
+        for team, row in zip(state["teams"], state["wins"], strict=True)
+    ]
+    return f"Games won against, % (a draw is half): {shown(state['state'])}", ["", *state["teams"]], rows
+
+
+def alpha(state: Mapping[str, Any]) -> Table:
+    """Alpha-rank at several strengths of selection, %."""
+    rows = [
+        [team, *(f"{100 * shares[k]:.0f}" for shares in state["alpha_rank"].values())]
+        for k, team in enumerate(state["teams"])
+    ]
+    return (
+        f"Alpha-rank, %, by strength of selection: {shown(state['state'])}",
+        ["team", *(f"{strength}" for strength in state["alpha_rank"])],
+        rows,
+    )
+
+
+def price(results: Results) -> Table:
+    """What the shield costs and brings, per team and game."""
+    rows = [
+        [
+            line["team"],
+            f"{number_text(line['net_captures_off'])} → {number_text(line['net_captures_on'])}",
+            _interval(line["net_captures"]),
+            f"{number_text(line['hits_off'])} → {number_text(line['hits_on'])}",
+            _interval(line["hits"]),
+            "-" if line["avoidable"] is None else f"{line['avoidable']} of {line['judged']} games",
+            {True: "yes", False: "no", None: "-"}[line["kept"]],
+        ]
+        for line in results["prices"]
+    ]
+    heads = ["team", "net captures a game", "change", "hits a game", "change", "avoidable, shielded", "keeps 95 %"]
+    return "Price of safety, per team", heads, rows
+
+
+def qualifying(results: Results) -> Table:
+    """The qualifying."""
+    rows = [
+        [line["team"], shown(line["state"]), f"{line['games']}", f"{line['score']:.2f}", f"{line['captures']}"]
+        for line in results["qualifying"]
+    ]
+    return "Qualifying against easy, medium and hidden", ["team", "state", "games", "score a game", "captures"], rows
+
+
+def agreement_lines(results: Results) -> list[str]:
+    """How far the ranks agree with the paper's, in sentences."""
+    found = []
+    for state in results["states"]:
+        for name, words in (("table_3", "Table 3"), ("table_4", "Table 4")):
+            if state[name] is not None:
+                found.append(f"{words}, {shown(state['state'])}: {_agreed(state[name])}")
+        if state["cycles"]:
+            found.append(f"Cycles, {shown(state['state'])}: {'; '.join(state['cycles'])}.")
+    return found
+
+
+def _agreed(entry: Mapping[str, Any]) -> str:
+    pairs = ", ".join(entry["disagree"])
+    return f"Kendall's tau-b {_interval(entry['kendall'])} over {', '.join(entry['teams'])}; " + (
+        f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round."
+    )
+
+
+def _interval(entry: Mapping[str, float | None]) -> str:
+    value = number_text(entry["value"])
+    low, high = entry.get("low"), entry.get("high")
+    if low is None or high is None or low != low or high != high:
+        return value
+    return f"{value} ({number_text(low)} to {number_text(high)})"
+
+
+def _limits(line: Mapping[str, Any], name: str, digits: int) -> str:
+    low, high = line[f"{name}_low"], line[f"{name}_high"]
+    return "" if low is None else f" ({low:.{digits}f} to {high:.{digits}f})"

@@ -1,0 +1,90 @@
+"""The grid as a PDDL+ domain and problem, and the planner that solves it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import cache
+from importlib.util import find_spec
+from typing import Any
+
+from .grid import COLUMNS, MOVES, ROWS, Cell, GridProblem
+
+TIMEOUT_S = 2.0
+"""The planner itself gives up then, s."""
+DOMAIN = """
+(define (domain capture-the-flag)
+  (:requirements :strips :typing :negative-preconditions :time)
+  (:types cell)
+  (:predicates (at ?c - cell) (next ?a ?b - cell) (flag ?c - cell) (watched ?c - cell) (own ?c - cell)
+               (carrying) (tagged) (captured))
+  (:action move
+    :parameters (?a ?b - cell)
+    :precondition (and (at ?a) (next ?a ?b) (not (tagged)))
+    :effect (and (not (at ?a)) (at ?b)))
+  (:event grab
+    :parameters (?c - cell)
+    :precondition (and (at ?c) (flag ?c) (not (carrying)) (not (tagged)))
+    :effect (carrying))
+  (:event contact
+    :parameters (?c - cell)
+    :precondition (and (at ?c) (watched ?c) (not (tagged)))
+    :effect (tagged))
+  (:event capture
+    :parameters (?c - cell)
+    :precondition (and (at ?c) (own ?c) (carrying) (not (tagged)) (not (captured)))
+    :effect (captured)))
+"""
+_MOVE = re.compile(r"\(move \S+ c(\d+)-(\d+)\)")
+
+
+def available() -> bool:
+    """Whether the planner is installed."""
+    return find_spec("kairos") is not None
+
+
+def problem_text(problem: GridProblem) -> str:
+    """The PDDL+ problem: cells with a mate are left out, watched ones are there and make contact."""
+    cells = [(c, r) for c in range(COLUMNS) for r in range(ROWS) if (c, r) not in problem.blocked]
+    known = set(cells)
+    facts = [f"(at {_name(problem.start)})", *(["(carrying)"] if problem.carrying else [])]
+    # nobody gains by moving off a watched cell, where contact ends the plan
+    facts += [
+        f"(next {_name(cell)} {_name(to)})"
+        for cell in cells
+        if cell not in problem.watched
+        for to in ((cell[0] + column, cell[1] + row) for column, row in MOVES)
+        if to in known
+    ]
+    facts += _about("flag", problem.flag & known) + _about("watched", problem.watched & known)
+    facts += _about("own", [cell for cell in cells if cell[0] < problem.own])
+    names = " ".join(map(_name, cells))
+    init = " ".join(facts)
+    return (
+        f"(define (problem now) (:domain capture-the-flag) (:objects {names} - cell) (:init {init}) (:goal (captured)))"
+    )
+
+
+def plan(problem: GridProblem, timeout_s: float = TIMEOUT_S) -> list[Cell] | None:
+    """Cells to move through to a capture; None where the planner finds no plan. Needs the extra ``[plan]``."""
+    kairos, domain = _planner()
+    parsed = kairos.parse_problem(problem_text(problem), domain)
+    result = kairos.Planner().solve(parsed, timeout=timeout_s, anytime=False)
+    if result.status != kairos.Status.SOLVED:
+        return None
+    return [(int(column), int(row)) for column, row in _MOVE.findall(str(result.plan))]
+
+
+@cache
+def _planner() -> tuple[Any, Any]:
+    import kairos  # the extra [plan]
+
+    return kairos, kairos.parse_domain(DOMAIN)
+
+
+def _about(predicate: str, cells: Iterable[Cell]) -> list[str]:
+    return [f"({predicate} {_name(cell)})" for cell in sorted(cells)]
+
+
+def _name(cell: Cell) -> str:
+    return f"c{cell[0]}-{cell[1]}"

@@ -1,0 +1,140 @@
+"""The team: the middle boat follows plans, the others sail circles."""
+
+from __future__ import annotations
+
+import math
+
+from steerclear.shield.exceptions import PolicyError
+
+from ..catalogue import entrant
+from ..plane import STOP_MPS, Order, heading_to
+from ..play import EntrantTeam
+from ..sight import Boat, Sight
+from .grid import Cell, GridProblem, cell_at, middle_of, problem_at
+from .pddl import available
+from .search import search, way_home
+from .thinking import Thinking, solver_named
+
+LOOK_S, REPLAN_S, TAKEN_S = 1.0, 5.0, 0.5
+"""How often the boat looks whether its plan still holds, makes a new one anyhow, and how long it thinks, s."""
+CONTACT_M = 6.0
+"""Less than the tag radius: with all of it, two boats before a base leave no way to the flag."""
+CIRCLE_DEG = 45.0
+CIRCLE_SHARE = 0.5
+"""Of top speed, at which team-mates sail their circles."""
+PLANNERS = ("auto", "pddl", "astar")
+
+
+@entrant("chao", "the middle boat plans on a grid (PDDL+, or A*), mates sail circles (Chao-NIWC-PAC)", "Chao-NIWC-PAC")
+class Chao(EntrantTeam):
+    """Plans for its middle boat.
+
+    Args:
+        planner: "pddl" (extra ``[plan]``), "astar", or "auto" for the first that is there.
+        contact_m: distance to an opponent that counts as contact in plans, m.
+
+    Raises:
+        PolicyError: an unknown planner, one that is not installed, or a distance that is none.
+    """
+
+    name = "chao"
+
+    def __init__(self, planner: str = "auto", contact_m: float = CONTACT_M) -> None:
+        super().__init__()
+        if planner not in PLANNERS:
+            raise PolicyError(f"planner is {planner!r}; choose from {', '.join(PLANNERS)}")
+        if planner == "pddl" and not available():
+            raise PolicyError('the PDDL+ planner is not installed; pip install "steerclear[plan]", or planner="astar"')
+        if not 0.0 <= contact_m < math.inf:
+            raise PolicyError(f"contact_m is {contact_m!r}; give a distance in m, 0 or more")
+        self.planner = ("pddl" if available() else "astar") if planner == "auto" else planner
+        self._contact_m = float(contact_m)
+        self._thinking: Thinking | None = None
+
+    def begin(self, sight: Sight) -> None:
+        """Nothing is planned."""
+        self.close()
+        self._thinking = Thinking(solver_named(self.planner))
+        self._middle, self._plan, self._step = len(sight.own) // 2, [], -1
+        self._planned_s, self._carried = -math.inf, False
+        self._every, self._later = max(round(LOOK_S / self.dt_s), 2), max(round(TAKEN_S / self.dt_s), 1)
+        self._later = min(self._later, self._every - 1)
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Plan now and then, follow the plan, let the others circle."""
+        self._step += 1
+        self._think(sight)
+        return [
+            self._follow(sight) if number == self._middle else circling(boat, number < self._middle)
+            for number, boat in enumerate(sight.own)
+        ]
+
+    @property
+    def missed_deadlines(self) -> int:
+        """Plans that came too late in this game."""
+        return 0 if self._thinking is None else self._thinking.missed
+
+    @property
+    def think_times_s(self) -> list[float]:
+        """How long each plan of this game took, s."""
+        return [] if self._thinking is None else self._thinking.times_s
+
+    def close(self) -> None:
+        """End the planner's thread."""
+        if self._thinking is not None:
+            self._thinking.close()
+
+    def _think(self, sight: Sight) -> None:
+        assert self._thinking is not None  # begin() made it
+        phase = self._step % self._every
+        if phase == 0 and not sight.own[self._middle].tagged:
+            problem = problem_at(sight, self._middle, self._contact_m)
+            if not self._plan_holds(problem) or sight.time - self._planned_s >= REPLAN_S:
+                self._planned_s = sight.time
+                self._thinking.ask(problem)
+        elif phase == self._later:
+            answered = self._thinking.answer(self._plan or None)
+            if answered is not None:
+                problem, plan = answered
+                # no way to a capture: the planner proves it or gives up, A* looks again, else the goal is the own zone
+                plan = plan if plan is not None else search(problem)
+                self._plan = list(plan if plan is not None else way_home(problem) or [])
+
+    def _plan_holds(self, problem: GridProblem) -> bool:
+        """Whether the plan goes on and through open cells, with the flag in the same hands as when it was made."""
+        same, self._carried = self._carried == problem.carrying, problem.carrying
+        return bool(self._plan) and same and all(problem.open_to(cell) for cell in self._plan)
+
+    def _follow(self, sight: Sight) -> Order:
+        boat, here = sight.own[self._middle], cell_at(sight, sight.own[self._middle].at)
+        if here in self._plan:
+            self._plan = self._plan[self._plan.index(here) + 1 :] if not _twice(self._plan, here) else self._after(here)
+        if not self._plan:
+            return STOP_MPS, boat.heading
+        return boat.top, heading_to(boat.at, middle_of(sight, straight_run(here, self._plan)))
+
+    def _after(self, here: Cell) -> list[Cell]:
+        """The plan after a cell it passes twice (out and back): from its first visit."""
+        first = self._plan.index(here)
+        return self._plan[first + 1 :] if first <= 1 else self._plan
+
+
+def _twice(plan: list[Cell], cell: Cell) -> bool:
+    return plan.count(cell) > 1
+
+
+def straight_run(here: Cell, plan: list[Cell]) -> Cell:
+    """The cell at which a plan's first straight run ends."""
+    step = (plan[0][0] - here[0], plan[0][1] - here[1])
+    end = plan[0]
+    for cell in plan[1:]:
+        if (cell[0] - end[0], cell[1] - end[1]) != step:
+            break
+        end = cell
+    return end
+
+
+def circling(boat: Boat, to_port: bool) -> Order:
+    """A constant turn, to one side for boats above the planner and to the other below."""
+    turn = math.radians(-CIRCLE_DEG if to_port else CIRCLE_DEG)
+    return CIRCLE_SHARE * boat.top, boat.heading + turn

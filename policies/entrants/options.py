@@ -1,0 +1,223 @@
+"""Crowley-BU-LL's primitives as options, and a team that plays fixed ones.
+
+The paper: the entry learned to choose among attack, flank, avoid, retreat, guard, tag and no-op. Here they are options
+(Sutton, Precup and Singh 1999): each says when it may begin, what it does, and when it ends. What a learner chooses
+with is its own affair; `OptionsTeam` plays given ones, and a person chooses in ``steerclear demonstrate``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from steerclear.shield.exceptions import PolicyError
+
+from .catalogue import entrant
+from .plane import STOP_MPS, Order, ahead, clip, distance, go, heading_to, meeting_point
+from .play import EntrantTeam
+from .posts import arc
+from .sight import Boat, Sight
+
+Test = Callable[[Sight, int], bool]
+Steer = Callable[[Sight, int], Order]
+LONGEST_S = 30.0
+"""An option that has not ended by then is ended, s."""
+AVOID_M = 16.0
+EDGE_M = 4.0
+
+
+@dataclass(frozen=True)
+class Option:
+    """A primitive. ``begins`` and ``ends`` look at a sight and an own boat's number; ``steer`` gives its order."""
+
+    name: str
+    begins: Test
+    ends: Test
+    steer: Steer
+
+
+def attack(sight: Sight, number: int) -> Order:
+    """Straight to the other flag."""
+    return go(sight.own[number], sight.goal)
+
+
+def flank(sight: Sight, number: int) -> Order:
+    """Round the side with fewer foes: along the edge to the height of the flag, then in."""
+    boat = sight.own[number]
+    if boat.x >= sight.base[0] - sight.reach:
+        return go(boat, sight.goal)
+    above = sum(foe.y > 0.5 * sight.size[1] for foe in sight.foes) * 2 > len(sight.foes)
+    edge_y = EDGE_M + boat.radius if above else sight.size[1] - EDGE_M - boat.radius
+    ahead_x = min(boat.x + 2.0 * sight.reach, sight.base[0])
+    return go(boat, (ahead_x if abs(boat.y - edge_y) < sight.reach else boat.x + 0.5 * sight.reach, edge_y))
+
+
+def avoid(sight: Sight, number: int) -> Order:
+    """Away from the nearest foe, bent off the edges."""
+    boat, foe = sight.own[number], nearest_foe(sight, number)
+    x, y = ahead(boat.at, heading_to(foe.at, boat.at), sight.reach)
+    inside = clip(x, EDGE_M, sight.size[0] - EDGE_M), clip(y, EDGE_M, sight.size[1] - EDGE_M)
+    return boat.top, heading_to(boat.at, inside)
+
+
+def retreat(sight: Sight, number: int) -> Order:
+    """Straight home."""
+    return go(sight.own[number], sight.home, sight.keepout + sight.own[number].radius + 1.0)
+
+
+def guard(sight: Sight, number: int) -> Order:
+    """To the boat's own station before the flag."""
+    return go(sight.own[number], arc(sight)[number], 2.0)
+
+
+def tag(sight: Sight, number: int) -> Order:
+    """To meet the nearest foe that can be tagged, in the own half."""
+    boat, foe = sight.own[number], target(sight, number)
+    if foe is None:
+        return STOP_MPS, boat.heading
+    x, y = meeting_point(boat, foe)
+    return go(boat, (min(x, sight.line - 1.0), clip(y, 1.0, sight.size[1] - 1.0)))
+
+
+def no_op(sight: Sight, number: int) -> Order:
+    """Stay."""
+    return STOP_MPS, sight.own[number].heading
+
+
+def nearest_foe(sight: Sight, number: int) -> Boat:
+    """The nearest boat of the other team."""
+    return min(sight.foes, key=lambda foe: distance(foe.at, sight.own[number].at))
+
+
+def target(sight: Sight, number: int) -> Boat | None:
+    """The nearest foe that a boat could tag: untagged and in its half; None where there is none."""
+    found = [foe for foe in sight.foes if not foe.tagged and not foe.on_side]
+    return min(found, key=lambda foe: distance(foe.at, sight.own[number].at), default=None)
+
+
+def _free(sight: Sight, number: int) -> bool:
+    return not sight.own[number].tagged
+
+
+def _carries(sight: Sight, number: int) -> bool:
+    return sight.own[number].carries
+
+
+def _seeks_flag(sight: Sight, number: int) -> bool:
+    return _free(sight, number) and not any(boat.carries for boat in sight.own)
+
+
+def _seeking_ends(sight: Sight, number: int) -> bool:
+    return not _seeks_flag(sight, number)
+
+
+def _pressed(sight: Sight, number: int) -> bool:
+    near_m = distance(nearest_foe(sight, number).at, sight.own[number].at)
+    return _free(sight, number) and not sight.own[number].on_side and near_m < AVOID_M
+
+
+def _at_home(sight: Sight, number: int) -> bool:
+    boat = sight.own[number]
+    return distance(boat.at, sight.home) <= sight.reach and not boat.tagged
+
+
+def _can_tag(sight: Sight, number: int) -> bool:
+    boat = sight.own[number]
+    return _free(sight, number) and boat.recharged and target(sight, number) is not None
+
+
+def _always(sight: Sight, number: int) -> bool:
+    return True
+
+
+OPTIONS = {
+    option.name: option
+    for option in (
+        Option("attack", _seeks_flag, _seeking_ends, attack),
+        Option("flank", _seeks_flag, _seeking_ends, flank),
+        Option("avoid", _pressed, lambda sight, number: not _pressed(sight, number), avoid),
+        Option("retreat", _always, _at_home, retreat),
+        Option("guard", _free, lambda sight, number: not _free(sight, number), guard),
+        Option("tag", _can_tag, lambda sight, number: not _can_tag(sight, number), tag),
+        Option("no_op", _always, lambda sight, number: False, no_op),
+    )
+}
+"""By name, in the order of the keys 1 to 7 of ``steerclear demonstrate``."""
+
+
+def check_option(name: str) -> str:
+    """Return the name.
+
+    Raises:
+        PolicyError: no such option.
+    """
+    if name not in OPTIONS:
+        raise PolicyError(f"unknown option {name!r}; choose from {', '.join(OPTIONS)}")
+    return name
+
+
+class Choice:
+    """The option one boat follows, since when, and what follows when it ends.
+
+    Args:
+        option: its name.
+        since_s: game time at which it was chosen, s.
+    """
+
+    def __init__(self, option: str, since_s: float) -> None:
+        self.option, self.since_s = check_option(option), since_s
+
+    def ended(self, sight: Sight, number: int) -> bool:
+        """Whether it is over: by its own test, or after `LONGEST_S`."""
+        return OPTIONS[self.option].ends(sight, number) or sight.time - self.since_s >= LONGEST_S
+
+
+def next_option(sight: Sight, number: int, wish: str) -> str:
+    """What a boat does that wishes for an option: that if it may begin, home with a flag, else guard or nothing."""
+    if _carries(sight, number):
+        return "retreat"
+    for name in (wish, "guard"):
+        if OPTIONS[name].begins(sight, number):
+            return name
+    return "no_op"
+
+
+@entrant("options", "one of Crowley-BU-LL's primitives per boat (boats='attack,flank,guard')")
+class OptionsTeam(EntrantTeam):
+    """Plays a given option per boat; a boat whose option cannot begin guards, one with the flag returns.
+
+    Args:
+        boats: names of options, one for all boats or one per boat.
+
+    Raises:
+        PolicyError: an unknown option; the wrong number is reported once the team's size is known.
+    """
+
+    name = "options"
+
+    def __init__(self, boats: str | Sequence[str] = ("attack", "flank", "tag")) -> None:
+        super().__init__()
+        words = boats.split(",") if isinstance(boats, str) else list(boats)
+        self._given = [check_option(str(word).strip()) for word in words]
+
+    def begin(self, sight: Sight) -> None:
+        """Hand out the options.
+
+        Raises:
+            PolicyError: neither one nor one per boat.
+        """
+        if len(self._given) not in (1, len(sight.own)):
+            raise PolicyError(
+                f"boats names {len(self._given)} options for {len(sight.own)} boats; give one or one each"
+            )
+        self._wishes = self._given * len(sight.own) if len(self._given) == 1 else self._given
+        self._choices = [Choice("no_op", -math.inf) for _ in sight.own]
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Follow the options, begin anew those that ended."""
+        for number, choice in enumerate(self._choices):
+            wanted = next_option(sight, number, self._wishes[number])
+            if choice.ended(sight, number) or wanted != choice.option:
+                self._choices[number] = Choice(wanted, sight.time)
+        return [OPTIONS[choice.option].steer(sight, number) for number, choice in enumerate(self._choices)]

@@ -1,0 +1,71 @@
+"""Plane geometry of the entrants: headings, meeting points, crossing paths."""
+
+from __future__ import annotations
+
+import math
+
+from .sight import Boat, Point
+
+Order = tuple[float, float]
+"""Speed m/s and absolute heading rad in the own-end frame."""
+STOP_MPS = 0.0
+SLOWING_M, SLOWEST = 10.0, 0.25
+"""Way over which a boat slows down before a point, m, and the least share of its top speed on it."""
+
+
+def distance(a: Point, b: Point) -> float:
+    """From a to b, m."""
+    return math.hypot(b[0] - a[0], b[1] - a[1])
+
+
+def heading_to(a: Point, b: Point) -> float:
+    """Heading from a to b, rad clockwise from north."""
+    return math.atan2(b[0] - a[0], b[1] - a[1])
+
+
+def ahead(a: Point, heading: float, way: float) -> Point:
+    """The point so many metres from a along a heading."""
+    return a[0] + way * math.sin(heading), a[1] + way * math.cos(heading)
+
+
+def wrap(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def clip(value: float, low: float, high: float) -> float:
+    """The nearest number within limits."""
+    return min(max(value, low), high)
+
+
+def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
+    """Full speed to a point, slower on the last `SLOWING_M` (fast boats circle near points), a stop at ``near_m``."""
+    towards, way_m = heading_to(boat.at, point), distance(boat.at, point)
+    if way_m <= near_m:
+        return STOP_MPS, boat.heading
+    return boat.top * clip(way_m / SLOWING_M, SLOWEST, 1.0), towards
+
+
+def meeting_point(hunter: Boat, target: Boat) -> Point:
+    """Where a boat at full speed first meets one that goes on as it does.
+
+    The least t >= 0 with |p + v t - q| = V t, a quadratic in t; where there is none, where the target is.
+    """
+    (vx, vy), px, py = target.velocity, target.x - hunter.x, target.y - hunter.y
+    a, b, c = vx * vx + vy * vy - hunter.top**2, px * vx + py * vy, px * px + py * py
+    if abs(a) < 1e-9:
+        times = [-c / (2.0 * b)] if b < -1e-9 else []
+    else:
+        root = b * b - a * c
+        times = [(-b + sign * math.sqrt(root)) / a for sign in (1.0, -1.0)] if root >= 0.0 else []
+    soonest = min((t for t in times if t >= 0.0), default=0.0)
+    return target.x + vx * soonest, target.y + vy * soonest
+
+
+def cross(a: Point, b: Point, c: Point, d: Point) -> bool:
+    """Whether the paths from a to b and from c to d cross."""
+
+    def side(p: Point, q: Point, r: Point) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    return side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0

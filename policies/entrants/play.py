@@ -1,0 +1,70 @@
+"""`EntrantTeam`: what all entrants share; an entrant says what its boats do at a `Sight`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import PolicyError
+
+from ..scripted.team import boat_numbers, game_core
+from .plane import Order, wrap
+from .sight import Sight, is_turned, look
+
+
+class EntrantTeam:
+    """A `TeamPolicy` that sees the live game in its own-end frame.
+
+    Subclasses override `decide`, and `begin` where they remember something between steps.
+
+    Attributes:
+        name: for records and reports.
+        seed: of the game, set before `begin`.
+        dt_s: the game's step, s.
+    """
+
+    name = "entrant"
+
+    def __init__(self) -> None:
+        self._ids: list[str] = []
+        self.seed = 0
+        self.dt_s = 0.1
+
+    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Begin a game.
+
+        Raises:
+            PolicyError: not an `MctfEnv` (or a wrapper round one), or the boats are not one whole team.
+        """
+        self.core = game_core(env)
+        boats = boat_numbers(self.core, agent_ids)
+        if len(boats) != self.core.config.team_size:
+            raise PolicyError(f"entrant {self.name!r} plays whole teams; give all of its boats, got {list(agent_ids)}")
+        self._ids, self.team = sorted(agent_ids, key=self.core.config.agent_ids.index), int(self.core.team[boats[0]])
+        self._turn = math.pi if is_turned(self.core, self.team) else 0.0
+        self.seed, self.dt_s = seed, self.core.config.dt_s
+        self.begin(look(self.core, self.team))
+
+    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+        """Actions (speed m/s, relative heading deg) of the boats; the arguments are not read.
+
+        Raises:
+            PolicyError: `reset` was not called.
+        """
+        if not self._ids:
+            raise PolicyError(f"entrant {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        sight = look(self.core, self.team)
+        orders = self.decide(sight)
+        return {
+            agent_id: (speed, math.degrees(wrap(heading - boat.heading)))
+            for agent_id, boat, (speed, heading) in zip(self._ids, sight.own, orders, strict=True)
+        }
+
+    def begin(self, sight: Sight) -> None:
+        """Begin a game at what is seen of its start."""
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """An order for each own boat."""
+        raise NotImplementedError

@@ -1,0 +1,196 @@
+"""The competition's entrants: they play either side under every preset, alike when seeded alike, as their row says."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.presets import PRESETS
+from steerclear.policies.entrants import catalogue, plane
+from steerclear.policies.entrants.chao import pddl
+from steerclear.policies.entrants.chao.grid import GridProblem
+from steerclear.policies.entrants.chao.search import search, way_home
+from steerclear.policies.entrants.options import OPTIONS
+from steerclear.policies.entrants.play import EntrantTeam
+from steerclear.policies.entrants.sight import Boat, look
+from steerclear.shield.exceptions import PolicyError
+
+SIDES = {"blue": slice(0, 3), "red": slice(3, 6)}
+FLAG = frozenset({(13, 3), (13, 4), (12, 3), (12, 4)})
+
+
+def play(name, preset="aamas2024", side="blue", steps=30, seed=2, **options):
+    """Commands and positions of an entrant against holding boats."""
+    env = MctfEnv(preset)
+    observations, infos = env.reset(seed=seed)
+    team = policies.make(name, **options)
+    team.reset(env, env.possible_agents[SIDES[side]], seed)
+    sent = []
+    for _ in range(steps):
+        actions = team.act(observations, infos)
+        sent.append([actions[agent] for agent in env.possible_agents[SIDES[side]]])
+        env.core.advance(env.core.commands(env.decode(actions)[None]))
+    if hasattr(team, "close"):
+        team.close()
+    return np.array(sent), env
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", policies.entrants())
+def test_entrants_play_both_sides_and_are_deterministic(name, preset):
+    for side in SIDES:
+        first, env = play(name, preset, side)
+        again, _ = play(name, preset, side)
+        assert np.isfinite(first).all()
+        assert first.tobytes() == again.tobytes()
+        assert (first[..., 0] <= env.core.max_speed_mps.max()).all()
+        assert (np.abs(first[..., 1]) <= 180.0).all()
+
+
+@pytest.mark.parametrize("name", ["ohto", "alamer", "meo", "options"])
+def test_red_plays_as_blue_turned_round(name):
+    env = MctfEnv("aamas2024")
+    width, height = env.config.env_bounds_m
+    places = [[20.0, 8.0], [22.0, 20.0], [14.0, 33.0], [60.0, 10.0], [47.0, 25.0], [70.0, 31.0]]
+    headings = [10.0, 80.0, 170.0, -90.0, -60.0, -100.0]
+    turned = [[width - x, height - y] for x, y in places]
+    found = []
+    for side, at, facing in (
+        ("blue", places, headings),
+        ("red", turned[3:] + turned[:3], [h + 180.0 for h in headings[3:] + headings[:3]]),
+    ):
+        init = {"agent_position": at, "agent_heading": [(h + 180.0) % 360.0 - 180.0 for h in facing]}
+        observations, infos = env.reset(seed=1, options={"init_dict": init | {"agent_speed": [1.0] * 6}})
+        team = policies.make(name)
+        team.reset(env, env.possible_agents[SIDES[side]], 1)
+        found.append(np.array(list(team.act(observations, infos).values())))
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+
+
+def test_ohto_holds_near_its_base_and_never_grabs():
+    _, env = play("ohto", steps=900)
+    before = env.core.state[0, :3, :2].copy()
+    assert (np.linalg.norm(before - env.core.flag_home[0], axis=1) < 20.0).all()
+    assert (env.core.state[0, :3, 3] < 0.05).all()
+    assert env.core.grabs.sum() == 0
+
+
+def test_a_crossing_mate_of_meo_is_turned_round():
+    boats = [Boat(10.0, y, 0.0, 0.0, 2.0, 1.0, False, False, True, True) for y in (10.0, 20.0)]
+    assert plane.cross(boats[0].at, (30.0, 20.0), boats[1].at, (30.0, 10.0))
+    assert not plane.cross(boats[0].at, (30.0, 10.0), boats[1].at, (30.0, 20.0))
+
+
+@given(st.floats(-50, 50), st.floats(-50, 50), st.floats(0, 6.3), st.floats(0, 1.9))
+@settings(max_examples=60, deadline=None)
+def test_a_meeting_point_is_reached_at_the_same_moment_by_both(x, y, heading, speed):
+    hunter = Boat(0.0, 0.0, 0.0, 0.0, 2.0, 1.0, False, False, True, True)
+    target = Boat(x, y, heading, speed, 2.0, 1.0, False, False, True, True)
+    point = plane.meeting_point(hunter, target)
+    time_s = plane.distance(hunter.at, point) / hunter.top
+    assert plane.distance((x + time_s * target.velocity[0], y + time_s * target.velocity[1]), point) < 1e-6
+
+
+def problems(number=25):
+    rng = np.random.default_rng(3)
+    for _ in range(number):
+        start = (int(rng.integers(8)), int(rng.integers(8)))
+        cells = {(int(c), int(r)) for c, r in zip(rng.integers(8, 16, 14), rng.integers(0, 8, 14), strict=True)}
+        yield GridProblem(start, False, FLAG, 8, frozenset({(5, 9)}), frozenset(cells))
+
+
+def test_a_way_leads_over_the_flag_and_home_through_open_cells():
+    found = 0
+    for problem in problems():
+        way = search(problem)
+        if way is not None:
+            found += 1
+            steps = [problem.start, *way]
+            assert all(abs(a[0] - b[0]) + abs(a[1] - b[1]) == 1 for a, b in pairwise(steps))
+            assert all(problem.open_to(cell) for cell in way)
+            assert FLAG & set(way)
+            assert way[-1][0] < problem.own
+    assert found > 5
+
+
+def test_where_the_flag_is_shut_in_there_is_no_way_but_one_home():
+    ring = frozenset((c, r) for c in range(11, 15) for r in range(2, 6)) - FLAG
+    problem = GridProblem(
+        (10, 3), False, FLAG - {(12, 3)} - {(12, 4)}, 8, frozenset(), ring | {(12, 3), (12, 4), (15, 3)}
+    )
+    shut = GridProblem(
+        (10, 3), False, frozenset({(13, 3)}), 8, frozenset(), frozenset({(12, 3), (14, 3), (13, 2), (13, 4)})
+    )
+    assert search(shut) is None
+    assert len(way_home(problem)) == 3
+
+
+def test_the_planner_finds_ways_as_short_as_the_search():
+    pytest.importorskip("kairos")
+    for problem in problems(6):
+        planned, searched = pddl.plan(problem), search(problem)
+        assert (planned is None) == (searched is None)
+        if planned is not None:
+            assert len(planned) == len(searched)
+            assert all(problem.open_to(cell) for cell in planned)
+
+
+def test_options_begin_and_end_where_they_say():
+    env = MctfEnv("aamas2024")
+    env.reset(seed=1)
+    sight = look(env.core, 0)
+    assert OPTIONS["attack"].begins(sight, 0)
+    assert not OPTIONS["tag"].begins(sight, 0)  # nobody has crossed the line
+    for option in OPTIONS.values():
+        speed, heading = option.steer(sight, 0)
+        assert 0.0 <= speed <= sight.own[0].top
+        assert math.isfinite(heading)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "text"),
+    [
+        ("lucas", {"population": 1}, "population is 1; give a whole number from 2"),
+        ("lucas", {"horizon": 2.5}, "horizon is 2.5"),
+        ("chao", {"planner": "fast"}, "choose from auto, pddl, astar"),
+        ("chao", {"contact_m": math.nan}, "give a distance"),
+        ("options", {"boats": "attack,run"}, "unknown option 'run'; choose from attack"),
+        ("ohto", {"speed": 1}, "has no option 'speed'"),
+    ],
+)
+def test_bad_options_are_refused_with_what_to_give(name, options, text):
+    with pytest.raises(PolicyError, match=text):
+        policies.make(name, **options)
+
+
+def test_an_entrant_plays_a_whole_team_of_a_game():
+    env = MctfEnv("aamas2024")
+    env.reset(seed=1)
+    with pytest.raises(PolicyError, match="plays whole teams"):
+        policies.make("ohto").reset(env, ["agent_0"], 0)
+    with pytest.raises(PolicyError, match="has no game; call reset"):
+        policies.make("meo").act({}, {})
+
+
+def test_a_newcomer_is_a_policy_by_name(monkeypatch):
+    monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
+
+    @policies.entrant("rush", "every boat straight to the flag")
+    class Rush(EntrantTeam):
+        name = "rush"
+
+        def decide(self, sight):
+            return [plane.go(boat, sight.goal) for boat in sight.own]
+
+    sent, _ = play("rush", steps=2)
+    assert (sent[..., 0] > 0.0).all()
+    assert len(policies.fingerprint("rush")) == 16  # of its own file, so that --resume sees it change
+    assert policies.fingerprint("ohto") == ""
+    with pytest.raises(PolicyError, match="there is an entrant 'ohto' already"):
+        policies.entrant("ohto", "another")(Rush)
+    with pytest.raises(PolicyError, match="cannot be named 'a/b'"):
+        policies.entrant("a/b", "a path")(Rush)
