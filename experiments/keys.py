@@ -57,7 +57,7 @@ GAME_COLUMNS = {
     "closest_teammate_m": "closest distance of two own boats, m",
     "closest_opponent_m": "closest distance of an own boat to an opponent, m",
     "closest_m": "the smaller of the two, m",
-    "collisions": "as the score counts them: entries into the sum of the agent radii, for each own boat in it",
+    "collisions": "as the game counts them, once a decision: entries into the sum of radii, for each own boat in it",
     "covered_steps": "boat-steps a shield decided on",
     "changed_steps": "boat-steps in which the sent command differs from the wanted one",
     "changed_share": "changed_steps / covered_steps",
