@@ -83,8 +83,8 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
 
     For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e, where e0 and I are
     the controller's memory (derivative 0 when it has none); an error held for several moves is found by trial. Without
-    thrust there is no rudder to command and the error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there: the
-    turn is then the nearest one possible.
+    thrust there is no rudder to command and the error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there:
+    the turn is then the nearest one possible.
     """
     moves = moves_in(params, dt_s)
     if params[L.KIND] != L.KIND_USV:

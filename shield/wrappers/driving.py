@@ -41,7 +41,7 @@ def driven_boats(core: Any) -> Array | None:
     if not (tagged | oob | disabled).any():
         return None
     rows = np.full((core.n_boats, 4), np.nan)
-    for i in np.flatnonzero(tagged | oob | disabled):
+    for i in np.flatnonzero(tagged | oob | disabled).tolist():
         if disabled[i]:
             rows[i] = (0.0, np.nan, np.nan, _disabled_for_s(core, i))
         elif tagged[i] and core.config.n_obstacles == 0:

@@ -44,9 +44,10 @@ def _home(env: Any, player: Any) -> Row:
         speed = min(speed, float(player.get_max_speed()) * _fraction(env, "oob_speed_frac"))
     marks = getattr(env, ("blue_untag_coords", "red_untag_coords")[team], None)
     if marks is None:
-        marks, ends, radius_m = [env.flags[team].home], [env.flags[team].home], float(env.catch_radius)
+        marks = ends = (env.flags[team].home,) * 2
+        radius_m = float(env.catch_radius)
     else:
-        ends = [(env.env_ul, env.env_ll), (env.env_ur, env.env_lr)][team]
+        ends = (env.env_ul, env.env_ll) if team == 0 else (env.env_ur, env.env_lr)
         radius_m = float(env.untag_radius)
     places = np.asarray(marks, dtype=np.float64)
     mark = places[int(np.argmin(np.hypot(*(places - (x, y)).T)))]
