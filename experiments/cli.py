@@ -16,6 +16,7 @@ from .commands.console import leave_failed
 from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
+from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
 from .commands.parity import parity
 from .commands.play import play
@@ -56,6 +57,7 @@ for function in (
 app.command("sim-boats")(sim_boats)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
+app.add_typer(entry_app, name="entry")
 
 
 def _show_version(wanted: bool) -> None:

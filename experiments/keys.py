@@ -153,6 +153,30 @@ RESULTS = {
     "files.*": "what was written, relative to the folder",
 }
 
+ENTRY_CHECK = {
+    **_PROVENANCE,
+    "entry": "what was checked",
+    "load_s": "time until it was loaded in a process of its own, s",
+    "imports.needed[]": "packages its files import beyond Python's own and themselves",
+    "imports.missing[]": "those of them that are not installed here",
+    "imports.unread[]": "files that are no Python this interpreter reads",
+    "calls": "actions asked for",
+    "mean_ms": "mean time of one, ms",
+    "max_ms": "longest, ms",
+    "late": "actions that took longer than a decision of the game",
+    "decision_ms": "time of a decision of the game, ms",
+    "held": "actions that could not be used: the boat stopped",
+    "failures[].kind": "what kind of failure",
+    "failures[].count": "how often",
+    "failures[].message": "of the first of them",
+    "game.captures": "of the game against boats that hold: flags captured",
+    "game.grabs": "flags grabbed",
+    "game.tags": "tags made",
+    "game.collisions": "as the game counts them",
+    "game.duration_s": "its length, s",
+    "game.first_failure": "the first thing that went wrong; null for nothing",
+}
+
 PLAY = {
     **_PROVENANCE,
     **{f"game.{k}": v for k, v in GAME_COLUMNS.items()},
@@ -257,6 +281,8 @@ REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for n
 KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
+    "entry check": ENTRY_CHECK,
+    "entry report": RESULTS,
     "play": PLAY,
     "parity": PARITY,
     "bench": BENCH,
