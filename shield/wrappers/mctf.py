@@ -58,7 +58,10 @@ class MctfReader:
         core = self.env.core
         controlled = (core.team == team) & ~core.is_disabled[0]
         if not shield_autopilot:
-            controlled = controlled & ~core.driven[0] & ~core.is_tagged[0] & ~core.oob[0]
+            driven = core.is_tagged[0] | core.oob[0]
+            if core.config.n_obstacles > 0:  # asked between steps, it tells of the last one; but who else hits obstacles
+                driven = driven | core.driven[0]
+            controlled = controlled & ~driven
         # a copy: decisions are read after the step has moved the boats
         state = core.state[0].copy()
         return Fleet(state, core.team, self._platforms, controlled, self.agent_ids, driven=driven_boats(core))
