@@ -59,7 +59,7 @@ class MctfReader:
         controlled = (core.team == team) & ~core.is_disabled[0]
         if not shield_autopilot:
             driven = core.is_tagged[0] | core.oob[0]
-            if core.config.n_obstacles > 0:  # between steps it tells of the last one; yet who hits obstacles is in it only
+            if core.config.n_obstacles > 0:  # who hits obstacles is in it only; between steps it is of the last
                 driven = driven | core.driven[0]
             controlled = controlled & ~driven
         # a copy: decisions are read after the step has moved the boats
