@@ -1,4 +1,4 @@
-"""One step of all games, compiled."""
+"""One decision of all games, compiled: the boats move, once or several times, and then the rules are applied."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from steerclear.shield.jit import Array, lean_kernel
 
 from . import rules as R
 from .arrays import Games, Rules
-from .collisions import check_collisions
+from .collisions import check_collisions, look_for_contacts
+from .drive_home import decide_games
 from .motion import move_boats, place_boats
 
 CHUNK = 64
@@ -26,9 +27,26 @@ def first_unusable(commands: Array) -> int:
 
 
 @lean_kernel
+def begin_decision(rules: Rules, games: Games) -> None:
+    """What comes before the boats move, once their commands are known: boats recharge."""
+    games.events[:] = 0
+    R.recharge(rules, games, 0, games.state.shape[0])
+
+
+@lean_kernel
+def move_games(rules: Rules, games: Games, commands: Array) -> None:
+    """Move all boats by one step under ``commands`` (B, n, 2), speed m/s and relative heading deg."""
+    n_games = games.state.shape[0]
+    for first in range(0, n_games, CHUNK):
+        last = min(first + CHUNK, n_games)
+        move_boats(rules, games, commands, first, last)
+        look_for_contacts(rules, games, first, last)
+
+
+@lean_kernel
 def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
     for b in range(first, last):
-        games.time_s[b] += rules.dt_s
+        games.time_s[b] += rules.decision_s
     R.check_bounds(rules, games, first, last)
     R.check_grabs(rules, games, first, last)
     R.check_tags(rules, games, first, last)
@@ -39,17 +57,30 @@ def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
 
 
 @lean_kernel
-def advance_games(rules: Rules, games: Games, commands: Array) -> None:
-    """Move all boats under ``commands`` (B, n, 2), speed m/s and relative heading deg, and apply the rules.
+def end_decision(rules: Rules, games: Games) -> None:
+    """What comes after the boats have moved: clocks, rules, collisions."""
+    n_games = games.state.shape[0]
+    for first in range(0, n_games, CHUNK):
+        _after_the_move(rules, games, first, min(first + CHUNK, n_games))
+
+
+@lean_kernel
+def advance_games(rules: Rules, games: Games, wanted: Array, commands: Array) -> None:
+    """Move all boats for a decision, after `begin_decision`, and apply the rules.
+
+    The first step is made under ``commands`` (B, n, 2), speed m/s and relative heading deg; in each later one the game
+    decides anew for the boats it drives, and the others obey ``wanted``. ``commands`` is used up.
 
     Games do not touch each other, so each rule runs over a chunk of games that fits into the cache.
     """
     n_games = games.state.shape[0]
-    games.events[:] = 0
     for first in range(0, n_games, CHUNK):
         last = min(first + CHUNK, n_games)
-        R.recharge(rules, games, first, last)
-        move_boats(rules, games, commands, first, last)
+        for step in range(rules.decision_steps):
+            if step > 0:
+                decide_games(rules, games, wanted, commands, first, last)
+            move_boats(rules, games, commands, first, last)
+            look_for_contacts(rules, games, first, last)
         _after_the_move(rules, games, first, last)
 
 
@@ -57,9 +88,9 @@ def advance_games(rules: Rules, games: Games, commands: Array) -> None:
 def follow_games(rules: Rules, games: Games, seen: Array) -> None:
     """Apply the rules to boats that moved by themselves to ``seen`` (B, n, 4), see `motion.place_boats`."""
     n_games = games.state.shape[0]
-    games.events[:] = 0
+    begin_decision(rules, games)
     for first in range(0, n_games, CHUNK):
         last = min(first + CHUNK, n_games)
-        R.recharge(rules, games, first, last)
         place_boats(rules, games, seen, first, last)
+        look_for_contacts(rules, games, first, last)
         _after_the_move(rules, games, first, last)

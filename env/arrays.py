@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from steerclear.shield.platforms.layout import N_STATE
 from steerclear.shield.shared import share
 
 from .config import GameConfig
-from .field import FieldGeometry
+from .field import CORNER_INSET_M, FieldGeometry, own_corners
 from .observation_layout import boat_slots
 from .obstacles import Obstacles, pack_obstacles
 from .sight import pack_lines
@@ -23,6 +24,8 @@ class Rules(NamedTuple):
     n_boats: int
     team_size: int
     dt_s: float
+    decision_steps: int
+    decision_s: float
     max_time_s: float
     max_score: int
     agent_radius: Array
@@ -33,6 +36,16 @@ class Rules(NamedTuple):
     tag_on_oob: bool
     tag_on_collision: bool
     capture_at_base: bool
+    capture_at_corner: bool
+    untag_at_corner: bool
+    corner_radius: float
+    corners: Array  # (2, 2, 2) m, by team the two corners of its side
+    corner_marks: Array  # (2, 2, 2) m, where a tagged boat is driven to
+    tag_speed_frac: float
+    tag_probability: float
+    max_cycles: int  # decisions of a game
+    power_length: float  # of a power play, decisions
+    shows_disabled: bool
     size: Array
     flag_home: Array
     scrimmage: Array
@@ -56,6 +69,7 @@ class Games(NamedTuple):
     previous_position: Array  # (B, n, 2) m, before the last move
     error_is_float32: BoolArray  # (B, n) the heading controller's memory came in single precision
     is_tagged: BoolArray  # (B, n)
+    is_disabled: BoolArray  # (B, n) stopped by a power play
     has_flag: BoolArray  # (B, n)
     oob: BoolArray  # (B, n)
     on_side: BoolArray  # (B, n)
@@ -64,7 +78,12 @@ class Games(NamedTuple):
     made_tag: IntArray  # (B, n) boat tagged in this step, -1 for none
     collisions: IntArray  # (B, n) collisions so far, one per entry per pair
     touching: BoolArray  # (B, n, n) pairs within the sum of their radii
-    new_collisions: IntArray  # (B, n) collisions begun in this step
+    new_collisions: IntArray  # (B, n) collisions begun in this decision
+    contacts: IntArray  # (B, n) the same as ``collisions``, looked for after every step: what really happened
+    contact: BoolArray  # (B, n, n) pairs within touch after the last step
+    power_start: IntArray  # (B, 2) decision at which a team's power play begins, -1 for none
+    power_boats: IntArray  # (B, 2, 2) boats it disables: the first, and one more if it begins twice, see `power_play`
+    power_begun: IntArray  # (B, 2) how often it began
     flag_position: Array  # (B, 2, 2) m
     flag_taken: BoolArray  # (B, 2) the flag of that team is carried by an opponent
     captures: IntArray  # (B, 2)
@@ -90,6 +109,8 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
             n_boats=config.n_boats,
             team_size=config.team_size,
             dt_s=config.dt_s,
+            decision_steps=config.decision_steps,
+            decision_s=config.decision_s,
             max_time_s=config.max_time_s,
             max_score=config.max_score,
             agent_radius=np.array(config.agent_radius_m, dtype=np.float64),
@@ -100,6 +121,16 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
             tag_on_oob=config.tag_on_oob,
             tag_on_collision=config.tag_on_collision,
             capture_at_base=config.capture_at == "own_base",
+            capture_at_corner=config.capture_at == "own_corners",
+            untag_at_corner=config.untag_at == "own_corners",
+            corner_radius=config.corner_radius_m,
+            corners=own_corners(field.size, 0.0),
+            corner_marks=own_corners(field.size, CORNER_INSET_M),
+            tag_speed_frac=config.tag_speed_frac,
+            tag_probability=config.tag_probability,
+            max_cycles=math.ceil(config.max_time_s / config.decision_s),
+            power_length=math.ceil(config.max_time_s / config.decision_s) * config.power_play_share,
+            shows_disabled=config.shows_disabled,
             size=field.size,
             flag_home=field.flag_home,
             scrimmage=field.scrimmage,
@@ -134,6 +165,7 @@ def make_games(config: GameConfig, n_games: int) -> Games:
             previous_position=reals(n, 2),
             error_is_float32=booleans(n),
             is_tagged=booleans(n),
+            is_disabled=booleans(n),
             has_flag=booleans(n),
             oob=booleans(n),
             on_side=booleans(n),
@@ -143,6 +175,11 @@ def make_games(config: GameConfig, n_games: int) -> Games:
             collisions=counts(n),
             touching=booleans(n, n),
             new_collisions=counts(n),
+            contacts=counts(n),
+            contact=booleans(n, n),
+            power_start=counts(2),
+            power_boats=counts(2, 2),
+            power_begun=counts(2),
             flag_position=reals(2, 2),
             flag_taken=booleans(2),
             captures=counts(2),

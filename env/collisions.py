@@ -1,4 +1,7 @@
-"""Collisions between boats: once per entry into the sum of radii, per pair, for each boat in it."""
+"""Collisions between boats: once per entry into the sum of radii, per pair, for each boat in it.
+
+The game looks once a decision, and misses what happens between; ``contacts`` are counted after every step.
+"""
 
 from __future__ import annotations
 
@@ -35,3 +38,16 @@ def check_collisions(rules: Rules, games: Games, first: int, last: int) -> None:
         _new_in_game(games.state[b], rules.agent_radius, games.touching[b], games.new_collisions[b])
         for i in range(rules.n_boats):
             games.collisions[b, i] += games.new_collisions[b, i]
+            if rules.decision_steps == 1:  # every step was looked at
+                games.contacts[b, i] += games.new_collisions[b, i]
+
+
+@lean_kernel
+def look_for_contacts(rules: Rules, games: Games, first: int, last: int) -> None:
+    """Count, after one of several steps of a decision, the pairs that came within touch in it."""
+    if rules.decision_steps == 1:
+        return
+    for b in range(first, last):
+        _new_in_game(games.state[b], rules.agent_radius, games.contact[b], games.new_collisions[b])
+        for i in range(rules.n_boats):
+            games.contacts[b, i] += games.new_collisions[b, i]

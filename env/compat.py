@@ -94,6 +94,11 @@ class Player:
         return bool(self._core.is_tagged[0, self.idx])
 
     @property
+    def is_disabled(self) -> bool:
+        """Whether a power play has it stopped."""
+        return bool(self._core.is_disabled[0, self.idx])
+
+    @property
     def oob(self) -> bool:
         """Whether it is out of bounds."""
         return bool(self._core.oob[0, self.idx])
@@ -185,6 +190,12 @@ class PyquaticusAttributes:
         self.gps_env = False
         self.team_size = config.team_size
         self.dt = config.dt_s
+        self.sim_speedup_factor = config.decision_steps
+        self.tag_speed_frac = config.tag_speed_frac
+        self.tag_probability = config.tag_probability
+        self.untag_radius = config.corner_radius_m
+        self.power_play_percentage = config.power_play_share
+        self.blue_untag_coords, self.red_untag_coords = self.core.rules.corner_marks.tolist()
         self.agent_radius = np.array(config.agent_radius_m)
         self.catch_radius = config.catch_radius_m
         self.flag_radius = config.flag_radius_m

@@ -28,7 +28,23 @@ Point = tuple[float, float]
 PolygonPoints = tuple[Point, ...]
 CircleSpec = tuple[float, Point]
 
-CAPTURE_AT = ("own_side", "own_base")
+CAPTURE_AT = ("own_side", "own_base", "own_corners")
+UNTAG_AT = ("own_flag", "own_corners")
+
+MOST_STEPS = 1000
+"""Steps of a decision at most; a slip of the pen would make one last for hours."""
+
+_NOT_NEGATIVE = (
+    "flag_keepout_m",
+    "flag_radius_m",
+    "tagging_cooldown_s",
+    "oob_speed_frac",
+    "tag_speed_frac",
+    "tag_probability",
+    "power_play_share",
+)
+_HIGHEST = {"tag_probability": 1.0, "power_play_share": 0.5}
+"""Of those that have an end; two power plays of more than half a game would not be apart."""
 
 LONGEST_S = 1e7
 """Games are at most this long, s: four months, far beyond any; a slip of the pen would never end."""
@@ -64,19 +80,29 @@ class GameConfig:
     Attributes:
         team_size: boats per team; blue are agent_0.., red follow.
         env_bounds_m: width (x, east) and height (y, north) of the field, m.
-        dt_s: length of a step, s.
+        dt_s: length of a step, in which boats move, s.
+        decision_steps: steps that boats move by under one command, whose relative heading is held; the rules are
+            applied once, after the last.
         max_time_s: length of a game, s, at most 10^7.
         max_score: captures that end the game.
         platforms: one platform (name or `Platform`) for all boats or one per boat.
         agent_radius_m: radius of a boat, m, one for all or one per boat; two boats collide when closer than the sum.
         catch_radius_m: radius for tags, grabs and untagging at the own flag's home, m.
+        corner_radius_m: radius around the two corners of the own side, for captures and untagging there, m.
         flag_keepout_m: own boats stay this far plus their radius from their flag while it is home, m; 0 = no keep-out.
         flag_radius_m: radius a flag is drawn with, m.
         tagging_cooldown_s: time after a tag before the same boat can tag again, s.
         oob_speed_frac: share of top speed at which the game drives a boat that is out of bounds.
+        tag_speed_frac: share of top speed at which the game drives a tagged boat.
+        tag_probability: chance that a tag succeeds; one that fails costs the cool-down too.
         tag_on_oob: leaving the field tags the boat.
         tag_on_collision: hitting an obstacle tags the boat.
-        capture_at: "own_side" (on crossing to it) or "own_base" (within the catch radius of the own flag's home).
+        capture_at: "own_side" (on crossing to it), "own_base" (within the catch radius of the own flag's home) or
+            "own_corners" (within ``corner_radius_m`` of a corner of the own side).
+        untag_at: "own_flag" or "own_corners", where tagged boats are driven and become free; at corners not while they
+            are out of bounds.
+        power_play_share: share of the game for which each team, once, has a random boat disabled, 0 to 0.5; 0: never.
+        shows_disabled: observations and the global state tell which boats are disabled.
         blue_flag_home_m, red_flag_home_m: flag homes (x, y), m; None = 1/8 and 7/8 of the width, half the height.
         scrimmage_m: two points of the dividing line, m; None = perpendicular bisector of the flag homes.
         default_start: fixed starts on a line before the own flag, at rest; else random positions, speeds, headings.
@@ -93,18 +119,25 @@ class GameConfig:
     team_size: int = 3
     env_bounds_m: Point = (160.0, 80.0)
     dt_s: float = 0.1
+    decision_steps: int = 1
     max_time_s: float = 600.0
     max_score: int = 20
     platforms: str | Platform | tuple[str | Platform, ...] = "surveyor"
     agent_radius_m: float | tuple[float, ...] = 2.0
     catch_radius_m: float = 10.0
+    corner_radius_m: float = 20.0
     flag_keepout_m: float = 3.0
     flag_radius_m: float = 2.0
     tagging_cooldown_s: float = 60.0
     oob_speed_frac: float = 0.5
+    tag_speed_frac: float = 1.0
+    tag_probability: float = 1.0
     tag_on_oob: bool = True
     tag_on_collision: bool = False
     capture_at: str = "own_side"
+    untag_at: str = "own_flag"
+    power_play_share: float = 0.0
+    shows_disabled: bool = False
     blue_flag_home_m: Point | None = None
     red_flag_home_m: Point | None = None
     scrimmage_m: tuple[Point, Point] | None = None
@@ -117,10 +150,13 @@ class GameConfig:
     def __post_init__(self) -> None:
         check_count("team_size", self.team_size, low=1)
         check_count("max_score", self.max_score, low=1)
+        if check_count("decision_steps", self.decision_steps, low=1) > MOST_STEPS:
+            raise ConfigError(f"decision_steps is {self.decision_steps}; give at most {MOST_STEPS}")
         self._check_numbers()
-        for name in ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start"):
+        for name in ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled"):
             check_choice(name, getattr(self, name), (True, False))
         check_choice("capture_at", self.capture_at, CAPTURE_AT)
+        check_choice("untag_at", self.untag_at, UNTAG_AT)
         if not isinstance(self.preset_name, str):
             raise ConfigError(f"preset_name is {self.preset_name!r}; give a text")
         if not isinstance(self.reward, RewardWeights):
@@ -136,11 +172,11 @@ class GameConfig:
         object.__setattr__(self, name, value)
 
     def _check_numbers(self) -> None:
-        for name in ("dt_s", "catch_radius_m"):
+        for name in ("dt_s", "catch_radius_m", "corner_radius_m"):
             self._set(name, check_real(name, getattr(self, name), above=0.0))
         self._set("max_time_s", check_real("max_time_s", self.max_time_s, above=0.0, high=LONGEST_S))
-        for name in ("flag_keepout_m", "flag_radius_m", "tagging_cooldown_s", "oob_speed_frac"):
-            self._set(name, check_real(name, getattr(self, name), low=0.0))
+        for name in _NOT_NEGATIVE:
+            self._set(name, check_real(name, getattr(self, name), low=0.0, high=_HIGHEST.get(name)))
 
     def _set_geometry(self) -> None:
         width, height = check_point("env_bounds_m", self.env_bounds_m)
@@ -165,6 +201,11 @@ class GameConfig:
         circles = check_circles(self.obstacles.get("circle") or ())
         polygons = check_polygons(self.obstacles.get("polygon") or ())
         self._set("obstacles", {"circle": circles, "polygon": polygons})
+
+    @property
+    def decision_s(self) -> float:
+        """Time from one decision to the next, s."""
+        return self.decision_steps * self.dt_s
 
     @property
     def n_boats(self) -> int:
@@ -205,7 +246,8 @@ class GameConfig:
         """A named set of rules, with settings replaced at will.
 
         Args:
-            name: "aamas2024" (the 2024 competition's paper) or "mctf2025" (the 2025 competition's configuration).
+            name: "aamas2024" (the 2024 competition's paper), "mctf2025" or "mctf2026" (the configurations of the 2025
+                and 2026 competitions).
             **overrides: any setting of `GameConfig`.
 
         Raises:

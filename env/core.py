@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,15 @@ from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.shared import share
 
-from .advance import CHUNK, advance_games, first_unusable, follow_games
+from .advance import (
+    CHUNK,
+    advance_games,
+    begin_decision,
+    end_decision,
+    first_unusable,
+    follow_games,
+    move_games,
+)
 from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
@@ -19,6 +28,7 @@ from .field import field_geometry
 from .initial import start_from
 from .observation_layout import observation_bounds, observation_keys
 from .observe import observe_games
+from .power_play import toggle_power_plays
 from .randomness import seed_states
 from .reward import reward_games
 from .starts import default_places, reset_games, start_where_seen
@@ -26,7 +36,10 @@ from .validation import check_count
 from .view import GameView, restore_game, view_game
 
 CommandFilter = Callable[["BatchedMctf", Array], Array]
-"""Stands between decision and motion: ``filter(core, commands (B, n, 2)) -> commands``; the shield's place."""
+"""Stands between decision and motion: ``filter(core, commands (B, n, 2)) -> commands``; the shield's place.
+
+It is asked before every step of motion: several times a decision where a command is held for several steps.
+"""
 
 
 class BatchedMctf:
@@ -36,11 +49,13 @@ class BatchedMctf:
     are changed in place by `step` and `reset`. With n boats:
 
     ``state (B, n, N_STATE)`` (columns in `steerclear.shield.platforms.layout`), ``params (n, N_PARAM)``,
-    ``team (n,)``, ``is_tagged, has_flag, oob, on_side, driven (B, n)`` bool, ``tagging_cooldown_s (B, n)`` s since
+    ``team (n,)``, ``is_tagged, is_disabled, has_flag, oob, on_side,
+    driven (B, n)`` bool, ``tagging_cooldown_s (B, n)`` s since
     the last tag, ``flag_home (2, 2)`` m, ``flag_position (B, 2, 2)`` m, ``flag_taken (B, 2)``,
     ``captures, grabs, tags (B, 2)``, ``events (B, 2, 4)`` captures, grabs, tags and boats gone out of bounds in the
-    last step, ``made_tag (B, n)``, ``collisions, new_collisions (B, n)``, ``touching (B, n, n)``, ``time_s (B,)``,
-    ``terminated, truncated (B,)``, ``previous_position (B, n, 2)``.
+    last decision, ``made_tag (B, n)``, ``collisions, new_collisions (B, n)``, ``touching (B, n, n)``, ``contacts
+    (B, n)`` collisions looked for after every step, ``power_start (B, 2)`` decision at which a team's power play begins
+    (-1: none), ``time_s (B,)``, ``terminated, truncated (B,)``, ``previous_position (B, n, 2)``.
 
     A finished game goes on when stepped; reset it with `reset(mask)`.
 
@@ -86,6 +101,9 @@ class BatchedMctf:
         self.state: Array = games.state
         self.previous_position: Array = games.previous_position
         self.is_tagged: BoolArray = games.is_tagged
+        self.is_disabled: BoolArray = games.is_disabled
+        self.contacts: IntArray = games.contacts
+        self.power_start: IntArray = games.power_start
         self.has_flag: BoolArray = games.has_flag
         self.oob: BoolArray = games.oob
         self.on_side: BoolArray = games.on_side
@@ -164,14 +182,22 @@ class BatchedMctf:
         return decided
 
     def advance(self, commands: Array) -> None:
-        """Move all boats under ``commands`` (B, n, 2) and apply the rules, collisions and clocks.
+        """Move all boats under ``commands`` (B, n, 2) for a decision and apply the rules, collisions and clocks.
+
+        Where a decision is of several steps, the game decides anew before each for the boats it drives, and the others
+        go on under the same speed and relative heading.
 
         Raises:
             GameError: wrong shape, or a command is not finite.
         """
-        given = self._checked("commands", commands)
-        self._refuse("command", first_unusable(given))
-        advance_games(self.rules, self.games, given)
+        given = self._obeyed(commands)
+        begin_decision(self.rules, self.games)
+        self._go_on(given, given)
+
+    def _go_on(self, wanted: Array, commands: Array) -> None:
+        """Move the boats of a decision that has begun, first under ``commands``, and apply the rules."""
+        self._commands[:] = commands
+        advance_games(self.rules, self.games, wanted, self._commands)
 
     def start_seen(self, seen: Array) -> None:
         """Start all games with boats that something else moves, such as real ones, where they are.
@@ -197,7 +223,7 @@ class BatchedMctf:
         given = self._checked_sight(seen)
         if not 0.0 <= dt_s < np.inf:
             raise GameError(f"dt_s is {dt_s}; give a finite time >= 0, in s")
-        follow_games(share(self.rules._replace(dt_s=float(dt_s))), self.games, given)
+        follow_games(share(self.rules._replace(decision_s=float(dt_s))), self.games, given)
 
     def restore(self, view: GameView, game: int = 0) -> None:
         """Make a game stand as a view of it, or of another of the same size, says: the inverse of `view`.
@@ -211,11 +237,12 @@ class BatchedMctf:
     def step(
         self, actions: Array, command_filter: CommandFilter | None = None
     ) -> tuple[np.ndarray, Array, BoolArray, BoolArray]:
-        """One step of all games.
+        """One decision of all games, in one step of motion or several.
 
         Args:
             actions: (B, n, 2) speed m/s, relative heading deg.
-            command_filter: called with this object and the decided commands; what it returns is obeyed.
+            command_filter: called with this object and the decided commands before every step of motion; what it
+                returns is obeyed.
 
         Returns:
             observations (B, n, n_obs) float32 in [-1, 1], rewards (B, n), terminated (B,), truncated (B,). The
@@ -224,12 +251,39 @@ class BatchedMctf:
         Raises:
             GameError: see `commands` and `advance`.
         """
-        commands = self.commands(actions)
-        if command_filter is not None:
-            commands = command_filter(self, commands)
-        self.advance(commands)
+        wanted = self._checked("actions", actions)
+        self._refuse("action", first_unusable(wanted))
+        with self._power_plays():
+            commands = self.commands(wanted)
+            if command_filter is not None:
+                commands = self._obeyed(command_filter(self, commands))
+        begin_decision(self.rules, self.games)
+        if command_filter is None:
+            self._go_on(wanted, commands)
+        else:
+            move_games(self.rules, self.games, commands)
+            for _ in range(1, self.config.decision_steps):
+                move_games(self.rules, self.games, self._obeyed(command_filter(self, self.commands(wanted))))
+            end_decision(self.rules, self.games)
         reward_games(self.rules, self.games, self.rewards)
         return self.observe(), self.rewards, self.terminated, self.truncated
+
+    def _obeyed(self, commands: Any) -> Array:
+        """What a filter returned, checked."""
+        given = self._checked("commands", commands)
+        self._refuse("command", first_unusable(given))
+        return given
+
+    @contextmanager
+    def _power_plays(self) -> Iterator[None]:
+        """Begin and end power plays; undone if what is inside fails: then the decision has not begun."""
+        before = self.is_disabled.copy(), self.games.power_begun.copy()
+        toggle_power_plays(self.rules, self.games)
+        try:
+            yield
+        except BaseException:
+            self.is_disabled[:], self.games.power_begun[:] = before
+            raise
 
     def observe(self) -> np.ndarray:
         """Observations (B, n, n_obs) float32, normalised; the array is reused."""

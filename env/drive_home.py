@@ -1,7 +1,7 @@
 """Which boats the game itself drives, and where to: what every boat will obey, decided before anything moves.
 
-A tagged boat drives straight to its own flag's home, past obstacles as `detour` has it; a boat out of bounds drives
-straight off the nearest edge.
+A tagged boat drives straight to its own flag's home, or to the nearer corner of its side, past obstacles as `detour`
+has it; a boat out of bounds drives straight off the nearest edge; a disabled one coasts.
 """
 
 from __future__ import annotations
@@ -38,11 +38,22 @@ def heading_into_field(size: Array, x: float, y: float) -> float:
 
 
 @lean_kernel
+def nearer_mark(marks: Array, x: float, y: float) -> int:
+    """Which of two marks (2, 2), m, is nearer to (x, y): 0 or 1, and 0 where both are as near."""
+    first = math.sqrt((marks[0, 0] - x) ** 2 + (marks[0, 1] - y) ** 2)
+    second = math.sqrt((marks[1, 0] - x) ** 2 + (marks[1, 1] - y) ** 2)
+    return 1 if second < first else 0
+
+
+@lean_kernel
 def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
     """Command of a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
     x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
     if games.is_tagged[b, i]:
         home = rules.flag_home[rules.team[i]]
+        if rules.untag_at_corner:
+            marks = rules.corner_marks[rules.team[i]]
+            home = marks[nearer_mark(marks, x, y)]
         if rules.obstacles.bounds.shape[0] > 0:
             heading = heading_past_obstacles(rules.obstacles, rules.agent_radius[i], x, y, home)
         else:
@@ -50,6 +61,8 @@ def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
     else:
         heading = heading_into_field(rules.size, x, y)
     share = rules.oob_speed_frac if games.oob[b, i] else 1.0
+    if games.is_tagged[b, i] and rules.tag_speed_frac < 1.0:
+        share = min(share, rules.tag_speed_frac)
     command[0] = rules.max_speed[i] * share
     command[1] = wrap_bearing(heading - games.state[b, i, L.HEADING])
 
@@ -67,12 +80,20 @@ def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array)
     Returns:
         -1, or the flat number ``b * n + i`` of the first boat whose own command is not finite and would be obeyed.
     """
+    return decide_games(rules, games, actions, commands, 0, games.state.shape[0])
+
+
+@lean_kernel
+def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, first: int, last: int) -> int:
+    """`decide_commands` of the games first..last-1."""
     has_obstacles = rules.obstacles.bounds.shape[0] > 0
-    for b in range(games.state.shape[0]):
+    for b in range(first, last):
         for i in range(rules.n_boats):
             state = games.state[b, i]
             games.driven[b, i] = True
-            if has_obstacles and touches_obstacle(rules.obstacles, state[L.X], state[L.Y], rules.agent_radius[i]):
+            if (
+                has_obstacles and touches_obstacle(rules.obstacles, state[L.X], state[L.Y], rules.agent_radius[i])
+            ) or games.is_disabled[b, i]:
                 commands[b, i, 0] = 0.0
                 commands[b, i, 1] = 0.0
             elif games.is_tagged[b, i] or games.oob[b, i]:

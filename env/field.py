@@ -16,6 +16,9 @@ ROWS = ("B", "F", "H", "M", "C", "MX", "HX", "FX", "BX")
 COLUMNS = ("PP", "P", "C", "S", "SS")
 """Columns from port (y = height) to starboard (y = 0), as seen from the blue end."""
 
+CORNER_INSET_M = 10.0
+"""How far inside of a corner, along both edges, the point is that tagged boats are driven to, m."""
+
 
 @dataclass(frozen=True)
 class FieldGeometry:
@@ -54,6 +57,12 @@ def field_geometry(config: GameConfig) -> FieldGeometry:
         raise ConfigError("scrimmage_m does not part the two flag homes; move the line or the flags")
     walls = np.stack([_walls_of_team(size, homes, team) for team in (0, 1)])
     return FieldGeometry(size, float(np.linalg.norm(size)), homes, scrimmage, walls, np.sign(sides))
+
+
+def own_corners(size: Array, inset_m: float) -> Array:
+    """The two corners of each team's side, upper first, moved inwards along both edges: (2, 2, 2), m."""
+    (left, low), (right, high) = (inset_m, inset_m), size - inset_m
+    return np.array([[[left, high], [left, low]], [[right, high], [right, low]]])
 
 
 def field_points(size: Array) -> dict[str, Array]:

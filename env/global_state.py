@@ -15,7 +15,7 @@ from .obstacles import distance_and_heading
 from .sight import sight_of_line
 
 N_BOAT = 11
-"""Numbers per boat, before obstacles."""
+"""Numbers per boat, before ``is_disabled``, where it is told, and obstacles."""
 
 SCRIMMAGE = 4
 """Which of the sight lines is the dividing line."""
@@ -41,6 +41,7 @@ def global_state_keys(config: GameConfig) -> tuple[Key, ...]:
     keys: list[Key] = []
     for agent_id in config.agent_ids:
         keys += [(agent_id, entry) for entry in BOAT_ENTRIES]
+        keys += [(agent_id, "is_disabled")] if config.shows_disabled else []
         for k in range(config.n_obstacles):
             keys += [(agent_id, f"obstacle_{k}_distance"), (agent_id, f"obstacle_{k}_bearing")]
     return (*keys, *FLAG_ENTRIES, *TEAM_ENTRIES)
@@ -93,16 +94,20 @@ def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> No
     out[8] = games.oob[b, i]
     out[9] = games.tagging_cooldown_s[b, i]
     out[10] = games.is_tagged[b, i]
+    at = N_BOAT
+    if rules.shows_disabled:
+        out[at] = games.is_disabled[b, i]
+        at += 1
     for k in range(rules.obstacles.bounds.shape[0]):
         distance, towards = distance_and_heading(rules.obstacles, k, x, y)
-        out[N_BOAT + 2 * k] = distance - rules.agent_radius[i]
-        out[N_BOAT + 2 * k + 1] = wrap_bearing(towards - heading)
+        out[at + 2 * k] = distance - rules.agent_radius[i]
+        out[at + 2 * k + 1] = wrap_bearing(towards - heading)
 
 
 @lean_kernel
 def describe_game(rules: Rules, games: Games, b: int, out: Array) -> None:
     """Raw global state of game ``b`` into ``out`` (n_global,)."""
-    width = N_BOAT + 2 * rules.obstacles.bounds.shape[0]
+    width = N_BOAT + int(rules.shows_disabled) + 2 * rules.obstacles.bounds.shape[0]
     for i in range(rules.n_boats):
         _describe_boat(rules, games, b, i, out[i * width : (i + 1) * width])
     at = rules.n_boats * width

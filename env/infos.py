@@ -13,7 +13,9 @@ from .normalizer import VectorNormalizer
 from .observation_layout import Key
 from .observe import observe_raw
 
-BOOLEAN_ENTRIES = frozenset({"has_flag", "on_side", "oob", "is_tagged", "blue_flag_pickup", "red_flag_pickup"})
+BOOLEAN_ENTRIES = frozenset(
+    {"has_flag", "on_side", "oob", "is_tagged", "is_disabled", "blue_flag_pickup", "red_flag_pickup"}
+)
 
 
 class InfoWriter:

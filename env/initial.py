@@ -14,6 +14,7 @@ from .arrays import Games, Rules
 from .config import GameConfig
 from .motion import is_on_side
 from .obstacles import touches_obstacle
+from .power_play import plan_power_plays
 from .starts import clear_game, crowded_field_error, settle, start_game
 
 PER_BOAT = (
@@ -26,7 +27,8 @@ PER_BOAT = (
     "agent_collisions",
 )
 PER_TEAM = ("captures", "tags", "grabs")
-KEYS = (*PER_BOAT, "agent_pos_unit", *PER_TEAM)
+POWER_PLAYS = ("power_play_start", "power_play_boats")
+KEYS = (*PER_BOAT, "agent_pos_unit", *PER_TEAM, *POWER_PLAYS)
 
 
 def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: Array, init: Mapping[str, Any]) -> None:
@@ -39,7 +41,8 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
         b: which game.
         places: (n, 2) fixed start places, m.
         init: any of `KEYS`; per-boat values as a sequence in boat order or a dict by agent id, per-team values as a
-            pair (blue, red) or a dict by team. Units: m, m/s, deg, s.
+            pair (blue, red) or a dict by team. ``power_play_start`` is the decision at which each team's power play
+            begins, ``power_play_boats`` the boat of each it disables. Units: m, m/s, deg, s.
 
     Raises:
         GameError: a key, id, shape or value that the rules do not allow.
@@ -68,6 +71,27 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
         raise crowded_field_error()
     _set_counters(rules, games, b, boats, teams)
     settle(rules, games, b)
+    plan_power_plays(rules, games, b)
+    _set_power_plays(config, games, b, init)
+
+
+def _set_power_plays(config: GameConfig, games: Games, b: int, init: Mapping[str, Any]) -> None:
+    """Put given power plays in the place of those drawn: decisions (blue, red), and the boats they disable."""
+    if "power_play_start" in init:
+        games.power_start[b] = _per_team("power_play_start", init["power_play_start"])
+    if "power_play_boats" not in init:
+        return
+    try:
+        boats = np.asarray(init["power_play_boats"], dtype=np.float64)
+        boats = np.broadcast_to(boats.reshape(2, -1), (2, 2))
+    except (TypeError, ValueError):
+        boats = np.full((2, 2), np.nan)
+    teams = np.arange(2)[:, None] * config.team_size
+    if not ((boats == np.floor(boats)) & (boats >= teams) & (boats < teams + config.team_size)).all():
+        raise GameError(
+            f"power_play_boats is {init['power_play_boats']!r}; give the number of a blue and of a red boat"
+        )
+    games.power_boats[b] = boats
 
 
 def _set_counters(rules: Rules, games: Games, b: int, boats: dict[str, Array], teams: dict[str, Array]) -> None:

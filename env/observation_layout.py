@@ -11,12 +11,8 @@ from steerclear.shield.jit import Array, IntArray
 from .config import GameConfig
 from .field import FieldGeometry
 
-N_OWN = 21
-"""Numbers about the boat itself and the field."""
-N_OTHER = 8
-"""Numbers about each other boat."""
 OWN_STATUS = 15
-"""Where the boat's own has_flag, on_side, tagging_cooldown and is_tagged begin."""
+"""Where the boat's own has_flag, on_side, tagging_cooldown, is_tagged and, where it is told, is_disabled begin."""
 OTHER_STATUS = 4
 """Where those of another boat begin, after the start of its numbers."""
 
@@ -34,15 +30,21 @@ OTHER_ENTRIES = (
 )
 
 
+def sizes(shows_disabled: bool) -> tuple[int, int]:
+    """How many numbers there are about the boat itself and the field, scores last, and about each other boat."""
+    return (22, 9) if shows_disabled else (21, 8)
+
+
 def observation_keys(config: GameConfig) -> tuple[Key, ...]:
     """Names of an observation's numbers, in order."""
     keys: list[Key] = []
     for place in ("opponent_home", "own_home", "wall_0", "wall_1", "wall_2", "wall_3", "scrimmage_line"):
         keys += [f"{place}_bearing", f"{place}_distance"]
-    keys += ["speed", "has_flag", "on_side", "tagging_cooldown", "is_tagged", "team_score", "opponent_score"]
+    disabled = ["is_disabled"] if config.shows_disabled else []
+    keys += ["speed", "has_flag", "on_side", "tagging_cooldown", "is_tagged", *disabled, "team_score", "opponent_score"]
     others = [f"teammate_{k}" for k in range(config.team_size - 1)]
     others += [f"opponent_{k}" for k in range(config.team_size)]
-    keys += [(other, entry) for other in others for entry in OTHER_ENTRIES]
+    keys += [(other, entry) for other in others for entry in (*OTHER_ENTRIES, *disabled)]
     for k in range(config.n_obstacles):
         keys += [f"obstacle_{k}_distance", f"obstacle_{k}_bearing"]
     return tuple(keys)
@@ -54,12 +56,13 @@ def boat_slots(config: GameConfig) -> IntArray:
     A boat's own slot is such that its status lies at the same offset as another boat's.
     """
     n, size = config.n_boats, config.team_size
+    own_numbers, other_numbers = sizes(config.shows_disabled)
     slots = np.full((n, n), OWN_STATUS - OTHER_STATUS, dtype=np.int64)
     for i in range(n):
         mates = [j for j in range(n) if j // size == i // size and j != i]
         others = [j for j in range(n) if j // size != i // size]
         for k, j in enumerate(mates + others):
-            slots[i, j] = N_OWN + N_OTHER * k
+            slots[i, j] = own_numbers + other_numbers * k
     return slots
 
 

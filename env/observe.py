@@ -13,7 +13,7 @@ from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
 from .arrays import Games, Rules
-from .observation_layout import N_OTHER, N_OWN, OTHER_STATUS
+from .observation_layout import OTHER_STATUS, OWN_STATUS
 from .obstacles import Obstacles, distance_and_heading
 from .sight import sight_of_line, sight_of_point
 
@@ -51,7 +51,15 @@ def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -
 
 @lean_kernel
 def _see_status(
-    raw: Array, i: int, slots: IntArray, has_flag: BoolArray, on_side: BoolArray, cooldown: Array, is_tagged: BoolArray
+    raw: Array,
+    i: int,
+    slots: IntArray,
+    has_flag: BoolArray,
+    on_side: BoolArray,
+    cooldown: Array,
+    is_tagged: BoolArray,
+    is_disabled: BoolArray,
+    shows_disabled: bool,
 ) -> None:
     """Status of boat ``i`` (arrays (n,) of one game) into every boat's observation, its own included."""
     for j in range(raw.shape[0]):
@@ -60,6 +68,8 @@ def _see_status(
         raw[j, at + 1] = on_side[i]
         raw[j, at + 2] = cooldown[i]
         raw[j, at + 3] = is_tagged[i]
+        if shows_disabled:
+            raw[j, at + 4] = is_disabled[i]
 
 
 @lean_kernel
@@ -75,14 +85,16 @@ def _see_obstacles(row: Array, state: Array, obstacles: Obstacles, radius: float
 def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -> None:
     """Raw observations of all boats of the games first..last-1 into ``raw`` (last - first, n, n_obs)."""
     n_boats = rules.n_boats
+    status = 5 if rules.shows_disabled else 4
+    scores = OWN_STATUS + status
     for b in range(first, last):
         seen = raw[b - first]
         state = games.state[b]
         for i in range(n_boats):
             team = rules.team[i]
             _see_field(seen, i, state, rules.sight_lines[team], rules.flag_home, team)
-            seen[i, 19] = games.captures[b, team]
-            seen[i, 20] = games.captures[b, 1 - team]
+            seen[i, scores] = games.captures[b, team]
+            seen[i, scores + 1] = games.captures[b, 1 - team]
             for j in range(i + 1, n_boats):
                 _see_each_other(seen, state, i, j, rules.slots)
             _see_status(
@@ -93,9 +105,11 @@ def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -
                 games.on_side[b],
                 games.tagging_cooldown_s[b],
                 games.is_tagged[b],
+                games.is_disabled[b],
+                rules.shows_disabled,
             )
             if rules.obstacles.bounds.shape[0] > 0:
-                at = N_OWN + N_OTHER * (n_boats - 1)
+                at = scores + 2 + (OTHER_STATUS + status) * (n_boats - 1)
                 _see_obstacles(seen[i], state[i], rules.obstacles, rules.agent_radius[i], at)
 
 

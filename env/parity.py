@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import GameError, TraceError
@@ -14,7 +15,7 @@ from .actions import discrete_commands
 from .core import BatchedMctf
 from .infos import InfoWriter
 from .parity_report import EventMismatch, ParityReport
-from .trace import OBSERVATION_EVERY, Trace, load_trace
+from .trace import Trace, load_trace
 
 BOAT_EVENTS = {
     "is_tagged": "is_tagged",
@@ -22,6 +23,8 @@ BOAT_EVENTS = {
     "oob": "oob",
     "on_side": "on_side",
     "agent_collisions": "collisions",
+    "is_disabled": "is_disabled",
+    "contacts": "contacts",
 }
 TEAM_EVENTS = {"flag_taken": "flag_taken", "captures": "captures", "grabs": "grabs", "tags": "tags"}
 """Array of the trace -> array of `BatchedMctf`; compared exactly at every step."""
@@ -95,7 +98,24 @@ def _first_state(trace: Trace) -> dict[str, np.ndarray]:
     names = ("position", "speed", "heading", "has_flag", "is_tagged", "tagging_cooldown")
     init = {f"agent_{name}": trace.arrays[name][0] for name in names}
     init["agent_collisions"] = trace.arrays["agent_collisions"][0]
+    init |= _power_plays(trace.meta)
     return init | {name: trace.arrays[name][0] for name in ("captures", "tags", "grabs")}
+
+
+def _power_plays(meta: dict[str, Any]) -> dict[str, Any]:
+    """When the game's power plays began and which boats it drew for them, of those that came about."""
+    plays = meta.get("power_play")
+    if not plays:
+        return {}
+    starts, size = (plays["blue_start"], plays["red_start"]), int(meta["team_size"])
+    drawn: tuple[list[int], list[int]] = ([], [])
+    for decision, function, _, value in meta["draws"]:
+        if decision >= 0 and function == "randint":
+            # slots do not overlap: the one that began last is the one that draws
+            team = max((0, 1), key=lambda side: starts[side] if starts[side] <= decision + 1 else -1)
+            drawn[team].append(team * size + int(value))
+    boats = [([*drawn[team], team * size] * 2)[:2] if len(drawn[team]) < 2 else drawn[team][:2] for team in (0, 1)]
+    return {"power_play_start": starts, "power_play_boats": boats}
 
 
 def _commands(trace: Trace, core: BatchedMctf, step: int) -> Array:
@@ -119,9 +139,9 @@ def _compare_views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: in
     angles = writer.global_state.is_angle
     ours = writer.global_vector().astype(np.float32)
     deviations.widen("global_state", _difference(ours, trace.arrays["global_state"][step], angles, 360.0))
-    if step % OBSERVATION_EVERY:
+    if step % trace.observed_every:
         return
-    row, angles = step // OBSERVATION_EVERY, writer.observation.is_angle
+    row, angles = step // trace.observed_every, writer.observation.is_angle
     theirs = trace.arrays["obs_normalized"][row]
     deviations.widen("observation_normalised", _difference(core.observations[0], theirs, angles, 2.0))
     ours = writer.raw_observations().astype(np.float32)
@@ -144,6 +164,8 @@ def _compare_events(trace: Trace, core: BatchedMctf, step: int) -> list[EventMis
     found = []
     for events, ids in ((BOAT_EVENTS, trace.config.agent_ids), (TEAM_EVENTS, ("blue", "red"))):
         for theirs_name, ours_name in events.items():
+            if theirs_name not in trace.arrays:
+                continue
             theirs, ours = trace.arrays[theirs_name][step], getattr(core, ours_name)[0]
             for i in np.flatnonzero(theirs != ours):
                 found.append(EventMismatch(step, theirs_name, ids[i], int(theirs[i]), int(ours[i])))

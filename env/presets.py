@@ -19,4 +19,19 @@ PRESETS: dict[str, dict[str, Any]] = {
         "agent_radius_m": 2.0,
         "tagging_cooldown_s": 60.0,
     },
+    # The 2026 competition's configuration: one decision a second, corners instead of the flag, power plays.
+    "mctf2026": {
+        "env_bounds_m": (160.0, 80.0),
+        "platforms": "surveyor",
+        "agent_radius_m": 2.0,
+        "tagging_cooldown_s": 60.0,
+        "decision_steps": 10,
+        "flag_keepout_m": 0.0,
+        "flag_radius_m": 1.5,
+        "tag_speed_frac": 0.5,
+        "capture_at": "own_corners",
+        "untag_at": "own_corners",
+        "power_play_share": 0.2,
+        "shows_disabled": True,
+    },
 }

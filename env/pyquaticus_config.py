@@ -30,6 +30,11 @@ RENAMED = {
     "tagging_cooldown": "tagging_cooldown_s",
     "tag_on_collision": "tag_on_collision",
     "tag_on_oob": "tag_on_oob",
+    "sim_speedup_factor": "decision_steps",
+    "tag_speed_frac": "tag_speed_frac",
+    "tag_probability": "tag_probability",
+    "untag_radius": "corner_radius_m",
+    "power_play_percentage": "power_play_share",
 }
 """Pyquaticus' name -> ours."""
 
@@ -38,7 +43,6 @@ ONLY = {
     "env_bounds_unit": ("m",),
     "flag_homes_unit": ("m",),
     "scrimmage_coords_unit": ("m",),
-    "sim_speedup_factor": (1,),
     "lidar_obs": (False,),
     "normalize_obs": (True,),
     "short_obs_hist_length": (1,),
@@ -76,6 +80,12 @@ WITHOUT_EFFECT = frozenset(
 )
 """Settings of drawing, lidar and histories: accepted, not needed."""
 
+ONLY_2026 = frozenset({"tag_speed_frac", "tag_probability", "untag_radius", "power_play_percentage"})
+"""Settings that only the environment of the 2026 competition has."""
+
+OF_2026 = {"capture_at": "own_corners", "untag_at": "own_corners", "shows_disabled": True}
+"""What that environment does without a setting."""
+
 DEFAULTS = {"platforms": "heron", "flag_radius_m": 1.5}
 """Where Pyquaticus' defaults are not ours."""
 
@@ -93,7 +103,8 @@ def from_pyquaticus(settings: Mapping[str, Any], team_size: int, **overrides: An
     """
     if not isinstance(settings, Mapping):
         raise ConfigError(f"the configuration is {type(settings).__name__}; give a dict")
-    ours: dict[str, Any] = {**DEFAULTS, "team_size": team_size, "preset_name": "pyquaticus"}
+    other = OF_2026 if ONLY_2026 & set(settings) else {}
+    ours: dict[str, Any] = {**DEFAULTS, **other, "team_size": team_size, "preset_name": "pyquaticus"}
     for name, value in settings.items():
         if name in RENAMED:
             if not (isinstance(value, str) and value == "auto"):

@@ -179,5 +179,5 @@ def _state_of(view: Any) -> dict[str, Any]:
     """Return the part of a record that a ``GameView`` holds."""
     state = np.asarray(view.state)
     moving = {"position": state[:, [X, Y]], "heading_deg": state[:, HEADING], "speed_mps": state[:, SPEED]}
-    marks = ("has_flag", "is_tagged", "oob", "flag_position", "captures")
+    marks = ("has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
     return moving | {name: getattr(view, name) for name in marks}

@@ -112,6 +112,8 @@ _SETTINGS: dict[str, tuple[Test, str]] = {
     "flag_home": (_list_of(_point, 2, 2), "two points, m"),
     "scrimmage": (_maybe(_list_of(_point, 2, 2)), "two points, m"),
     "catch_radius_m": (_radius, "a radius, m"),
+    "decision_steps": (_number(1, MOST_BOATS * 10), "a whole number of steps"),
+    "corner_radius_m": (_radius, "a radius, m"),
     "flag_keepout_m": (_radius, "a radius, m"),
     "agent_radius_m": (lambda value: _radius(value) or _list_of(_radius)(value), "a radius, or one for each boat, m"),
     "separation_m": (_number(0.0, FARTHEST_M, above=True), "a radius above 0, m"),

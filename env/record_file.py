@@ -10,6 +10,7 @@ array              shape           contents
 ``heading_deg``    (T+1, n)        deg, clockwise from north
 ``speed_mps``      (T+1, n)        m/s
 ``has_flag``       (T+1, n)        bool; likewise ``is_tagged`` and ``oob`` (out of bounds)
+``is_disabled``    (T+1, n)        bool, stopped by a power play; older files have none
 ``flag_position``  (T+1, 2, 2)     m, flag of team 0 and of team 1
 ``captures``       (T+1, 2)        captures made by each team so far
 ``wanted``         (T, n, 2)       speed m/s and absolute heading deg the policy asked for
@@ -59,7 +60,7 @@ META_KEYS = (
     "reason_names",
     "platforms",
 )
-"""Keys that ``meta`` must have; further keys (``obstacles``, ``title``) are kept."""
+"""Keys that ``meta`` must have; further keys (``obstacles``, ``title``, ``decision_steps``, ...) are kept."""
 
 LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "position": (("T+1", "n", 2), np.float64),
@@ -68,6 +69,7 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "has_flag": (("T+1", "n"), np.bool_),
     "is_tagged": (("T+1", "n"), np.bool_),
     "oob": (("T+1", "n"), np.bool_),
+    "is_disabled": (("T+1", "n"), np.bool_),
     "flag_position": (("T+1", 2, 2), np.float64),
     "captures": (("T+1", 2), np.int64),
     "wanted": (("T", "n", 2), np.float64),
@@ -81,6 +83,9 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
 
 ARRAYS = tuple(LAYOUT)
 """Names of the arrays beside ``meta``."""
+
+LATER = ("is_disabled",)
+"""Those that files of older versions lack; `load` and `make_record` fill them in."""
 
 _MUST_BE_FINITE = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
 
@@ -121,16 +126,17 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
         TraceError: An array is missing, has the wrong shape, or holds a value that cannot be drawn.
     """
     meta = read_meta(record)
-    missing = [name for name in ARRAYS if name not in record]
+    missing = [name for name in ARRAYS if name not in record and name not in LATER]
     if missing:
         raise TraceError(f"the record lacks {', '.join(missing)}. {_AGAIN}")
     check_meta(meta)
-    if not all(record[name].ndim == len(axes) for name, (axes, _) in LAYOUT.items()):
+    layout = {name: entry for name, entry in LAYOUT.items() if name in record}
+    if not all(record[name].ndim == len(axes) for name, (axes, _) in layout.items()):
         raise TraceError(f"the record's arrays have other shapes than a record's. {_AGAIN}")
-    check_kinds(record, {name: kind for name, (_, kind) in LAYOUT.items()})
+    check_kinds(record, {name: kind for name, (_, kind) in layout.items()})
     n, steps = len(meta["agent_ids"]), len(record["wanted"])
     sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(record["breaches"])}
-    for name, (axes, _) in LAYOUT.items():
+    for name, (axes, _) in layout.items():
         want = tuple(axis if isinstance(axis, int) else sizes[axis] for axis in axes)
         if record[name].shape != want:
             raise TraceError(f"the record's {name} has shape {record[name].shape}, expected {want}. {_AGAIN}")
@@ -168,7 +174,7 @@ def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
     record = {name: np.asarray(values, dtype=LAYOUT[name][1]) for name, values in arrays.items()}
     record["meta"] = np.array(json.dumps(dict(meta), default=plain))
     validate(record)
-    return record
+    return _filled(record)
 
 
 def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path:
@@ -210,7 +216,12 @@ def load(path: str | os.PathLike[str]) -> Record:
         validate(record)
     except TraceError as error:
         raise TraceError(f"{path}: {error}") from None
-    return record
+    return _filled(record)
+
+
+def _filled(record: Record) -> Record:
+    """The record, with what older versions did not write: no boat was disabled then."""
+    return {"is_disabled": np.zeros_like(record["is_tagged"]), **record}
 
 
 def plain(value: Any) -> Any:

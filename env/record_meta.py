@@ -40,6 +40,8 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
     (width, height), radii = config.env_bounds_m, config.agent_radius_m
     game = {
         "dt_s": config.dt_s,
+        "decision_steps": config.decision_steps,
+        "corner_radius_m": config.corner_radius_m if "own_corners" in (config.capture_at, config.untag_at) else 0.0,
         "env_bounds_m": config.env_bounds_m,
         "team_size": config.team_size,
         "agent_ids": config.agent_ids,

@@ -10,6 +10,7 @@ from steerclear.shield.platforms import layout as L
 
 from .arrays import CAPTURE, GRAB, OUT, TAG, Games, Rules
 from .motion import drop_flag, is_within
+from .randomness import next_uniform
 
 
 @lean_kernel
@@ -19,7 +20,7 @@ def recharge(rules: Rules, games: Games, first: int, last: int) -> None:
         for i in range(rules.n_boats):
             elapsed = games.tagging_cooldown_s[b, i]
             if elapsed != rules.cooldown:
-                games.tagging_cooldown_s[b, i] = min(elapsed + rules.dt_s, rules.cooldown)
+                games.tagging_cooldown_s[b, i] = min(elapsed + rules.decision_s, rules.cooldown)
 
 
 @lean_kernel
@@ -70,29 +71,44 @@ def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: i
 
 @lean_kernel
 def check_tags(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Boats on their side, in bounds, untagged and recharged tag one opponent each, in boat order."""
+    """Boats on their side, in bounds, untagged, able and recharged tag one opponent each, in boat order.
+
+    A try that fails by chance costs the cool-down as well.
+    """
     for b in range(first, last):
         for i in range(rules.n_boats):
             games.made_tag[b, i] = -1
             ready = games.tagging_cooldown_s[b, i] == rules.cooldown
             if not ready or not games.on_side[b, i] or games.oob[b, i] or games.is_tagged[b, i]:
                 continue
+            if games.is_disabled[b, i]:
+                continue
             team = rules.team[i]
             foe = (1 - team) * rules.team_size
             j = _first_in_reach(games.state[b], games.on_side[b], games.is_tagged[b], i, foe, rules.catch_radius)
             if j < 0:
+                continue
+            games.tagging_cooldown_s[b, i] = 0.0
+            if rules.tag_probability < 1.0 and next_uniform(games.rng, b) > rules.tag_probability:
                 continue
             games.is_tagged[b, j] = True
             games.made_tag[b, i] = j
             games.tags[b, team] += 1
             games.events[b, team, TAG] += 1
             drop_flag(rules, games, b, j)
-            games.tagging_cooldown_s[b, i] = 0.0
+
+
+@lean_kernel
+def is_at_corner(rules: Rules, games: Games, b: int, i: int) -> bool:
+    """Whether boat ``i`` is within the corner radius of a corner of its own side."""
+    corners = rules.corners[rules.team[i]]
+    near = is_within(games.state[b, i], corners[0], rules.corner_radius)
+    return near or is_within(games.state[b, i], corners[1], rules.corner_radius)
 
 
 @lean_kernel
 def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Carriers that reached their own side (or, by option, their own base) score; the flag goes home."""
+    """Carriers that reached their own side (or, by option, their own base or corners) score; the flag goes home."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             if not games.has_flag[b, i]:
@@ -101,6 +117,8 @@ def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
             arrived = games.on_side[b, i]
             if rules.capture_at_base:
                 arrived = is_within(games.state[b, i], rules.flag_home[team], rules.catch_radius)
+            elif rules.capture_at_corner:
+                arrived = is_at_corner(rules, games, b, i)
             if arrived:
                 drop_flag(rules, games, b, i)
                 games.captures[b, team] += 1
@@ -109,10 +127,12 @@ def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def check_untags(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Tagged boats within reach of their own flag's home are free again."""
+    """Tagged boats within reach of their own flag's home, or in bounds at their corners, are free again."""
     for b in range(first, last):
         for i in range(rules.n_boats):
-            if games.is_tagged[b, i]:
+            if games.is_tagged[b, i] and rules.untag_at_corner:
+                games.is_tagged[b, i] = games.oob[b, i] or not is_at_corner(rules, games, b, i)
+            elif games.is_tagged[b, i]:
                 home = rules.flag_home[rules.team[i]]
                 games.is_tagged[b, i] = not is_within(games.state[b, i], home, rules.catch_radius)
 

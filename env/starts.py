@@ -16,6 +16,7 @@ from .config import GameConfig
 from .field import FieldGeometry, line_through_field
 from .motion import is_on_side, see_boat
 from .obstacles import closest_on_segment, touches_obstacle
+from .power_play import plan_power_plays
 from .randomness import next_uniform
 from .rules import check_bounds, check_grabs, check_tags, check_untags
 
@@ -92,6 +93,7 @@ def clear_game(rules: Rules, games: Games, b: int) -> None:
         games.state[b, i, L.HEADING_ERROR] = np.nan
         games.error_is_float32[b, i] = False
         games.is_tagged[b, i] = False
+        games.is_disabled[b, i] = False
         games.has_flag[b, i] = False
         games.oob[b, i] = False
         games.driven[b, i] = False
@@ -99,7 +101,9 @@ def clear_game(rules: Rules, games: Games, b: int) -> None:
         games.made_tag[b, i] = -1
         games.collisions[b, i] = 0
         games.new_collisions[b, i] = 0
+        games.contacts[b, i] = 0
     games.touching[b] = False
+    games.contact[b] = False
     games.flag_position[b] = rules.flag_home
     games.flag_taken[b] = False
     games.captures[b] = 0
@@ -195,6 +199,7 @@ def start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
             see_boat(games.state[b, i], seen[b, i])
         check_bounds(rules, games, b, b + 1)
         settle(rules, games, b)
+        plan_power_plays(rules, games, b)
 
 
 @kernel
@@ -206,6 +211,7 @@ def _start_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, r
             if not start_game(rules, games, b, places, nothing_given, random, own_side):
                 return False
             settle(rules, games, b)
+            plan_power_plays(rules, games, b)
     return True
 
 

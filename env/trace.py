@@ -17,8 +17,9 @@ from .pyquaticus_config import from_pyquaticus
 from .whole_file import whole_file
 
 OBSERVATION_EVERY = 5
-"""Observations are recorded at every so many steps."""
+"""Observations are recorded at every so many decisions, where a trace does not say otherwise."""
 
+ALWAYS = ("action", "position", "flag_position", "global_state", "obs", "obs_normalized")
 PER_BOAT = (
     "heading",
     "speed",
@@ -31,6 +32,9 @@ PER_BOAT = (
     "tagging_cooldown",
     "agent_collisions",
 )
+OF_2026 = ("is_disabled", "contacts")
+"""Per boat, of games of several steps a decision or with power plays; ``contacts`` may be told by ``sub_position``."""
+
 PER_TEAM = ("flag_taken", "captures", "tags", "grabs")
 MOST_BOATS = 100
 """Of a team."""
@@ -41,15 +45,15 @@ _REMEDY = "Record or copy it again."
 
 @dataclass(frozen=True)
 class Trace:
-    """One recorded game of T steps and n boats.
+    """One recorded game of T decisions and n boats.
 
     Attributes:
         path: the file.
         meta: its settings, Pyquaticus' own names.
         config: the same game as a `GameConfig`.
         arrays: ``action`` (T, n, 2) and, at index t before and t+1 after that action, ``position`` (T+1, n, 2) m,
-            ``flag_position`` (T+1, 2, 2) m, `PER_BOAT` (T+1, n), `PER_TEAM` (T+1, 2), ``global_state`` (T+1, g), and
-            ``obs``, ``obs_normalized`` (T//5+1, n, k).
+            ``flag_position`` (T+1, 2, 2) m, `PER_BOAT` and, where there are any, `OF_2026` (T+1, n), `PER_TEAM`
+            (T+1, 2), ``global_state`` (T+1, g), and ``obs``, ``obs_normalized`` (T // every + 1, n, k).
     """
 
     path: Path
@@ -59,8 +63,13 @@ class Trace:
 
     @property
     def steps(self) -> int:
-        """Recorded steps T."""
+        """Recorded decisions T."""
         return len(self.arrays["action"])
+
+    @property
+    def observed_every(self) -> int:
+        """Decisions from one recorded observation to the next."""
+        return _observed_every(self.meta)
 
     def cut(self, steps: int) -> Trace:
         """The first ``steps`` steps.
@@ -70,7 +79,7 @@ class Trace:
         """
         if not 1 <= steps <= self.steps:
             raise TraceError(f"cannot cut {self.path.name} to {steps} steps; give 1..{self.steps}")
-        seen = steps // OBSERVATION_EVERY + 1
+        seen = steps // self.observed_every + 1
         ends = {"action": steps, "obs": seen, "obs_normalized": seen}
         arrays = {name: values[: ends.get(name, steps + 1)] for name, values in self.arrays.items()}
         return Trace(self.path, self.meta, self.config, arrays)
@@ -98,6 +107,7 @@ def load_trace(path: str | os.PathLike[str]) -> Trace:
     try:
         meta = _read_meta(source, arrays)
         config = from_pyquaticus(meta["config"], team_size=_team_size(meta), dt_s=meta["dt"])
+        arrays = _what_counts(arrays, config)
         _check_shapes(source, arrays, config, meta)
     except TraceError:
         raise
@@ -123,6 +133,32 @@ def _read_meta(source: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     return meta
 
 
+def _observed_every(meta: dict[str, Any]) -> int:
+    every = meta.get("obs_every", OBSERVATION_EVERY)
+    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+        raise TraceError(f"obs_every in meta is {every!r}; give a whole number >= 1. {_REMEDY}")
+    return every
+
+
+def _what_counts(arrays: dict[str, np.ndarray], config: GameConfig) -> dict[str, np.ndarray]:
+    """The arrays that a replay compares; contacts are counted from the places after every step, where there are any."""
+    kept = {name: arrays[name] for name in (*ALWAYS, *PER_BOAT, *PER_TEAM, *OF_2026) if name in arrays}
+    if "sub_position" in arrays and "contacts" not in kept:
+        kept["contacts"] = _count_contacts(arrays["sub_position"], config)
+    return kept
+
+
+def _count_contacts(after: np.ndarray, config: GameConfig) -> np.ndarray:
+    """Entries into the sum of radii so far of each boat, (T+1, n), from places (T, S, n, 2) m after every step."""
+    decisions, steps, n = after.shape[:3]
+    radius = np.array(config.agent_radius_m)
+    gap_m = np.linalg.norm(after[..., :, None, :] - after[..., None, :, :], axis=-1).reshape(-1, n, n)
+    touch = (gap_m <= radius[:, None] + radius) & ~np.eye(n, dtype=bool)
+    before = np.concatenate([np.zeros((1, n, n), dtype=bool), touch[:-1]])
+    entries = (touch & ~before).sum(axis=2).reshape(decisions, steps, n).sum(axis=1)
+    return np.concatenate([np.zeros((1, n), dtype=np.int64), np.cumsum(entries, axis=0)])
+
+
 def _team_size(meta: dict[str, Any]) -> int:
     size = meta["team_size"]
     if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= MOST_BOATS:
@@ -131,15 +167,26 @@ def _team_size(meta: dict[str, Any]) -> int:
 
 
 def _check_shapes(source: Path, arrays: dict[str, np.ndarray], config: GameConfig, meta: dict[str, Any]) -> None:
-    names = ("action", "position", "flag_position", "global_state", "obs", "obs_normalized", *PER_BOAT, *PER_TEAM)
+    more = [name for name in OF_2026 if name in arrays]
+    names = (
+        "action",
+        "position",
+        "flag_position",
+        "global_state",
+        "obs",
+        "obs_normalized",
+        *PER_BOAT,
+        *PER_TEAM,
+        *more,
+    )
     missing = [name for name in names if name not in arrays]
     if missing:
         raise TraceError(f"{source} lacks {', '.join(missing)}. {_REMEDY}")
     n, steps = config.n_boats, len(arrays["action"])
-    seen = (steps // OBSERVATION_EVERY + 1, n, len(meta["obs_keys"]))
+    seen = (steps // _observed_every(meta) + 1, n, len(meta["obs_keys"]))
     expected: dict[str, tuple[int, ...]] = {"action": (steps, n, 2), "obs": seen, "obs_normalized": seen}
     expected |= {"position": (steps + 1, n, 2), "flag_position": (steps + 1, 2, 2)}
-    expected |= dict.fromkeys(PER_BOAT, (steps + 1, n)) | dict.fromkeys(PER_TEAM, (steps + 1, 2))
+    expected |= dict.fromkeys((*PER_BOAT, *more), (steps + 1, n)) | dict.fromkeys(PER_TEAM, (steps + 1, 2))
     for name, shape in expected.items():
         if arrays[name].shape != shape or steps == 0:
             raise TraceError(f"{source}: {name} has shape {arrays[name].shape}, expected {shape}. {_REMEDY}")

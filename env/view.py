@@ -23,6 +23,7 @@ class GameView:
     team: IntArray
     previous_position: Array
     is_tagged: BoolArray
+    is_disabled: BoolArray
     has_flag: BoolArray
     oob: BoolArray
     on_side: BoolArray
@@ -30,6 +31,7 @@ class GameView:
     tagging_cooldown_s: Array
     made_tag: IntArray
     collisions: IntArray
+    contacts: IntArray
     flag_home: Array
     flag_position: Array
     flag_taken: BoolArray
@@ -37,6 +39,9 @@ class GameView:
     grabs: IntArray
     tags: IntArray
     events: IntArray
+    power_start: IntArray
+    power_boats: IntArray
+    power_begun: IntArray
     time_s: float
     terminated: bool
     truncated: bool
@@ -61,6 +66,7 @@ _COPIED = (
     "state",
     "previous_position",
     "is_tagged",
+    "is_disabled",
     "has_flag",
     "oob",
     "on_side",
@@ -68,12 +74,16 @@ _COPIED = (
     "tagging_cooldown_s",
     "made_tag",
     "collisions",
+    "contacts",
     "flag_position",
     "flag_taken",
     "captures",
     "grabs",
     "tags",
     "events",
+    "power_start",
+    "power_boats",
+    "power_begun",
 )
 
 

@@ -17,6 +17,7 @@ from .commands.demonstrate import demonstrate
 from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
+from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
 from .commands.fit import fit
 from .commands.parity import parity
@@ -66,6 +67,7 @@ app.command("sea-trial")(sea_trial)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
 app.add_typer(platform_app, name="platform")
+app.add_typer(entry_app, name="entry")
 
 
 def _show_version(wanted: bool) -> None:

@@ -59,7 +59,7 @@ GAME_COLUMNS = {
     "closest_teammate_m": "closest distance of two own boats, m",
     "closest_opponent_m": "closest distance of an own boat to an opponent, m",
     "closest_m": "the smaller of the two, m",
-    "collisions": "as the score counts them: entries into the sum of the agent radii, for each own boat in it",
+    "collisions": "as the game counts them, once a decision: entries into the sum of radii, for each own boat in it",
     "covered_steps": "boat-steps a shield decided on",
     "changed_steps": "boat-steps in which the sent command differs from the wanted one",
     "changed_share": "changed_steps / covered_steps",
@@ -153,6 +153,30 @@ RESULTS = {
     "replay.breaches_on": "its breaches with shield",
     "replay.same_as_played": "whether playing it again gave the same counts",
     "files.*": "what was written, relative to the folder",
+}
+
+ENTRY_CHECK = {
+    **_PROVENANCE,
+    "entry": "what was checked",
+    "load_s": "time until it was loaded in a process of its own, s",
+    "imports.needed[]": "packages its files import beyond Python's own and themselves",
+    "imports.missing[]": "those of them that are not installed here",
+    "imports.unread[]": "files that are no Python this interpreter reads",
+    "calls": "actions asked for",
+    "mean_ms": "mean time of one, ms",
+    "max_ms": "longest, ms",
+    "late": "actions that took longer than a decision of the game",
+    "decision_ms": "time of a decision of the game, ms",
+    "held": "actions that could not be used: the boat stopped",
+    "failures[].kind": "what kind of failure",
+    "failures[].count": "how often",
+    "failures[].message": "of the first of them",
+    "game.captures": "of the game against boats that hold: flags captured",
+    "game.grabs": "flags grabbed",
+    "game.tags": "tags made",
+    "game.collisions": "as the game counts them",
+    "game.duration_s": "its length, s",
+    "game.first_failure": "the first thing that went wrong; null for nothing",
 }
 
 PLAY = {
@@ -260,6 +284,8 @@ KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
     "tournament": _TOURNAMENT,
+    "entry check": ENTRY_CHECK,
+    "entry report": RESULTS,
     "play": PLAY,
     "parity": PARITY,
     "bench": BENCH,

@@ -125,6 +125,7 @@ class Match:
         try:
             return self.shielding.step(actions)
         except GameError:  # an answer the game refuses; nothing has moved yet
+            self._moment = None
             mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
             return self.shielding.step(mended)
 
@@ -151,6 +152,8 @@ class Match:
         return f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else ""
 
     def _note_commands(self, wanted: Array, sent: Array) -> None:
+        if self._moment is not None:  # an earlier step of motion of the same decision is over
+            self._record_step()
         heading_deg = self.env.core.state[0, :, L.HEADING]
         commands = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
         seen = self.shielding.read()
@@ -169,6 +172,7 @@ class Match:
             self._log.step(self.env.core)
         if seen.solve_time_s is not None:
             self._decision_us.append(1e6 * seen.solve_time_s)
+        self._moment = None
 
     def _result(self, wall_s: float) -> MatchResult:
         record = self._recorder.finish()

@@ -34,14 +34,14 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
     own, dt_s = np.asarray(meta["team"]) == side, float(meta["dt_s"])
     return {
         **_breach_columns(distances, meta, side, radii_m),
-        "collisions": scored_collisions(distances, meta, side),
+        "collisions": scored_collisions(_when_looked(record, meta), meta, side),
         **shield_columns(record, own, dt_s),
         "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
     }
 
 
 def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: int) -> int:
-    """Count collisions as the score does: per entry into the sum of the agent radii, for each boat of the team.
+    """Count collisions as the game does: per entry into the sum of the agent radii, for each boat of the team.
 
     Two team-mates that collide thus count twice.
     """
@@ -51,6 +51,11 @@ def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: i
         pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
         total += boats_in_it * count_breaches(pairs, own_radius_m[pairs.pairs].sum(axis=1))
     return total
+
+
+def _when_looked(record: Record, meta: Mapping[str, Any]) -> PairDistances:
+    """Distances when the game looks for collisions: after every decision, whose steps of motion are recorded each."""
+    return PairDistances.of(record["position"][:: int(meta.get("decision_steps", 1))])
 
 
 def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[str, Any]:

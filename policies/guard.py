@@ -98,7 +98,7 @@ class GuardedTeam:
         boat_numbers(core, agent_ids)
         self._ids = list(agent_ids)
         self._reader = ActionReader(env)
-        self._reporter.begin(core.config.dt_s)
+        self._reporter.begin(core.config.decision_s)
         try:
             self.code.begin(env, self._ids, seed)
         except PolicyError:

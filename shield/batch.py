@@ -195,7 +195,7 @@ class BatchedShield:
 
         Args:
             team: the team to shield.
-            shield_autopilot: also decide for boats the game drives (tagged, out of bounds).
+            shield_autopilot: also decide for boats the game drives (tagged, out of bounds; never disabled ones).
 
         Raises:
             ConfigError: no boat is of that team, or the shield was built for the other team's flag. When it is called:
@@ -239,8 +239,8 @@ class GamesFilter:
         if self._checked is not core:
             self.shield.check_games(core, self.team)
             self._checked = core
-        ours = np.broadcast_to(core.team == self.team, core.driven.shape)
-        ours = ours.copy() if self.shield_autopilot else ours & ~core.driven
+        ours = (core.team == self.team) & ~core.is_disabled
+        ours = ours if self.shield_autopilot else ours & ~core.driven
         return self.shield.decide(core.state, commands, ours)
 
 

@@ -29,7 +29,9 @@ class ShieldConfig:
         separation_m: distance to keep between boat centres, m. Where nobody gives it, a wrapper or `games_shield` takes
             the distance at which its game counts a collision, if that is larger.
         buffer_m: added to the separation for rounding and sampling, m.
-        dt_s: step of the decision loop and of the boat model, s.
+        dt_s: step of the decision loop, s, and of the boat model where ``move_s`` is None.
+        move_s: step of the boat model, s, where a command is held for several: ``dt_s`` is a whole number of them, in
+            each of which the same relative heading is applied anew; None: a command is for one.
         certificate: name of the certificate, see `certificates.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
@@ -76,6 +78,7 @@ class ShieldConfig:
     separation_m: float = Unsaid(2.5)
     buffer_m: float = 0.05
     dt_s: float = 0.1
+    move_s: float | None = None
     certificate: str = "auto"
     coordination: str = "team"
     solver: str = "daqp"
@@ -117,6 +120,18 @@ class ShieldConfig:
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
         check_solver(self.solver)
+        if self.move_s is not None and abs(self.moves - self.dt_s / self.move_s) > 1e-6:
+            raise ConfigError(f"dt_s is {self.dt_s:g}, no whole number of moves of {self.move_s:g} s (move_s)")
+
+    @property
+    def model_s(self) -> float:
+        """Step of the boat model, s."""
+        return self.dt_s if self.move_s is None else self.move_s
+
+    @property
+    def moves(self) -> int:
+        """Steps of the boat model in a step of the decision loop."""
+        return max(1, round(self.dt_s / self.model_s))
 
     @property
     def feared_s(self) -> float:
@@ -145,11 +160,12 @@ class ShieldConfig:
 
 _TEXTS = {"certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
-_POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "speed_weight", "horizon_s"}
+_POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "move_s", "speed_weight", "horizon_s"}
 _RANGES = {
     "margin_cap_m": (0.0, 50.0),
     "mate_cap_m": (0.0, 50.0),
-    "dt_s": (0.01, 1.0),
+    "dt_s": (0.01, 2.0),
+    "move_s": (0.01, 1.0),
     "horizon_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
     "delay_s": (0.0, 10.0),
@@ -157,7 +173,7 @@ _RANGES = {
 }
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
-_MAY_BE_NONE = {"adversary_s", "horizon_s", "edge_m"}
+_MAY_BE_NONE = {"adversary_s", "move_s", "horizon_s", "edge_m"}
 _MAY_BE_INFINITE = _RATES | {"adversary_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
 

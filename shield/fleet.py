@@ -61,6 +61,10 @@ class Fleet:
         names: names for messages and reports.
         age_s: (n,) age of each track, s; None: all fresh.
         position_error_m: (n,) bound on each position's error, m; None: as in the settings.
+        driven: (n, 4) of boats that something drives whose doing is known (a game, of tagged or disabled ones): speed
+            m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
+            sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
+            `certificates.foreseen`, unless they may be free before an escape ends, or are controlled.
     """
 
     state: Array
@@ -70,6 +74,7 @@ class Fleet:
     names: tuple[str, ...]
     age_s: Array | None = None
     position_error_m: Array | None = field(default=None)
+    driven: Array | None = None
 
     def __post_init__(self) -> None:
         """Bring arrays to the type and layout of compiled code; what cannot be is refused by `check`."""
@@ -172,10 +177,20 @@ class Fleet:
             )
         for name in ("team", "platforms", "controlled", "names", "age_s", "position_error_m"):
             self._check_length(name, n)
+        if self.driven is not None and np.shape(self.driven) != (n, 4):
+            raise FleetError(f"driven has shape {np.shape(self.driven)}; give ({n}, 4): speed m/s, x m, y m, time s")
         if not isinstance(self.controlled, np.ndarray) or self.controlled.dtype != np.bool_:
             kind = getattr(self.controlled, "dtype", type(self.controlled).__name__)
             raise FleetError(f"controlled is of {kind}; give an array of True or False per boat")
-        for name, kind in (("team", np.int64), ("age_s", np.float64), ("position_error_m", np.float64)):
+        for name, kind in (
+            ("team", np.int64),
+            ("age_s", np.float64),
+            ("position_error_m", np.float64),
+            (
+                "driven",
+                np.float64,
+            ),
+        ):
             value = getattr(self, name)
             if value is not None and not isinstance(value, np.ndarray):
                 raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
@@ -244,6 +259,7 @@ _FORMS: dict[str, Callable[[Any], Any]] = {
     "controlled": _laid_out,
     "age_s": numbers,
     "position_error_m": numbers,
+    "driven": numbers,
 }
 
 

@@ -25,12 +25,19 @@ class GameFacts(NamedTuple):
         radius_m: (n,) radius of each boat, m; two boats collide when no farther apart than the sum.
         team: (n,) team of each boat.
         obstacles: whether there are any, which boats hit by their radius.
+        decision_s: time that the boats are moved by for one answer of a policy, s; 0: the same.
     """
 
     dt_s: float
     radius_m: Array
     team: IntArray
     obstacles: bool
+    decision_s: float = 0.0
+
+    @property
+    def moves(self) -> int:
+        """Moves of the boats for one answer of a policy."""
+        return max(1, round(self.decision_s / self.dt_s))
 
     def collision_m(self, team: int | None = None) -> float:
         """Largest distance at which a boat of the team (None: any boat) collides with another, m; 0 where none can."""
@@ -51,7 +58,10 @@ class GameFacts(NamedTuple):
 
 def facts_of_games(core: Any) -> GameFacts:
     """Facts of a `BatchedMctf`."""
-    return GameFacts(float(core.config.dt_s), core.agent_radius_m, core.team, core.config.n_obstacles > 0)
+    config = core.config
+    return GameFacts(
+        float(config.dt_s), core.agent_radius_m, core.team, config.n_obstacles > 0, float(config.decision_s)
+    )
 
 
 def check_step(config: ShieldConfig, facts: GameFacts) -> None:
@@ -60,11 +70,37 @@ def check_step(config: ShieldConfig, facts: GameFacts) -> None:
     Raises:
         ConfigError: it is one.
     """
+    if config.moves > 1:
+        raise ConfigError(
+            f"the shield decides once for {config.moves} moves of the boats (move_s), but is asked here before each; "
+            f"build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
+        )
     if not math.isclose(config.dt_s, facts.dt_s, rel_tol=1e-9):
         raise ConfigError(
             f"the shield decides for steps of {config.dt_s:g} s (dt_s), but the game moves its boats by {facts.dt_s:g} "
             f"s for each command; build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
         )
+
+
+def for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
+    """The settings of a shield that decides once for all moves that the game makes of one answer of a policy.
+
+    A shield for the moves themselves, as `Shield.for_game` builds it, is meant for such a game; so is one already made
+    for it.
+
+    Raises:
+        ConfigError: it is for moves of another length, or another number of them.
+    """
+    decision_s = facts.moves * facts.dt_s
+    given = config.moves > 1 or facts.moves == 1
+    if not math.isclose(config.model_s, facts.dt_s, rel_tol=1e-9) or (given and config.moves != facts.moves):
+        steps = "" if config.moves == 1 else f", {config.moves} of them a command"
+        raise ConfigError(
+            f"the shield foresees moves of {config.model_s:g} s{steps}, but the game moves its boats {facts.moves} "
+            f"time(s) by {facts.dt_s:g} s for each command; build it by Shield.for_game(game), or with "
+            f"dt_s={facts.dt_s:g}"
+        )
+    return config if given else replace(config, dt_s=decision_s, move_s=facts.dt_s)
 
 
 def with_distances(config: ShieldConfig, facts: GameFacts, team: int) -> ShieldConfig:

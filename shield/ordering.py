@@ -51,6 +51,7 @@ def ordered(fleet: Fleet, wanted: Commands, order: IntArray) -> tuple[Fleet, Com
         names=tuple(fleet.names[i] for i in rows),
         age_s=None if fleet.age_s is None else fleet.age_s[order],
         position_error_m=None if fleet.position_error_m is None else fleet.position_error_m[order],
+        driven=None if fleet.driven is None else fleet.driven[order],
     )
     return boats, replace(wanted, values=wanted.values[order])
 

@@ -114,7 +114,9 @@ class Tuning(NamedTuple):
     """Scalar settings in the form compiled code takes them.
 
     Attributes:
-        dt_s: step of decision and model, s.
+        dt_s: step of decisions, s.
+        model_s: step of the boat model, s; sample 0 of every path is one such step from now.
+        moves: steps of the model in one of decisions, under one command.
         radius_m: separation radius with buffer, m.
         buffer_m: the buffer in it, m.
         tail_s: how long straight runs are continued beyond the horizon, s.
@@ -128,6 +130,8 @@ class Tuning(NamedTuple):
     """
 
     dt_s: float
+    model_s: float
+    moves: int
     radius_m: float
     buffer_m: float
     tail_s: float

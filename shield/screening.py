@@ -22,6 +22,7 @@ from .work import Work
 def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """State of boat i one step after its command, by the full boat and autopilot model."""
     copy_row(work.next_state[i], state[i])
+    copy_row(work.command[i], commands[i])
     step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
 
 

@@ -53,6 +53,8 @@ def tuning_of(config: ShieldConfig) -> Tuning:
     return share(
         Tuning(
             dt_s=config.dt_s,
+            model_s=config.model_s,
+            moves=config.moves,
             radius_m=config.separation_m + config.buffer_m,
             buffer_m=config.buffer_m,
             tail_s=config.tail_s,
@@ -90,26 +92,28 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
         PlatformError: a platform is unknown.
     """
     kinds = tuple(get_platform(name) for name in platforms)
-    limits = [limits_of(kind, config.dt_s) for kind in kinds]
+    limits = [limits_of(kind, config.model_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
     granted = 1.0 if certificate.hunters and config.feared_s > 0.0 else 0.0
-    strides = [_stride(kind, limit, config.dt_s) for kind, limit in zip(kinds, limits, strict=True)]
+    strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     looked = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
     with_table = np.asarray((looked.table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
+    if config.moves > 1:
+        params = np.column_stack([params, np.full(len(kinds), config.model_s)])
     return share(
         Boats(
             params=params,
             team=np.array(team, dtype=np.int64),
-            fastest_mps=np.array([kind.fastest_mps(config.dt_s) for kind in kinds]),
+            fastest_mps=np.array([kind.fastest_mps(config.model_s) for kind in kinds]),
             granted_turn_dps=np.array([granted * limit.turn_rate_dps for limit in limits]),
             granted_acc_mps2=np.array([limit.acceleration_mps2 if granted > 0.0 else 0.0 for limit in limits]),
             granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
             granted_loss=np.array([granted * _lasting_loss(limit) for limit in limits]),
             ready_thrust=_ready_thrust(params, limits, with_table),
             stride=stride,
-            sample_s=stride * config.dt_s,
+            sample_s=stride * config.model_s,
             plans=np.array([certificate.ways(*boat) for boat in zip(kinds, with_table, strict=True)], dtype=np.int64),
             decay=np.where(
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
@@ -121,11 +125,23 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             table_margin_m=config.table_margin_m,
             look=np.where(with_table, looked.steps, 0),
             joint_decay=_decay(config.response_per_s, config),
-            joint_samples=math.ceil(max(looked.steps, round(JOINT_LOOK_S / config.dt_s)) / stride),
+            joint_samples=math.ceil(max(looked.steps, round(JOINT_LOOK_S / config.model_s)) / stride),
             told_range_m=looked.told_range_m,
             told_radius_m=_widest_m(config),
             feared=np.asarray((looked.table >= 0).any(axis=0)),
-            **_horizons(config, kinds, limits, team, stride * config.dt_s, granted > 0.0),
+            **_horizons(config, kinds, limits, team, stride * config.model_s, granted > 0.0),
+        )
+    )
+
+
+def without_hunters(boats: Boats, known: BoolArray) -> Boats:
+    """Constants of the same boats when of those of ``known`` (n,) it is foreseen where they go: they hunt nobody."""
+    return share(
+        boats._replace(
+            granted_turn_dps=np.where(known, 0.0, boats.granted_turn_dps),
+            granted_acc_mps2=np.where(known, 0.0, boats.granted_acc_mps2),
+            table=np.where(known[None], -1, boats.table),
+            feared=boats.feared & ~known,
         )
     )
 
@@ -135,7 +151,7 @@ def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], 
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     certificate, sides = CERTIFICATES[config.certificate], np.array(team)
     wanted = certificate.hunters and config.feared_s > 0.0
-    limits = [limits_of(get_platform(name), config.dt_s) for name in platforms]
+    limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
     kinds = [get_platform(name) for name in platforms]
     looks = np.array(
         [wanted and _looks_up(config, kind, limit) for kind, limit in zip(kinds, limits, strict=True)], dtype=np.bool_
@@ -156,7 +172,7 @@ def _horizons(
 ) -> dict[str, Any]:
     """How many samples each boat's paths, hunters and fixed things are followed for."""
     certificate = CERTIFICATES[config.certificate]
-    horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.dt_s) for kind in kinds]
+    horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
     hunt_s, static_s, thrust_s = list(horizon_s), [], []
     for i, limit in enumerate(limits):
         turn_s = horizon_s[i] if certificate.braking else limit.half_turn_s + STATIC_REACTION_S
@@ -219,7 +235,7 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
     found: dict[tuple[Platform, Platform], int] = {}
     tables: list[ValueTable] = []
     for i, own in enumerate(kinds):
-        if not _looks_up(config, own, limits_of(own, config.dt_s)):
+        if not _looks_up(config, own, limits_of(own, config.model_s)):
             continue
         for j, other in enumerate(kinds):
             if team[i] == team[j]:
@@ -231,9 +247,9 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
                 found[own, other] = len(tables)
                 tables.append(table)
             looked.table[i, j] = found[own, other]
-    steps = max((round(table.card.dt_s / config.dt_s) for table in tables), default=1)
+    steps = max((round(table.card.dt_s / config.model_s) for table in tables), default=1)
     enough_m = _widest_m(config) + config.table_margin_m + config.margin_cap_m
-    return _LookedUp(stack_tables(tables), looked.table, max(1, steps), ranges_told_m(tables, enough_m))
+    return _LookedUp(stack_tables(tables), looked.table, max(config.moves, steps), ranges_told_m(tables, enough_m))
 
 
 def _looks_up(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:

@@ -28,7 +28,7 @@ from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
 from .scene import Boats, Fixed, Scene, Tuning, path_samples
-from .setup import boats_of, missing_tables, plans_of, tuning_of
+from .setup import boats_of, missing_tables, plans_of, tuning_of, without_hunters
 from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
@@ -98,6 +98,7 @@ class Shield:
         self._kept_from: Fixed | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
+        self._foreseen: dict[bytes, Boats] = {}
         self._missing: BoolArray | None = None
         self._known: Known | None = None
         self._pending = np.zeros((0, 0, 2))
@@ -177,7 +178,7 @@ class Shield:
 
     def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
         """`decide`, of boats in the order of their names."""
-        boats = self._scene(fleet)
+        boats = self._foresee(fleet, self._scene(fleet))
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
         state, margin = prepare(seen, self.config, boats.params, self._pending)
@@ -230,7 +231,25 @@ class Shield:
             boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
             self._seat(fleet, boats)
             self._boats, self._known = boats, Known.of(fleet)
+            self._foreseen = {}
         return self._boats
+
+    def _foresee(self, fleet: Fleet, boats: Boats) -> Boats:
+        """Note which boats' ways are foreseen; the boats' constants, by which those hunt nobody."""
+        known = np.zeros(len(fleet), np.bool_)
+        if fleet.driven is not None:
+            horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
+            known = ~fleet.controlled & np.isfinite(fleet.driven[:, 0]) & (fleet.driven[:, 3] >= horizon_s)
+        for seat in self._seats:
+            seat.work.known[:] = known
+            if fleet.driven is not None:
+                seat.work.driven[:] = fleet.driven
+        if not known.any():
+            return boats
+        key = known.tobytes()
+        if key not in self._foreseen:
+            self._foreseen[key] = without_hunters(boats, known)
+        return self._foreseen[key]
 
     def _seat(self, fleet: Fleet, boats: Boats) -> None:
         """Make room for the boats of a fleet; those that were there before keep what is remembered of them."""

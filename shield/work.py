@@ -17,6 +17,9 @@ class Work(NamedTuple):
 
     Attributes:
         next_state: (n, N_STATE) predicted state after the candidate commands.
+        command: (n, 2) the candidate command it is predicted for, speed m/s and relative heading deg.
+        driven: (n, 4) what drives a boat whose way is foreseen, see `fleet.Fleet`.
+        known: (n,) boats whose way is foreseen, in ``path``, see `certificates.foreseen`.
         row: (N_STATE,) state being run through a manoeuvre.
         plan: (n + 1, 3) side, turn to go deg, speed m/s.
         path: (n + 1, samples + 1, 2) positions along the plans, m.
@@ -67,6 +70,9 @@ class Work(NamedTuple):
     """
 
     next_state: Array
+    command: Array
+    driven: Array
+    known: BoolArray
     row: Array
     plan: Array
     path: Array
@@ -121,6 +127,9 @@ def new_work(boats: int, samples: int) -> Work:
     return share(
         Work(
             next_state=np.zeros((boats, L.N_STATE)),
+            command=np.zeros((boats, 2)),
+            driven=np.full((boats, 4), np.nan),
+            known=np.zeros(boats, np.bool_),
             row=np.zeros(L.N_STATE),
             plan=np.zeros((boats + 1, 3)),
             path=np.zeros((boats + 1, samples + 1, 2)),

@@ -51,6 +51,7 @@ class Arena:
         dt_s: Length of a step.
         title: Text for the header's middle.
         steered: Names of the boats that a human steers.
+        corner_radius_m: Radius around the corners of each side where captures and untagging happen; 0 for none.
     """
 
     bounds_m: tuple[float, float]
@@ -69,6 +70,7 @@ class Arena:
     dt_s: float = 0.1
     title: str = ""
     steered: frozenset[str] = frozenset()
+    corner_radius_m: float = 0.0
 
     @classmethod
     def from_meta(cls, meta: Mapping[str, Any]) -> Arena:
@@ -101,6 +103,7 @@ class Arena:
                 obstacles=_obstacles(meta.get("obstacles") or {}),
                 dt_s=float(meta["dt_s"]),
                 title=str(meta.get("title", "")),
+                corner_radius_m=float(meta.get("corner_radius_m", 0.0)),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise TraceError(

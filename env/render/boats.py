@@ -129,8 +129,17 @@ def _draw_hull(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: The
     fill = mix(colour, theme.page, 0.72) if tagged else colour
     canvas.polygon(centre + turned(HULL * length_m, heading_deg), fill, colour if tagged else theme.plate)
     canvas.polygon(centre + turned(DECK * length_m, heading_deg), colour if tagged else mix(colour, theme.plate, 0.5))
+    if scene.is_disabled[boat]:
+        canvas.ring(centre, length_m * 0.62, theme.muted, 2.6, 1.0)
+        canvas.line(list(_across(centre, length_m * 0.62)), theme.muted, 2.6)
     if tagged:
         _draw_cross(canvas, centre, length_m * 0.36, theme.ink)
+
+
+def _across(centre: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the bar through the ring around a disabled boat."""
+    arm = reach_m * np.array([1.0, -1.0]) / np.sqrt(2.0)
+    return centre - arm, centre + arm
 
 
 def _mark_steered(canvas: Canvas, centre: np.ndarray, length_m: float, theme: Theme) -> None:

@@ -27,6 +27,7 @@ def draw_field(canvas: Canvas, arena: Arena, theme: Theme) -> None:
         tint = mix(theme.water[team], theme.team[team], 0.12)
         canvas.disc(home, arena.catch_radius_m, tint, 0.75)
         canvas.dashed_ring(home, arena.catch_radius_m, mix(tint, theme.team[team], 0.55), 1.3, 5)
+        _draw_corners(canvas, team, arena, theme)
         if arena.flag_keepout_m > 0.0:
             canvas.disc(home, arena.flag_keepout_m, theme.team[team], 0.16)
             canvas.ring(home, arena.flag_keepout_m, theme.team[team], 1.0, 0.6)
@@ -45,6 +46,20 @@ def _draw_water(canvas: Canvas, arena: Arena, theme: Theme) -> None:
         half = cut_by_line(corners, *arena.scrimmage_m, keep=home)
         if len(half) >= 3:
             canvas.polygon(half, theme.water[team])
+
+
+def _draw_corners(canvas: Canvas, team: int, arena: Arena, theme: Theme) -> None:
+    """Draw where a team captures and is untagged at the corners of its side: the quarter discs inside the field."""
+    radius_m, (width, height) = arena.corner_radius_m, arena.bounds_m
+    if radius_m <= 0.0:
+        return
+    angles = np.linspace(0.0, np.pi / 2.0, 19)
+    x = np.abs(team * width - radius_m * np.cos(angles))
+    for y in (radius_m * np.sin(angles), height - radius_m * np.sin(angles)):
+        arc = list(zip(x.tolist(), y.tolist(), strict=True))
+        corner = (team * width, 0.0 if y[0] == 0.0 else height)
+        canvas.polygon([corner, *arc], mix(theme.water[team], theme.team[team], 0.14))
+        canvas.line(arc, theme.team[team], 1.0)
 
 
 def _draw_grid(canvas: Canvas, arena: Arena, theme: Theme) -> None:

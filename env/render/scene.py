@@ -60,6 +60,7 @@ class Scene:
         has_flag: (n,) bool.
         is_tagged: (n,) bool.
         oob: (n,) bool, out of bounds.
+        is_disabled: (n,) bool, stopped by a power play.
         flag_position_m: (2, 2).
         captures: (2,) captures made by each team.
         trail_m: (k, n, 2) positions up to now, oldest first.
@@ -73,6 +74,7 @@ class Scene:
     has_flag: np.ndarray
     is_tagged: np.ndarray
     oob: np.ndarray
+    is_disabled: np.ndarray
     flag_position_m: np.ndarray
     captures: np.ndarray
     trail_m: np.ndarray
@@ -99,6 +101,7 @@ class Scene:
             np.asarray(view.has_flag),
             np.asarray(view.is_tagged),
             np.asarray(view.oob),
+            np.asarray(view.is_disabled),
             np.asarray(view.flag_position),
             np.asarray(view.captures),
             trail_m,
@@ -121,8 +124,12 @@ class Scene:
         asked = min(step, len(record["wanted"]) - 1)
         commands = ("wanted", "sent", "reason", "intervened", "certificate_m")
         overlay = None if asked < 0 else Overlay(*(record[name][asked] for name in commands))
-        states = ("position", "heading_deg", "speed_mps", "has_flag", "is_tagged", "oob", "flag_position", "captures")
-        return cls(step * dt_s, *(record[name][step] for name in states), record["position"][first : step + 1], overlay)
+        trail_m = record["position"][first : step + 1]
+        disabled = record["is_disabled"][step] if "is_disabled" in record else np.zeros(trail_m.shape[1], dtype=bool)
+        states = ("position", "heading_deg", "speed_mps", "has_flag", "is_tagged", "oob")
+        boats = (record[name][step] for name in states)
+        flags = (record[name][step] for name in ("flag_position", "captures"))
+        return cls(step * dt_s, *boats, disabled, *flags, trail_m, overlay)
 
 
 def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:

@@ -11,7 +11,7 @@ import typer
 from steerclear.shield.config import PROFILES
 from steerclear.shield.exceptions import ConfigError
 
-Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024 or mctf2025.")]
+Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
 Own = Annotated[str, typer.Option(metavar="NAME", help="Policy of the shielded team: a name or a submission's path.")]
 Opponents = Annotated[str, typer.Option(metavar="A,B", help="Policies it meets, separated by commas.")]
 Games = Annotated[int | None, typer.Option(metavar="N", help="Games per pairing and shield state.", show_default="20")]

@@ -134,7 +134,7 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
         err().print(STEERING, soft_wrap=True)
     if window:
         return play_match(spec, _until_closed, "human", speed)
-    total = round(spec.config().max_time_s / spec.config().dt_s)
+    total = round(spec.config().max_time_s / spec.config().decision_s)
     with progress("playing", total) as notice:
         return play_match(spec, _reporter(notice))
 

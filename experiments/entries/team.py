@@ -68,7 +68,7 @@ class EntryTeam:
         self._ids = list(agent_ids)
         self._reader = ActionReader(env)
         self._packer = Packer(not self._path.startswith(SB3_PREFIX))
-        self._reporter.begin(core.config.dt_s)
+        self._reporter.begin(core.config.decision_s)
         if not self._lost:
             self._first("begin", game_facts(env), self._ids, seed)
 

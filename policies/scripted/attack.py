@@ -7,8 +7,8 @@ import math
 from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
-from .geometry import bearing_deg, boat_to_boat, is_turned, own_end_point, to_boat, unit
-from .layout import GOAL, HEIGHT, MAX_SPEED, WIDTH, Game
+from .geometry import bearing_deg, boat_to_boat, is_turned, own_end_point, place_of_capture, to_boat, unit
+from .layout import CORNER_INSET, GOAL, HEIGHT, MAX_SPEED, WIDTH, Game
 from .paths import follow
 
 HARD_REACH_M = 30.0
@@ -24,7 +24,7 @@ HOME_REACHED_M = 6.0  # the own flag's keep-out circle is larger than POINT_REAC
 
 @lean_kernel
 def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
-    """Loop own base -> opponent's flag -> back at full speed; a tag restarts the loop.
+    """Loop own base (or corner) -> opponent's flag -> back at full speed; a tag restarts the loop.
 
     Returns:
         Speed m/s and relative heading deg.
@@ -33,25 +33,34 @@ def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
         memory[GOAL] = 0.0
     goal = int(memory[GOAL])
     reach_m = HOME_REACHED_M if goal == 3 else POINT_REACHED_M
-    along, across = EASY_LOOP[goal]
-    x, y = own_end_point(game, game.team[boat], along, across)
+    x, y = _point_of_loop(game, boat, goal)
     if math.hypot(x - game.state[boat, L.X], y - game.state[boat, L.Y]) <= reach_m:
         memory[GOAL] = (goal + 1) % 4
-        along, across = EASY_LOOP[(goal + 1) % 4]
-        x, y = own_end_point(game, game.team[boat], along, across)
+        x, y = _point_of_loop(game, boat, (goal + 1) % 4)
     return follow(game, boat, x, y)
 
 
 @lean_kernel
+def _point_of_loop(game: Game, boat: int, goal: int) -> tuple[float, float]:
+    """A point of the easy attacker's loop, m; its last is where captures are made."""
+    if goal == 3 and game.field[CORNER_INSET] > 0.0:
+        return place_of_capture(game, boat)
+    along, across = EASY_LOOP[goal]
+    return own_end_point(game, game.team[boat], along, across)
+
+
+@lean_kernel
 def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tuple[float, float]:
-    """Drawn to the flag (with it: to the own flag home), pushed off opponents and near walls, at full speed.
+    """Drawn to the flag (with it: to where captures are made), pushed off opponents and near walls, at full speed.
 
     ``shares_flag``: a team-mate's carrying the flag also sends this boat home.
     """
     team = game.team[boat]
     push_right, push_forward = push(game, boat, reach_m)
     homeward = game.has_flag[boat] or (shares_flag and team_has_flag(game, team))
-    x, y = game.flag_home[team] if homeward else game.flag_position[1 - team]
+    x, y = game.flag_position[1 - team, 0], game.flag_position[1 - team, 1]
+    if homeward:
+        x, y = place_of_capture(game, boat)
     right, forward = unit(*to_boat(game, boat, x, y))
     if not homeward and is_stalemate(right, forward, push_right, push_forward):
         right, forward = to_far_wall(game, boat)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from steerclear.env.core import BatchedMctf
+from steerclear.env.field import CORNER_INSET_M
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 
@@ -101,7 +102,8 @@ def _field_row(core: BatchedMctf, plan: Plan) -> Array:
     row = np.zeros(S.N_FIELD)
     row[S.WIDTH], row[S.HEIGHT] = core.config.env_bounds_m
     row[S.KEEPOUT] = core.config.flag_keepout_m
-    row[S.STEP] = core.config.dt_s
+    row[S.STEP] = core.config.decision_s
+    row[S.CORNER_INSET] = CORNER_INSET_M if core.config.capture_at == "own_corners" else 0.0
     row[S.SPEED_FRACTION] = plan.speed_fraction
     row[S.HIT_TEAM_MATES] = float(plan.target_team_mates)
     row[S.MEDIUM_REACH] = plan.reach_m

@@ -14,6 +14,7 @@ from .layout import KEEPOUT, MAX_SPEED, Game
 GUARD_POINT = (0.25, 0.5)  # own-end fractions: halfway between the own flag and the scrimmage line's middle
 GUARD_REACHED_M = 2.5
 PERIMETER_KEEPOUTS = 5.0
+LEAST_KEEPOUT_M = 3.0  # where there is no keep-out circle, the perimeter is that of the competitions that have one
 WALL_AHEAD_M = 7.0
 WALL_REACH_M = 10.0
 THREAT_M = 30.0
@@ -82,7 +83,7 @@ def guard_point(game: Game, boat: int, flag_right: float, flag_forward: float) -
         return flag_right, flag_forward
     right, forward = boat_to_boat(game, boat, target)
     gap_m = math.hypot(right - flag_right, forward - flag_forward)
-    perimeter_m = PERIMETER_KEEPOUTS * game.field[KEEPOUT]
+    perimeter_m = PERIMETER_KEEPOUTS * (game.field[KEEPOUT] if game.field[KEEPOUT] > 0.0 else LEAST_KEEPOUT_M)
     if gap_m <= perimeter_m and not game.is_tagged[target]:
         return right, forward
     toward_right, toward_forward = unit(right - flag_right, forward - flag_forward)

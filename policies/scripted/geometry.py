@@ -13,7 +13,7 @@ from steerclear.env.randomness import GAMMA, MIX_1, mix
 from steerclear.shield.jit import lean_kernel
 from steerclear.shield.platforms import layout as L
 
-from .layout import HEIGHT, WIDTH, Game
+from .layout import CORNER_INSET, HEIGHT, WIDTH, Game
 
 
 @lean_kernel
@@ -58,6 +58,17 @@ def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[f
     if is_turned(game, team):
         along, across = 1.0 - along, 1.0 - across
     return along * game.field[WIDTH], across * game.field[HEIGHT]
+
+
+@lean_kernel
+def place_of_capture(game: Game, boat: int) -> tuple[float, float]:
+    """Where a boat brings the flag to, m: its own flag's home, or the nearer of its side's corner marks."""
+    team, inset_m = game.team[boat], game.field[CORNER_INSET]
+    if inset_m == 0.0:
+        return game.flag_home[team, 0], game.flag_home[team, 1]
+    x = game.field[WIDTH] - inset_m if is_turned(game, team) else inset_m
+    lower = game.state[boat, L.Y] < 0.5 * game.field[HEIGHT]
+    return x, inset_m if lower else game.field[HEIGHT] - inset_m
 
 
 @lean_kernel

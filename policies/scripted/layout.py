@@ -56,7 +56,9 @@ HIT_TEAM_MATES = 5
 """1 when a rammer also aims at boats of its own team."""
 MEDIUM_REACH = 6
 """Distance within which opponents push a medium attacker off, m."""
-N_FIELD = 7
+CORNER_INSET = 7
+"""How far inside its own side's corners, along both edges, a team brings the flag to, m; 0: not to corners."""
+N_FIELD = 8
 
 # --- columns of a boat's limits --------------------------------------------------------------------
 MAX_SPEED = 0

@@ -240,6 +240,5 @@ def _check_limits(fleet: FleetSettings) -> None:
     )
     for name, first, second in later:
         if second < first:
-            raise FleetFileError(
-                f"limits.{name} is {second} s, before {'after_s' if name.startswith('model') else 'max_age_s'}, {first} s; give it at least that"
-            )
+            sooner = "after_s" if name.startswith("model") else "max_age_s"
+            raise FleetFileError(f"limits.{name} is {second} s, before {sooner}, {first} s; give it at least that")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..platforms import layout as L
+from ..platforms.step import step_boat
 from ..scene import Boats, Tuning
 from ..work import Work
 from .clearance import FAR
@@ -80,6 +82,19 @@ def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Bo
 
 
 @lean_kernel
+def lay_command(i: int, slot: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+    """Write where boat i is during the step it is predicted for, as far as that is of several moves."""
+    if tuning.moves == 1:
+        return
+    copy_row(work.row, state[i])
+    for move in range(tuning.moves):
+        step_boat(boats.params[i], work.row, work.command[i, 0], work.command[i, 1], tuning.model_s)
+        if move % boats.stride == 0:
+            path = work.path[slot, move // boats.stride]
+            path[0], path[1] = work.row[L.X], work.row[L.Y]
+
+
+@lean_kernel
 def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
     how = hunters_run(i, slot, boats, work)
@@ -92,6 +107,10 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
     earliest = min(earliest, samples)
     beyond = boats.hunt_samples[i] + boats.chased_samples[i] if how == HUNTERS else 0
     side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
+    moves = 0
+    if done == 1:
+        moves = tuning.moves
+        lay_command(i, slot, state, boats, tuning, work)
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     trace_path(
         boats.params[i],
@@ -99,8 +118,8 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         side,
         togo_deg,
         speed_mps,
-        tuning.dt_s,
-        done,
+        tuning.model_s,
+        moves,
         boats.stride,
         samples,
         boats.samples[i],

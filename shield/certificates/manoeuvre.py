@@ -21,6 +21,7 @@ from ..scene import Boats, Tuning
 from ..work import Work
 from .clearance import FAR, MARGIN, clear_of_course
 from .effort import HUNTER_COST, begin_counting
+from .foreseen import foresee
 from .hunters import closing
 from .values import find_beset, run_opponents
 
@@ -49,6 +50,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     n = state.shape[0]
     begin_counting(work)
     run_opponents(1, ours, state, boats, tuning, work, work.ways)
+    foresee(state, boats, tuning, work)
     for i in range(n):
         work.hunted[i] = False
         work.reach_samples[i] = _reach_samples(i, state, ours, boats, tuning)
@@ -56,7 +58,7 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
         work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
         ux, uy = math.sin(heading), math.cos(heading)
-        way = state[i, L.SPEED] * tuning.dt_s
+        way = state[i, L.SPEED] * tuning.model_s
         work.course[i, 0], work.course[i, 1] = state[i, L.X] + way * ux, state[i, L.Y] + way * uy
         work.course[i, 2], work.course[i, 3] = ux, uy
         top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
@@ -101,7 +103,7 @@ def _reach_samples(i: int, state: Array, ours: BoolArray, boats: Boats, tuning: 
         return boats.hunt_samples[i]
     row = state[i]
     least, _, _ = next_thrust(
-        boats.params[i], row[L.SPEED], row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL], 0.0, tuning.dt_s
+        boats.params[i], row[L.SPEED], row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL], 0.0, tuning.model_s
     )
     if boats.look[i] == 0 and min(least, row[L.THRUST]) >= boats.ready_thrust[i]:
         return boats.hunt_samples[i]
@@ -140,7 +142,7 @@ def _rank_recovery(
     """In breach no margin is left to compare: rank by not closing further and by the distance soon after."""
     sample_s = boats.sample_s
     k = min(boats.samples[i], max(1, int(RECOVERY_S / sample_s)))
-    if ours[j]:
+    if ours[j] or work.known[j]:
         x, y = work.path[j, k, 0], work.path[j, k, 1]
     else:
         way = state[j, L.SPEED] * k * sample_s
@@ -183,7 +185,7 @@ def clear_of_boat(
     floor, cap = floor_m, cap_m
     if work.breach[i, j]:
         floor, cap = -FAR, FAR
-    if ours[j]:
+    if ours[j] or work.known[j]:
         samples = min(boats.samples[i], boats.samples[j])
         tail = tuning.tail_s / boats.sample_s
         clear_of_course(

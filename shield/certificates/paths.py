@@ -68,6 +68,19 @@ def _note_ready(
 
 
 @lean_kernel
+def _note_done(
+    row: Array, done: int, stride: int, earliest: int, ready_thrust: float, path: Array, ready: Array
+) -> tuple[int, int]:
+    """Write the sample of a state so many steps on, if there is one then; returns the next sample and the step."""
+    step = done - 1
+    k = step // stride
+    if step % stride == 0:
+        path[k, 0], path[k, 1] = row[L.X], row[L.Y]
+        _note_ready(k, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
+    return k + 1, step
+
+
+@lean_kernel
 def trace_path(
     params: Array,
     row: Array,
@@ -95,7 +108,8 @@ def trace_path(
         togo_deg: turn to make before running straight, deg, >= 0.
         speed_mps: speed commanded throughout, m/s.
         dt_s: model step, s.
-        done: 1 when ``row`` is the state one step from now, 0 when it is the present one.
+        done: 0 when ``row`` is the present state; else it is the state so many steps from now, and the samples until
+            then are written already (the first, of one step, is written here).
         stride: model steps between samples.
         samples: number of samples after sample 0.
         least: number of them after which the path may end.
@@ -129,10 +143,7 @@ def trace_path(
         return
     if done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
-    path[0, 0], path[0, 1] = row[L.X], row[L.Y]
-    _note_ready(0, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
-    k = 1
-    step = 0
+    k, step = _note_done(row, max(1, done), stride, earliest, ready_thrust, path, ready)
     while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
@@ -176,12 +187,10 @@ def _trace_usv(
     half, c, s = 0.0, 1.0, 0.0
     gained = 0.0
     turning = True
-    k, step = 0, done - 1
-    if done == 1:
-        path[0, 0], path[0, 1] = x, y
-        ready[TURNING_SAMPLE] = 0.0
-        _note_ready(0, earliest, thrust, ready_thrust, heading, v, ready)
-        k, step = 1, 0
+    k, step = 0, -1
+    if done > 0:
+        k, step = _note_done(row, done, stride, earliest, ready_thrust, path, ready)
+        ready[TURNING_SAMPLE] = k - 1.0
     while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)

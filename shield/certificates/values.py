@@ -52,6 +52,8 @@ def run_opponents(
 ) -> None:
     """Write where the opponents that tables are looked up for may be after some steps: ``ways`` (n, WAYS, 5).
 
+    These are steps of the boat model, and no fewer than there are in one of decisions.
+
     What was known of margins against opponents holds no more.
     """
     work.hunters_known[:] = False
@@ -60,13 +62,13 @@ def run_opponents(
         if ours[j] or not boats.feared[j]:
             continue
         params = boats.params[j]
-        full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.dt_s)
+        full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.model_s)
         for way in range(WAYS):
             copy_row(work.row, state[j])
             turn = full * (0.0 if way == 0 else 2.0 * way - 3.0)
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
-            for _ in range(steps):
-                actuate(params, work.row, speed, turn, tuning.dt_s)
+            for _ in range(max(steps, tuning.moves)):
+                actuate(params, work.row, speed, turn, tuning.model_s)
             _note_place(work.row, boats.ready_thrust[j], ways[j, way])
 
 
@@ -142,7 +144,7 @@ def set_place(
         return
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
     for _ in range(0 if done == 1 else boats.look[i]):
-        togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.dt_s)
+        togo_deg = sail(boats.params[i], work.row, side, togo_deg, speed_mps, tuning.model_s)
     _note_place(work.row, boats.ready_thrust[i], work.place[slot])
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..jit import Array, lean_kernel
 from . import layout as L
+from .held import error_for_turn, moves_in, turn_at_rudder
 from .integrators import step_double_integrator, step_single_integrator
 from .rate import error_for_rate, rate_after, run_rate, turn_limit, wanted_for_turn
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
@@ -55,6 +56,9 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
 @lean_kernel
 def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
     """Largest turn, deg, that this step and any after it can make under a speed command."""
+    moves = moves_in(params, dt_s)
+    if moves > 1 and params[L.KIND] == L.KIND_USV:
+        return turn_at_rudder(params, state, speed_mps, held_rudder(params), dt_s / moves, moves)
     if params[L.KIND] == L.KIND_USV:
         thrust = thrust_after(params, state, speed_mps, dt_s)
         return turn_of_rudder(params, thrust, held_rudder(params), dt_s)
@@ -90,16 +94,20 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
     """Heading error, deg, that makes the autopilot turn the boat by ``turn_deg`` in this step.
 
     For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e, where e0 and I are
-    the controller's memory (derivative 0 when it has none). Without thrust there is no rudder to command and the
-    error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there: the turn is then the nearest one possible.
+    the controller's memory (derivative 0 when it has none); an error held for several moves is found by trial. Without
+    thrust there is no rudder to command and the error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there:
+    the turn is then the nearest one possible.
     """
     if params[L.KIND] == L.KIND_RATE:
         rate = state[L.TURN_RATE]
         limit = turn_limit(params, state[L.SPEED])
         wanted = clamp(wanted_for_turn(params, rate, turn_deg, FARTHEST_DEG, dt_s), -limit, limit)
         return clamp(error_for_rate(params, wanted) + 0.5 * dt_s * rate, -FARTHEST_DEG, FARTHEST_DEG)
+    moves = moves_in(params, dt_s)
     if params[L.KIND] != L.KIND_USV:
-        return clamp(turn_deg, -FARTHEST_DEG, FARTHEST_DEG)
+        return clamp(turn_deg / moves, -FARTHEST_DEG, FARTHEST_DEG)
+    if moves > 1:
+        return error_for_turn(params, state, speed_mps, turn_deg, FARTHEST_DEG, dt_s / moves, moves)
     full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
     if not full > 0.0:
         return 0.0

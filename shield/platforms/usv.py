@@ -57,7 +57,7 @@ def speed_of_thrust(params: Array, thrust: float) -> float:
 
 
 @lean_kernel
-def _controller(
+def controller(
     kp: float, ki: float, kd: float, limit: float, error: float, previous_error: float, integral: float, dt_s: float
 ) -> tuple[float, float]:
     """PID output before clamping and its new integral; the derivative is 0 on the first call (NaN memory)."""
@@ -77,7 +77,7 @@ def next_thrust(
         thrust = desired_mps * params[L.SPEED_FACTOR]
     else:
         previous, error = error, desired_mps - speed_mps
-        output, integral = _controller(
+        output, integral = controller(
             params[L.SPEED_KP],
             params[L.SPEED_KI],
             params[L.SPEED_KD],
@@ -113,7 +113,7 @@ def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: f
     if not state[L.THRUST] > 0.0:
         state[L.RUDDER] = 0.0
         return
-    output, integral = _controller(
+    output, integral = controller(
         params[L.HEADING_KP],
         params[L.HEADING_KI],
         params[L.HEADING_KD],

@@ -10,7 +10,14 @@ import numpy as np
 
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
-from ..game_facts import GameFacts, check_step, facts_of_games, told_distances, with_distances
+from ..game_facts import (
+    GameFacts,
+    check_step,
+    facts_of_games,
+    for_held_commands,
+    told_distances,
+    with_distances,
+)
 from ..shield import Shield
 from .reading import GameReader, reader_of
 
@@ -29,8 +36,10 @@ def settings_of(game: Any) -> dict[str, float]:
     return facts_of_games(game).settings()
 
 
-def shield_for(shield: Any, reader: GameReader, team: int) -> Any:
+def shield_for(shield: Any, reader: GameReader, team: int, held: bool = False) -> Any:
     """The shield, or one like it with the game's distances where nobody chose them, see `ShieldConfig`.
+
+    With ``held`` it decides once for all the moves that the game makes of a policy's answer, else before each.
 
     A decider of the user's own, without settings, is taken as it is.
 
@@ -41,8 +50,12 @@ def shield_for(shield: Any, reader: GameReader, team: int) -> Any:
     config = getattr(shield, "config", None)
     if not isinstance(config, ShieldConfig):
         return shield
-    check_step(config, facts)
-    fitting = with_distances(config, facts, team)
+    if held and facts.moves > 1:
+        fitting = for_held_commands(config, facts)
+    else:
+        check_step(config, facts)
+        fitting = config
+    fitting = with_distances(fitting, facts, team)
     told_distances(fitting, facts, team)
     if fitting is config or not isinstance(shield, Shield):
         return shield

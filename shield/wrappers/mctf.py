@@ -14,6 +14,7 @@ from ..fleet import Fleet
 from ..game_facts import GameFacts, facts_of_games
 from ..jit import Array
 from ..surroundings import Surroundings
+from .driving import driven_boats
 from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 
 
@@ -53,13 +54,17 @@ class MctfReader:
         return float(self.env.core.time_s[0])
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
-        """All boats now; boats the game drives are controlled only with ``shield_autopilot``."""
+        """All boats now; boats the game drives are controlled only with ``shield_autopilot``, disabled ones never."""
         core = self.env.core
-        controlled = core.team == team
+        controlled = (core.team == team) & ~core.is_disabled[0]
         if not shield_autopilot:
-            controlled = controlled & ~core.driven[0]
+            driven = core.is_tagged[0] | core.oob[0]
+            if core.config.n_obstacles > 0:  # who hits obstacles is in it only; between steps it is of the last
+                driven = driven | core.driven[0]
+            controlled = controlled & ~driven
         # a copy: decisions are read after the step has moved the boats
-        return Fleet(core.state[0].copy(), core.team, self._platforms, controlled, self.agent_ids)
+        state = core.state[0].copy()
+        return Fleet(state, core.team, self._platforms, controlled, self.agent_ids, driven=driven_boats(core))
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind the env understands."""

@@ -24,8 +24,9 @@ class ShieldedTeamPolicy:
     """A team policy (``reset(env, agent_ids, seed)``, ``act(observations, infos)``) whose commands pass the shield.
 
     Only the policy's own commands do: boats the game drives itself are out of its reach. `ShieldedParallelEnv` on our
-    env covers those too. In a Pyquaticus env all its answers are (speed m/s, relative heading deg) pairs, since that
-    env takes actions of one kind only from a boat.
+    env covers those too. Where the game moves its boats several times for an answer, that decides before each move, and
+    this once for all: the shield is told that commands are held (`ShieldConfig.move_s`). In a Pyquaticus env all its
+    answers are (speed m/s, relative heading deg) pairs, since that env takes actions of one kind only from a boat.
 
     Attributes:
         policy: the policy inside.
@@ -60,7 +61,7 @@ class ShieldedTeamPolicy:
         reader = reader_of(env)
         self._team = _team_of(reader, agent_ids)
         reader.check_answers(agent_ids)
-        self.shield = shield_for(self.shield, reader, self._team)
+        self.shield = shield_for(self.shield, reader, self._team, held=True)
         self._reader, self._agent_ids, self._facts = reader, tuple(agent_ids), facts_now(reader)
         self._shown = None
         self.shield.reset()

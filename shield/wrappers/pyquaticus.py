@@ -16,7 +16,8 @@ from ..game_facts import GameFacts
 from ..jit import Array, IntArray
 from ..platforms import layout as L
 from ..surroundings import Surroundings
-from .pyquaticus_checks import check_env, check_pairs, platforms_of_players, step_of
+from .pyquaticus_checks import check_env, check_pairs, moves_of, platforms_of_players, step_of
+from .pyquaticus_driving import driven_players
 from .reading import KEEP_OUT_MARGIN_M
 
 
@@ -24,7 +25,7 @@ class PyquaticusReader:
     """Reads a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
 
     The environment drives tagged and out-of-bounds boats itself, after the policy's action, and stops disabled ones:
-    those are not ours to decide for and are treated as boats that hold their course.
+    those are not ours to decide for, and are foreseen as what they are (`pyquaticus_driving`).
 
     Raises:
         ConfigError: the environment has settings that a shield would misread.
@@ -48,7 +49,9 @@ class PyquaticusReader:
         check_env(self.env)
         self._platforms = platforms_of_players(self.env)
         radius_m = np.broadcast_to(np.asarray(self.env.agent_radius, np.float64), len(self.agent_ids))
-        return GameFacts(step_of(self.env), radius_m, self._teams(), bool(getattr(self.env, "obstacles", ())))
+        step_s = step_of(self.env)
+        obstacles = bool(getattr(self.env, "obstacles", ()))
+        return GameFacts(step_s, radius_m, self._teams(), obstacles, moves_of(self.env) * step_s)
 
     @contextmanager
     def filtering(self, safe: Callable[[Array], Array]) -> Iterator[None]:
@@ -76,7 +79,7 @@ class PyquaticusReader:
             yield
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """Check that the environment plays pairs, and each for one move.
+        """Check that the environment plays pairs.
 
         Raises:
             ConfigError: it does not.
@@ -93,7 +96,8 @@ class PyquaticusReader:
         state = np.array([_row(player) for player in players])
         teams = self._teams()
         driven = np.array([_driven(player) for player in players])
-        return Fleet(state, teams, self._platforms, (teams == team) & ~driven, self.agent_ids)
+        ours = (teams == team) & ~driven
+        return Fleet(state, teams, self._platforms, ours, self.agent_ids, driven=driven_players(self.env, players))
 
     def _teams(self) -> IntArray:
         return np.array([_team(player) for player in self.env.players.values()], dtype=np.int64)

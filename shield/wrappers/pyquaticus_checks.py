@@ -58,12 +58,7 @@ def check_env(env: Any) -> None:
         raise ConfigError(
             "gps_env = True is not supported: its positions are web-Mercator units, not metres; use gps_env=False"
         )
-    speedup = getattr(env, "sim_speedup_factor", 1)
-    if speedup != 1:
-        raise ConfigError(
-            f"sim_speedup_factor = {speedup!r} is not supported: boats go on turning by one command for {speedup} "
-            "steps; use sim_speedup_factor=1"
-        )
+    moves_of(env)
     _check_settings(getattr(env, "config_dict", None))
 
 
@@ -75,6 +70,19 @@ def _check_settings(settings: Any) -> None:
             near = difflib.get_close_matches(str(name), KNOWN_SETTINGS, n=2)
             hint = f"did you mean {', '.join(near)}?" if near else "remove it"
             raise ConfigError(f"Pyquaticus setting {name!r} is not known here, so neither is what it does; {hint}")
+
+
+def moves_of(env: Any) -> int:
+    """Moves that the environment makes of one action: those of its speed-up, and with a window open of its frames.
+
+    Raises:
+        ConfigError: the speed-up is no whole number of steps.
+    """
+    speedup = getattr(env, "sim_speedup_factor", 1)
+    if isinstance(speedup, bool) or not isinstance(speedup, (int, np.integer)) or speedup < 1:
+        raise ConfigError(f"sim_speedup_factor = {speedup!r} is not supported; give a whole number of steps, 1 or more")
+    frames = getattr(env, "num_renders_per_step", 1) if getattr(env, "render_mode", None) else 1
+    return int(speedup) * int(frames)
 
 
 def step_of(env: Any) -> float:
@@ -140,14 +148,8 @@ def check_pairs(env: Any, agent_ids: Sequence[str]) -> None:
     Pyquaticus looks at the first action of a boat: if that is of the declared action space, all must be.
 
     Raises:
-        ConfigError: a boat is bound to other actions, or moves several times for one.
+        ConfigError: a boat is bound to other actions.
     """
-    moves = getattr(env, "num_renders_per_step", 1) if getattr(env, "render_mode", None) else 1
-    if moves != 1:
-        raise ConfigError(
-            f"with render_mode this environment moves its boats {moves} times for one action, and the policy's shield "
-            "sees the first only; build it with render_fps = 1 / tau, or shield the environment: ShieldedParallelEnv"
-        )
     spaces = getattr(env, "act_space_str", {})
     for agent in agent_ids:
         bound = getattr(env, "act_space_checked", {}).get(agent) and getattr(env, "act_space_match", {}).get(agent)

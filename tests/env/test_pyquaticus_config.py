@@ -67,7 +67,6 @@ def test_fleets_radii_places_and_obstacles_are_taken_over():
         ({"catch_radus": 3.0}, "unknown Pyquaticus setting 'catch_radus'; did you mean catch_radius"),
         ({"zzzz": 3.0}, "unknown Pyquaticus setting 'zzzz'; remove it"),
         ({"gps_env": True}, "gps_env = True is not supported; use False"),
-        ({"sim_speedup_factor": 4}, "sim_speedup_factor = 4 is not supported"),
         ({"env_bounds": "auto"}, "give the field's width and height"),
         ([1], "the configuration is list"),
     ],

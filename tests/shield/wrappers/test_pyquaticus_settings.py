@@ -41,7 +41,8 @@ def wrap_policy(env):
 
 REFUSED = [
     ({"gps_env": True}, "gps_env = True is not supported: .* web-Mercator .*; use gps_env=False"),
-    ({"sim_speedup_factor": 10}, "sim_speedup_factor = 10 is not supported: .*; use sim_speedup_factor=1"),
+    ({"sim_speedup_factor": 2.5}, "sim_speedup_factor = 2.5 is not supported; give a whole number of steps, 1 or more"),
+    ({"sim_speedup_factor": 0}, "sim_speedup_factor = 0 is not supported; give a whole number"),
     ({"dt": 0.5}, "for steps of 0.1 s .* by 0.5 s for each command; build it by Shield.for_game"),
     ({"dt": None}, "move by unknown s a step; give one with one step for all"),
     ({"dynamics": ["heron", "drone"]}, "unknown platform 'drone'; known platforms: "),
@@ -59,7 +60,7 @@ def test_settings_that_would_be_misread_are_refused_by_name(wrap, settings, word
     wrap(game(gps_env=False, sim_speedup_factor=1, dt=0.1, config_dict={"tau": 0.1, "agent_radius": 2.0}))
 
 
-@pytest.mark.parametrize(("settings", "words"), REFUSED[:3])
+@pytest.mark.parametrize(("settings", "words"), REFUSED[:4])
 def test_settings_changed_after_wrapping_are_refused_at_the_next_reset(settings, words):
     env = wrap_env(game())
     vars(env.unwrapped).update(settings)
@@ -102,9 +103,22 @@ def test_boats_drawn_while_they_move_are_shielded_at_each_of_their_own_steps():
     wrapped = ShieldedParallelEnv(env, Shield.for_game(env))
     wrapped.reset(seed=0)
     assert wrapped.shield.config.dt_s == pytest.approx(1 / 30)
-    drawn = game(render_mode="rgb_array", num_renders_per_step=3)
-    with pytest.raises(ConfigError, match="moves its boats 3 times for one action"):
-        wrap_policy(drawn)
+
+
+@pytest.mark.parametrize(
+    ("settings", "moves"),
+    [
+        ({"sim_speedup_factor": 10}, 10),
+        ({"render_mode": "rgb_array", "num_renders_per_step": 3}, 3),
+        ({"sim_speedup_factor": 4, "render_mode": "human", "num_renders_per_step": 3}, 12),
+    ],
+)
+def test_a_policys_shield_is_told_of_commands_held_for_several_moves_and_that_of_an_env_decides_before_each(
+    settings, moves
+):
+    assert wrap_policy(game(**settings)).shield.config.moves == moves
+    assert wrap_policy(game(**settings)).shield.config.dt_s == pytest.approx(0.1 * moves)
+    assert wrap_env(game(**settings)).shield.config.moves == 1
 
 
 def test_the_distance_kept_is_the_sum_of_the_radii():

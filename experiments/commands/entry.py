@@ -1,0 +1,158 @@
+"""``steerclear entry``: a competition entry looked at: does it play, and what does the shield do to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear.shield.exceptions import ConfigError
+
+from ..ablation import AblationSettings, spec_of
+from ..ablation import quick as small_version
+from ..entries.checking import check_entry
+from ..entries.report_page import games_to_look_at, write_entry_page
+from ..entries.team import is_entry
+from ..match import play_match
+from ..pool import check_jobs, run_all
+from ..provenance import machine, versions
+from ..replay_html import write_replay
+from ..spec import ANSWER_S
+from ..store import ResultStore, write_json
+from . import options as o
+from .console import command, out, progress
+from .games import check_complete, default_folder, run_games
+
+app = typer.Typer(help="A competition entry: check that it plays, report what the shield does.", no_args_is_help=True)
+
+Entry = Annotated[str, typer.Argument(metavar="ENTRY", help="Folder or zip with solution.py, as it is handed in.")]
+Also = Annotated[str | None, typer.Option(metavar="A.zip,B.zip", help="Further opponents: entries or policies.")]
+Games = Annotated[int, typer.Option(metavar="N", help="Games against each opponent, without the shield and with it.")]
+Looks = Annotated[int, typer.Option(metavar="N", help="Pairs of games to keep as replays, 0 to 3.")]
+CheckTime = Annotated[float, typer.Option(metavar="S", help="Length of the game it is tried in, s.")]
+KEEPS_M = 4.0
+"""Distance at which the games of 2025 and 2026 count a collision, m."""
+QUICK_GAMES, QUICK_TIME_S = 2, 200.0
+
+
+def check_path(entry: str) -> None:
+    """Refuse what is no path of an entry.
+
+    Raises:
+        ConfigError: it is a policy's name or a model.
+    """
+    if not is_entry(entry) or entry.startswith("sb3:"):
+        raise ConfigError(f"{entry} is no entry; give a folder or a zip with solution.py, such as ./{entry}.zip")
+
+
+@app.command()
+@command
+def check(
+    entry: Entry,
+    preset: o.Preset = "mctf2026",
+    max_time: CheckTime = 60.0,
+    answer_time: o.AnswerTime = ANSWER_S,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Check an entry: whether it loads, what it imports, how long its actions take, a game against boats that hold.
+
+    Exit status: 0 it plays, 2 it cannot be loaded or gave nothing usable.
+    """
+    check_path(entry)
+    found = check_entry(entry, preset, max_time, answer_time)
+    console = out()
+    for line in check_lines(found):
+        console.print(line, markup=False, soft_wrap=True)
+    if json_file is not None:
+        write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
+
+
+def check_lines(found: dict[str, Any]) -> list[str]:
+    """What a check found, in sentences."""
+    imports, game = found["imports"], found["game"]
+    missing = f"; not installed here: {', '.join(imports['missing'])}" if imports["missing"] else ""
+    lines = [
+        f"{found['entry']} loads in {found['load_s']:.1f} s and plays.",
+        f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}",
+        f"time per action: mean {found['mean_ms']:.2f} ms, longest {found['max_ms']:.1f} ms in {found['calls']} calls; "
+        f"{found['late']} took longer than a decision ({found['decision_ms']:g} ms)",
+        f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
+        f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
+    ]
+    lines += [f"could not be read as Python: {name}" for name in imports["unread"]]
+    lines += [f"failed: {one['kind']} x {one['count']}: {one['message']}" for one in found["failures"]]
+    return lines
+
+
+@app.command()
+@command
+def report(
+    entry: Entry,
+    opponents: o.Opponents = "easy,medium,hidden,hard",
+    also: Also = None,
+    preset: o.Preset = "mctf2026",
+    games: Games = 5,
+    seed: o.Seed = 0,
+    out_folder: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")] = None,
+    quick: o.Quick = False,
+    jobs: o.Jobs = None,
+    resume: o.Resume = False,
+    separation: Annotated[float, typer.Option(metavar="M", help="Radius the shield keeps, m.")] = KEEPS_M,
+    shield_set: o.ShieldSet = None,
+    max_time: o.MaxTime = None,
+    rules: o.RuleSet = None,
+    looks: Looks = 2,
+    judge: o.Judge = "none",
+    answer_time: o.AnswerTime = ANSWER_S,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play an entry against opponents without the shield and with it, and write one page to show a team: entry.html.
+
+    Exit status: 0 done, 2 bad input or an entry that never played, 130 interrupted.
+    """
+    check_path(entry)
+    if not 0 <= looks <= 3:
+        raise ConfigError(f"--looks is {looks}; give 0 to 3")
+    names = o.split_names(opponents + (f",{also}" if also else ""), "--opponents")
+    settings = AblationSettings(
+        preset=preset,
+        own=entry,
+        opponents=names,
+        games=games,
+        seed=seed,
+        shield=o.shield_settings(separation, None, None, shield_set),
+        rules=o.game_settings(max_time, None, rules),
+        judge=judge,
+        answer_s=answer_time,
+    )
+    if quick:
+        settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
+    folder = out_folder or default_folder("entry-report")
+    results = run_games("entry report", settings, folder, jobs, resume, quick)
+    _show(settings, folder, results, looks, check_jobs(jobs))
+    if json_file is not None:
+        write_json(json_file, results)
+    check_complete(results)
+
+
+def _show(settings: AblationSettings, folder: Path, results: dict[str, Any], looks: int, processes: int) -> None:
+    """Write the page and the replays of the games to look at, and say where they are."""
+    specs = settings.specs()
+    kept = ResultStore(folder, True, "entry report").load()
+    rows = [kept[spec.key] for spec in specs if spec.key in kept]
+    if not rows:
+        return
+    links = []
+    for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
+        chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
+        with progress(f"replay {number + 1}", 1):
+            outcomes = {one.job.key: one.answer for one in run_all(play_match, chosen, processes)}
+        records = [outcomes[spec.key].record for spec in chosen if outcomes.get(spec.key) is not None]
+        if len(records) == len(chosen):
+            name = f"look_{number + 1}.html"
+            write_replay(records, folder / name, f"{off['pairing']}, game {off['game']}: {words}")
+            links.append((f"{words}: {off['pairing']}, game {off['game']}", name))
+    links.append(("all figures and every game", results["files"]["report"]))
+    page = write_entry_page(rows, settings, folder, links, results["warnings"])
+    out().print(f"{page}", soft_wrap=True, markup=False)

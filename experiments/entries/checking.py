@@ -1,0 +1,65 @@
+"""Checking an entry: does it load, what does it import, how long does an action take, does it play."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from steerclear.policies.report import PolicyReport
+from steerclear.shield.exceptions import PolicyError
+
+from ..match import Match
+from ..spec import MatchSpec
+from .imports import imports_of
+from .team import EntryTeam
+
+OPPONENT = "hold"
+"""Stands still: what goes wrong in the game is the entry's doing."""
+
+
+def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> dict[str, Any]:
+    """Load an entry in a process of its own and let it play against boats that hold.
+
+    Args:
+        path: a folder or zip with solution.py.
+        preset: rules of the game.
+        max_time_s: length of the game, s.
+        answer_s: time it has for the actions of a decision, s.
+
+    Returns:
+        What `keys.ENTRY_CHECK` describes.
+
+    Raises:
+        PolicyError: it cannot be loaded, or gave nothing usable throughout the game; the message says why.
+        ConfigError: a setting is unusable.
+    """
+    imports = imports_of(path)
+    started = time.perf_counter()
+    EntryTeam(path, answer_s).close()
+    load_s = time.perf_counter() - started
+    rules = {"max_time_s": max_time_s}
+    match = Match(MatchSpec(preset, path, OPPONENT, rules=rules, judge="none", answer_s=answer_s))
+    try:
+        row = match.play().row
+        report: PolicyReport = match.teams[0].policy.report()
+    finally:
+        match.close()
+    if not row["policy_usable_steps"]:
+        raise PolicyError(f"{Path(path).name} gave nothing usable throughout the game; {row['first_failure']}")
+    return {
+        "entry": path,
+        "load_s": load_s,
+        "imports": asdict(imports),
+        "calls": report.calls,
+        "mean_ms": report.mean_ms,
+        "max_ms": report.max_ms,
+        "late": report.late,
+        "decision_ms": report.step_ms,
+        "failures": [{"kind": one.kind, "count": one.count, "message": one.message} for one in report.failures],
+        "held": report.held,
+        "game": {
+            name: row[name] for name in ("captures", "grabs", "tags", "collisions", "duration_s", "first_failure")
+        },
+    }

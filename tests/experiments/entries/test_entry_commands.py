@@ -1,0 +1,148 @@
+"""``steerclear entry``: an entry is tried, and what the shield does to it is shown on one page."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from steerclear.experiments import cli
+from steerclear.experiments.ablation import AblationSettings
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.entries.imports import imports_of
+from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
+from steerclear.experiments.keys import KEYS, undocumented
+from typer.testing import CliRunner
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, ["entry", *map(str, arguments)])
+
+
+def test_a_check_tells_what_an_entry_imports_how_long_it_takes_and_that_it_plays(write_entry):
+    entry = write_entry("return 4", head="import json\nimport numpy as np\nfrom torch.nowhere import nothing_here as x")
+    Path(entry, "solution.py").write_text(
+        Path(entry, "solution.py").read_text().replace("from torch.nowhere", "if 0: from nowhere_is")
+    )
+    done = run("check", entry, "--max-time", "3", "--json", "a.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    assert "loads in" in done.stdout
+    assert "numpy" in done.stdout
+    assert "not installed here: nowhere_is" in done.stdout
+    content = json.loads(Path("a.json").read_text())
+    assert undocumented(content, KEYS["entry check"]) == []
+    assert (content["calls"], content["held"], content["decision_ms"]) == (9, 0, 1000.0)
+    assert content["game"]["duration_s"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "start", "words"),
+    [
+        ("return 4", "raise RuntimeError('no luck')", "no luck"),
+        ("return 'nonsense'", "pass", "gave nothing usable throughout the game"),
+        ("raise ValueError('bad day')", "pass", "bad day"),
+        ("import nowhere_is", "pass", "nowhere_is"),
+        ("time.sleep(600)", "pass", "did not answer within 1 s"),
+    ],
+)
+def test_an_entry_that_does_not_play_is_one_line(write_entry, body, start, words):
+    done = run("check", write_entry(body, start=start), "--max-time", "2", "--answer-time", "1")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in done.stderr.replace("\n", " ")
+    assert "Traceback" not in done.stderr
+
+
+def test_what_is_no_entry_is_one_line(tmp_path):
+    with zipfile.ZipFile("empty.zip", "w") as archive:
+        archive.writestr("notes.txt", "nothing")
+    Path("wants").mkdir()
+    Path("wants/solution.py").write_text(
+        "class solution:\n    def __init__(self, more): pass\n    def compute_action(self, *a): return 4\n"
+    )
+    for arguments, words in (
+        (["check", "medium"], "medium is no entry; give a folder or a zip"),
+        (["check", "empty.zip"], "solution.py"),
+        (["check", "gone.zip"], "there is no submission at"),
+        (["check", "wants"], "more"),
+        (["report", "wants", "--looks", "7"], "--looks is 7; give 0 to 3"),
+    ):
+        done = run(*arguments)
+        assert done.exit_code == ExitCode.BAD_INPUT, done.output
+        assert words in done.stderr.replace("\n", " "), done.stderr
+
+
+def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
+    entry = write_entry("return (3.0, float(full_obs[agent_id]['opponent_home_bearing']))")
+    settings = [
+        "--opponents",
+        "hold",
+        "--games",
+        "1",
+        "--max-time",
+        "40",
+        "--jobs",
+        "1",
+        "--looks",
+        "1",
+        "--out",
+        "out",
+    ]
+    done = run("report", entry, *settings)
+    assert done.exit_code == ExitCode.OK, done.output
+    page = Path("out/entry.html").read_text()
+    assert "Against each opponent" in page
+    assert "hold" in page
+    links = [name for name in ("look_1.html", "report.html") if f'href="{name}"' in page]
+    assert "report.html" in links
+    assert all(Path("out", name).exists() for name in links)
+    assert undocumented(json.loads(Path("out/results.json").read_text()), KEYS["entry report"]) == []
+
+
+def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0):
+    hits = {"breaches_opponent_4.0m": opponents, "breaches_teammate_4.0m": mates, "collisions": counted}
+    names = {"pairing": "us vs <them>", "opponent": "<them>", "game": game, "shielded": shielded}
+    return {**names, **hits, "captures": captures, "captures_against": against}
+
+
+ROWS = [
+    row(0, False, 2, opponents=5, counted=5), row(0, True, 1, against=1),
+    row(1, False, 1, opponents=1), row(1, True, 1, mates=1),
+    row(2, False, 0), row(2, True, 3),
+    row(3, False, 9),
+]  # fmt: skip
+
+
+def test_figures_of_the_page_are_of_pairs_and_names_are_text(tmp_path):
+    settings = AblationSettings(
+        preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
+    )
+    change = net_change([ROWS[0], ROWS[2], ROWS[4]], [ROWS[1], ROWS[3], ROWS[5]])
+    assert change.value == pytest.approx((-2 + 0 + 3) / 3)
+    page = write_entry_page(ROWS, settings, tmp_path, [("a <look>", "x.html")], ["mind <this>"]).read_text()
+    for words in ("3 → 5", "6 → 0", "0 → 1", "5 → 0", "&lt;them&gt;", "a &lt;look&gt;", "mind &lt;this&gt;", ">3<"):
+        assert words in page, words
+    assert "<them>" not in page
+
+
+def test_games_to_look_at_are_chosen_once_each():
+    settings = AblationSettings(
+        preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
+    )
+    chosen = games_to_look_at(ROWS, settings, 3)
+    assert [(words, off["game"]) for words, off, _ in chosen] == [
+        ("most hits without the shield", 0),
+        ("hits with the shield", 1),
+    ]
+    assert games_to_look_at([ROWS[4], ROWS[5]], settings, 3) == []
+
+
+def test_imports_are_read_without_running_anything(tmp_path):
+    (tmp_path / "solution.py").write_text("import os, helper\nimport numpy.linalg\nfrom . import x\nraise SystemExit\n")
+    (tmp_path / "helper.py").write_text("def f(:")
+    found = imports_of(tmp_path)
+    assert (found.needed, found.missing, found.unread) == (("numpy",), (), ("helper.py",))
