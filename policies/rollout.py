@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steerclear.env.advance import advance_games
+from steerclear.env.advance import advance_games, begin_decision
 from steerclear.env.angles import wrap_bearing
 from steerclear.env.arrays import CAPTURE, GRAB, TAG, Games, Rules
 from steerclear.env.drive_home import decide_commands
@@ -64,7 +64,8 @@ def roll_out(
                     absolute = 45.0 * action if action != STOP else games.state[b, i, L.HEADING]
                     wanted[b, i, 1] = wrap_bearing(absolute - games.state[b, i, L.HEADING])
             decide_commands(rules, games, wanted, commands)
-            advance_games(rules, games, commands)
+            begin_decision(rules, games)
+            advance_games(rules, games, wanted, commands)
             for b in range(n_games):
                 _count(rules, games, b, worth, touching[b], counted[b])
 

@@ -121,7 +121,7 @@ def report(
         opponents=names,
         games=games,
         seed=seed,
-        shield=o.shield_settings(separation, None, None, shield_set),
+        shield=o.shield_settings(separation, None, None, None, shield_set),
         rules=o.game_settings(max_time, None, rules),
         judge=judge,
         answer_s=answer_time,

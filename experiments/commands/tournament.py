@@ -90,7 +90,7 @@ def tournament(
         finalists=finalists,
         penalty=check_penalty(penalty),
         judge=check_judge(judge),
-        shield=o.shield_settings(separation, None, None, shield_set),
+        shield=o.shield_settings(separation, None, None, None, shield_set),
         rules=o.game_settings(max_time, None, rules),
         fixed_start=fixed_start,
         trust=trust,

@@ -45,10 +45,12 @@ def _home(env: Any, player: Any) -> Row:
     marks = getattr(env, ("blue_untag_coords", "red_untag_coords")[team], None)
     if marks is None:
         marks = ends = (env.flags[team].home,) * 2
-        radius_m = float(env.catch_radius)
+        radius_m = float(getattr(env, "catch_radius", math.nan))
     else:
         ends = (env.env_ul, env.env_ll) if team == 0 else (env.env_ur, env.env_lr)
         radius_m = float(env.untag_radius)
+    if math.isnan(radius_m):  # of another version: nobody knows when it is home
+        return UNKNOWN
     places = np.asarray(marks, dtype=np.float64)
     mark = places[int(np.argmin(np.hypot(*(places - (x, y)).T)))]
     ends_m = np.asarray(ends, dtype=np.float64)

@@ -133,7 +133,9 @@ def test_the_page_of_keys_holds_every_key(tmp_path):
 
 
 def test_no_page_is_made_of_other_results(tmp_path):
-    with pytest.raises(ConfigError, match="ablate, evaluate, bench, encounters, reach compare or reach play"):
+    with pytest.raises(
+        ConfigError, match="ablate, evaluate, tournament, bench, encounters, reach compare or reach play"
+    ):
         write_pages([{"command": "parity"}], tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="choose another --out"):

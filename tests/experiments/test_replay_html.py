@@ -170,7 +170,17 @@ def test_a_full_game_stays_small(game_meta, game_record, tmp_path):
 def test_a_game_without_a_step_can_be_replayed(game_record, tmp_path):
     commands = ("wanted", "sent", "reason", "intervened", "certificate_m")
     empty = {name: values[:0] if name in commands else values for name, values in game_record.items()}
-    states = ("position", "heading_deg", "speed_mps", "has_flag", "is_tagged", "oob", "flag_position", "captures")
+    states = (
+        "position",
+        "heading_deg",
+        "speed_mps",
+        "has_flag",
+        "is_tagged",
+        "oob",
+        "is_disabled",
+        "flag_position",
+        "captures",
+    )
     empty |= {name: game_record[name][:1] for name in states} | {"breaches": np.zeros((0, 4))}
     (game,) = games_in(write_replay(empty, tmp_path / "a.html"))
     assert game["steps"] == 0

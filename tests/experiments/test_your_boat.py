@@ -35,8 +35,14 @@ QUICK = ("platform", "fit")
 
 def commands(kind=""):
     """The page's commands, in its order."""
-    blocks = re.findall(rf"^```{kind}\n(.*?)^```", PAGE.read_text(), flags=re.M | re.S)
-    return [shlex.split(line) for block in blocks for line in block.splitlines() if line.startswith("steerclear")]
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE.read_text(), flags=re.M | re.S)
+    return [
+        shlex.split(line)
+        for name, block in blocks
+        if name == kind
+        for line in block.splitlines()
+        if line.startswith("steerclear")
+    ]
 
 
 def write_fleet(folder):

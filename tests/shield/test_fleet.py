@@ -71,10 +71,10 @@ def test_what_cannot_be_used_is_refused_in_words_that_help(changes, text):
 
 @pytest.mark.parametrize("names", ["hron", ["heron", "hron"]])
 def test_an_unknown_platform_is_told_the_known_ones(names):
-    with pytest.raises(PlatformError, match="known platforms: di, heron"):
+    with pytest.raises(PlatformError, match="known platforms: ardurover_boat, blueboat, di, heron"):
         fleet(platforms=names)
     kinds = (names,) * 2 if isinstance(names, str) else tuple(names)
-    with pytest.raises(PlatformError, match="known platforms: di, heron"):
+    with pytest.raises(PlatformError, match="known platforms: ardurover_boat, blueboat, di, heron"):
         Shield().decide(replace(fleet(), platforms=kinds), AHEAD)
 
 

@@ -15,6 +15,7 @@ from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearErr
 TEXTS = ("certificate", "coordination", "profile", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
 NOT_ZERO = [
+    "move_s",
     "separation_m",
     "dt_s",
     "response_per_s",
@@ -25,7 +26,7 @@ NOT_ZERO = [
     "speed_weight",
     "horizon_s",
 ]
-MAY_BE_NONE = ["adversary_s", "horizon_s", "edge_m"]
+MAY_BE_NONE = ["adversary_s", "move_s", "horizon_s", "edge_m"]
 MAY_BE_INFINITE = [
     "adversary_s",
     "response_per_s",

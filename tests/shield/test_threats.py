@@ -19,7 +19,7 @@ def remembered(rows, team, platform):
     """Margins kept after one decision of boats that want to go straight on, and the next decision's targets."""
     fleet = fleet_of(rows, team, platform)
     fleet.state[:, L.THRUST] = 100.0
-    shield = Shield()
+    shield = Shield(profile="rammers")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
     seat = shield._seats[0]
     boats = boats_of(shield.config, fleet.platforms, tuple(team))

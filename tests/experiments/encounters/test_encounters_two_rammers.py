@@ -19,5 +19,5 @@ def test_two_that_close_in_from_both_quarters_are_seen_coming():
     assert (closest_m("shield") >= 2.5).all()
 
 
-def test_hunts_of_a_few_seconds_lose_them():
-    assert (closest_m("shield:adversary_s=6.4") < 2.5).mean() > 0.5
+def test_who_takes_them_to_hold_their_course_loses_them():
+    assert (closest_m("shield:profile=hold-course") < 2.5).mean() > 0.5

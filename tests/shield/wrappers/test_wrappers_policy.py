@@ -113,7 +113,7 @@ def near(gap_m):
 
 def test_a_function_of_what_is_seen_gets_a_shield_too():
     wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]])
-    team = Shield().wrap(lambda gap_m: wanted, read=near)
+    team = Shield(profile="rammers").wrap(lambda gap_m: wanted, read=near)
     assert isinstance(team, ShieldedCallable)
     assert team(60.0).values.tobytes() == wanted.values.tobytes()
     assert team(6.0).values[0, 1] != 0.0
