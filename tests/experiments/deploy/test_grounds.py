@@ -65,7 +65,7 @@ def test_the_same_game_is_decided_the_same_bit_for_bit_with_the_own_flag_home_ta
     half = len(env.possible_agents) // 2
     sides = {"blue": env.possible_agents[:half], "red": env.possible_agents[half:]}
     ours, theirs = sides[team], sides["red" if team == "blue" else "blue"]
-    attackers = policies.make("medium_attack")
+    attackers = policies.make("hard_attack")
     attackers.reset(env.unwrapped, theirs, 2)
     homes, changed = [], 0
     for step in range(STEPS):

@@ -1,4 +1,4 @@
-"""Encounters of a heron and two rammers, one on each quarter, that hunts of a few seconds lose."""
+"""Encounters of a heron and two rammers, one on each quarter, that who takes them to hold their course loses."""
 
 import numpy as np
 from steerclear.experiments.encounters.families import draw
@@ -20,4 +20,4 @@ def test_two_that_close_in_from_both_quarters_are_seen_coming():
 
 
 def test_who_takes_them_to_hold_their_course_loses_them():
-    assert (closest_m("shield:profile=hold-course") < 2.5).mean() > 0.5
+    assert (closest_m("shield:profile=hold-course") < 2.5).mean() >= 0.3
