@@ -188,7 +188,9 @@ def test_bad_input_is_refused():
 def test_boats_without_a_table_are_told_how_to_make_one(monkeypatch, tmp_path):
     monkeypatch.setenv("STEERCLEAR_TABLES", str(tmp_path))
     point = Platform(name="point", kind="single_integrator", max_speed_mps=2.0, max_turn_rate_dps=90.0)
-    with pytest.raises(ConfigError, match="steerclear reach solve --own heron --other point.yaml --other-may worst-case"):
+    with pytest.raises(
+        ConfigError, match=r"steerclear reach solve --own heron --other point\.yaml --other-may worst-case"
+    ):
         ReachGuard(CONFIG, 1, ("heron", point), (0, 1))
     ReachGuard(CONFIG, 1, (point,), (0,))
 
