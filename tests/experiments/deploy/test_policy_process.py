@@ -222,6 +222,7 @@ def test_what_left_its_session_ends_with_it_too(run, ask, write_entry, tmp_path)
     )
     process = run(entry)
     ask(process, answered)
+    wait_until(lambda: note.exists() and note.read_text())  # it writes when it comes to it
     daemon = int(note.read_text())
     assert is_running(daemon)
     process.close()
