@@ -74,7 +74,8 @@ def sets_config(radius_m: float, settings: Mapping[str, Any]) -> ShieldConfig:
     for name, remedy in GIVEN.items():
         if name in settings:
             raise ConfigError(f"{name} cannot be set here: {remedy}")
-    return ShieldConfig.of(separation_m=radius_m, buffer_m=0.0, **settings)
+    worst = {"profile": "rammers"}  # as reachability takes them
+    return ShieldConfig.of(**{"separation_m": radius_m, "buffer_m": 0.0, **worst, **settings})
 
 
 def looks_up(values: ValueTable, config: ShieldConfig) -> bool:

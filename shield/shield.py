@@ -16,7 +16,7 @@ from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
-from .fleet import Fleet
+from .fleet import Fleet, usable_drives
 from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
 from .limiting import tell_of_limits, within_limits
@@ -239,7 +239,7 @@ class Shield:
         known = np.zeros(len(fleet), np.bool_)
         if fleet.driven is not None:
             horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-            known = ~fleet.controlled & np.isfinite(fleet.driven[:, 0]) & (fleet.driven[:, 3] >= horizon_s)
+            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, 3] >= horizon_s)
         for seat in self._seats:
             seat.work.known[:] = known
             if fleet.driven is not None:

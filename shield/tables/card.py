@@ -41,7 +41,7 @@ class Card:
         margin: outcome of closed-loop runs of the full model; empty when not run.
         version: version of the package that solved it.
         levels_s: shorter times T for which V(x, T) is kept as well, s.
-        levels: what the set {V(x, T) < radius} is at each of them: areas and reach as above.
+        levels: how far ahead, m, the set {V(x, T) < radius} reaches head-on at top speeds, by T and radius.
         payload_sha256: digest of the packed values.
     """
 

@@ -107,6 +107,7 @@ def figures(
         "checked_radii_m": radii_m,
         "convergence": {f"{radius:g}": convergence(table, coarse, radius) for radius in radii_m},
         "areas_m2": area_table(table, radii_m) | {"reach_ahead_m": reaches(table, radii_m)},
+        "levels": level_reaches(table, radii_m),
         "model_error": {
             role: model_error(boat, table.card.dt_s, 500) for role, boat in (("own", own), ("other", other))
         },
@@ -119,6 +120,14 @@ def reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, float]:
     grid = table.card.make_grid()
     tops = grid.own_top_mps, grid.other_top_mps
     return {f"{radius:g}": round(reach_ahead_m(table, radius, 180.0, *tops), 2) for radius in radii_m}
+
+
+def level_reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, dict[str, float]]:
+    """`reaches` at each shorter time that the table keeps, by time in s."""
+    return {
+        f"{time_s:g}": reaches(replace(table, values=values), radii_m)
+        for time_s, values in zip(table.card.levels_s, table.levels, strict=True)
+    }
 
 
 def convergence(table: ValueTable, coarse: ValueTable, radius_m: float) -> dict[str, float]:

@@ -110,11 +110,8 @@ def _keep_level(problem: Problem, state: Progress) -> None:
     """Keep V(x, T) when the iteration passes a time T that tables keep."""
     passed = len(state.levels)
     if passed < len(LEVELS_S) and state.iterations == round(LEVELS_S[passed] / problem.dt_s):
-        state.levels = (
-            np.concatenate([state.levels.reshape(passed, -1), pack(state.values, problem.grid.cap_m)[None]])
-            if passed
-            else pack(state.values, problem.grid.cap_m)[None]
-        )
+        kept = state.levels.reshape(passed, problem.grid.size)
+        state.levels = np.concatenate([kept, pack(state.values, problem.grid.cap_m)[None]])
 
 
 class _Solver:

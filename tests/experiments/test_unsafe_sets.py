@@ -114,7 +114,8 @@ def test_settings_that_would_compare_two_questions_are_refused(setting, tmp_path
 
 
 def test_other_settings_reach_the_shield():
-    assert sets_config(RADIUS_M, {"adversary_s": 5.0}) == ShieldConfig(buffer_m=0.0, adversary_s=5.0)
+    assert sets_config(RADIUS_M, {"adversary_s": 5.0}) == ShieldConfig(profile="rammers", buffer_m=0.0, adversary_s=5.0)
+    assert sets_config(RADIUS_M, {}).feared_s == math.inf
     with pytest.raises(ConfigError, match="did you mean 'tail_s'"):
         sets_config(RADIUS_M, {"tail": 1.0})
 

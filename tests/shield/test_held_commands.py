@@ -1,11 +1,13 @@
 """Commands held for several moves: what is foreseen of the next decision is what the game then does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield import Commands, Shield, ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
@@ -137,3 +139,37 @@ def test_driven_rows_of_another_shape_are_refused():
     object.__setattr__(fleet, "driven", np.zeros((2, 3)))
     with pytest.raises(FleetError, match=r"driven has shape \(2, 3\); give \(2, 4\)"):
         fleet.check()
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        (2.0, 5.0, np.nan, 100.0),
+        (2.0, np.nan, 5.0, 100.0),
+        (2.0, np.inf, 5.0, 100.0),
+        (-1.0, np.nan, np.nan, 100.0),
+        (np.inf, np.nan, np.nan, 100.0),
+        (1e3, np.nan, np.nan, 100.0),
+        (0.0, np.nan, np.nan, np.nan),
+        (0.0, np.nan, np.nan, 0.5),
+    ],
+)
+def test_a_drive_that_says_no_way_makes_nobody_harmless(row):
+    """Such a boat is feared as any other; one whose drive is whole is not."""
+
+    def decided(drive):
+        shield = Shield(profile="rammers")
+        fleet = Fleet.of(
+            position_m=[[0, 0], [0, 6.5]],
+            heading_rad=[0, np.pi],
+            speed_mps=[2, 2],
+            team=[0, 1],
+            platforms="heron",
+        )
+        if drive is not None:
+            fleet = replace(fleet, driven=np.array([[np.nan] * 4, drive]))
+        told = shield.decide(fleet, Commands.relative_deg([[2.0, 0.0], [2.0, 0.0]]))
+        return told.sent.values.tolist(), told.certificate_m.tolist()
+
+    assert decided(row) == decided(None)
+    assert decided((2.0, 60.0, 6.5, 100.0)) != decided(None)
