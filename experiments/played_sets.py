@@ -100,7 +100,7 @@ def play_set(task: Task) -> PlayedSet:
         SteerclearError: there is no table of the pair, or a setting is refused.
     """
     values = load_table(task.own, task.other, "worst-case")
-    config = ShieldConfig.of(**{"separation_m": task.radius_m, "profile": "rammers", **task.settings})
+    config = ShieldConfig.of(**{"separation_m": task.radius_m, "profile": "rammers", **dict(task.settings)})
     state, cells_m2 = _positions(values, task)
     value_m = values_m(values, state)
     reach, band = value_m < task.radius_m, value_m < task.radius_m + BAND_M
