@@ -15,7 +15,7 @@ from .exceptions import ConfigError, FleetError
 from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .flow import decide_compiled
 from .game_facts import facts_of_games, told_distances
-from .jit import Array, BoolArray, IntArray, kernel
+from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
@@ -38,6 +38,7 @@ def decide_games(
     memory: Memory,
     error_m: Array,
     late_m: float,
+    fear_s: Array,
     pending: Array,
     sent: Array,
     reason: IntArray,
@@ -61,6 +62,7 @@ def decide_games(
             margin_m[i] = error_m[i] if ours[b, i] else error_m[i] + late_m
             if ahead[i, L.HEADING] != state[b, i, L.HEADING]:
                 asked[i, 1] += state[b, i, L.HEADING] - ahead[i, L.HEADING]
+        copy_row(work.fear_s, fear_s[b])
         take_memory(memory, b, scene.memory)
         decide_compiled(scene, ahead, asked, margin_m, ours[b])
         put_memory(scene.memory, b, memory)
@@ -149,7 +151,7 @@ class BatchedShield:
         self._memory.escaping[which] = False
         self._pending[which] = np.nan
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+    def decide(self, state: Array, wanted: Array, ours: BoolArray, visiting: BoolArray | None = None) -> Array:
         """Safe commands.
 
         Args:
@@ -157,6 +159,7 @@ class BatchedShield:
                 followed as `Shield` does.
             wanted: (B, n, 2) speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds themselves.
             ours: (B, n) boats to decide for.
+            visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: of none it is known.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
@@ -170,6 +173,7 @@ class BatchedShield:
         state = _shaped("state", state, (*games, L.N_STATE), numbers)
         wanted = _shaped("wanted", wanted, (*games, 2), numbers)
         ours = _shaped("ours", ours, games, truths)
+        seen = np.zeros(games, np.bool_) if visiting is None else _shaped("visiting", visiting, games, truths)
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
@@ -182,6 +186,7 @@ class BatchedShield:
             self._memory,
             self._margin,
             self._late_m,
+            np.where(seen, self.config.visitor_feared_s, self.config.feared_s),
             self._pending,
             self.sent,
             self.reason,
@@ -241,7 +246,7 @@ class GamesFilter:
             self._checked = core
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
-        return self.shield.decide(core.state, commands, ours)
+        return self.shield.decide(core.state, commands, ours, ~core.on_side)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

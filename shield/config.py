@@ -13,7 +13,7 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
-PROFILES = {"players": 12.0, "rammers": math.inf, "hold-course": 0.0}
+PROFILES = {"players": (12.0, 6.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
 """`ShieldConfig.adversary_s` of each profile, s."""
 
 
@@ -41,6 +41,8 @@ class ShieldConfig:
             commands are changed.
         profile: whom the opponents are taken for, see `PROFILES`: "players" of the game, "rammers" that are out to hit
             our boats, or boats that "hold-course".
+        visitor_s: the same of an opponent on our side of the field, which can tag nobody there (`Fleet.visiting`), s;
+            None takes ``adversary_s``, or the profile's where that is None as well.
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         fixed_response_per_s: the same of margins from the edge, obstacles and circles.
@@ -83,6 +85,7 @@ class ShieldConfig:
     coordination: str = "team"
     solver: str = "daqp"
     adversary_s: float | None = None
+    visitor_s: float | None = None
     profile: str = "players"
     response_per_s: float = 1.0
     table_response_per_s: float = 0.3
@@ -136,7 +139,14 @@ class ShieldConfig:
     @property
     def feared_s(self) -> float:
         """How long an opponent may do its worst, s: `adversary_s`, or the profile's."""
-        return PROFILES[self.profile] if self.adversary_s is None else self.adversary_s
+        return PROFILES[self.profile][0] if self.adversary_s is None else self.adversary_s
+
+    @property
+    def visitor_feared_s(self) -> float:
+        """The same of opponents on our side of the field, s."""
+        if self.visitor_s is not None:
+            return self.visitor_s
+        return PROFILES[self.profile][1] if self.adversary_s is None else self.adversary_s
 
     def said(self, name: str) -> bool:
         """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
@@ -173,8 +183,8 @@ _RANGES = {
 }
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
 cap of margins would weigh more than the field's edge."""
-_MAY_BE_NONE = {"adversary_s", "move_s", "horizon_s", "edge_m"}
-_MAY_BE_INFINITE = _RATES | {"adversary_s", "max_track_age_s", "give_way_after_s", "search_limit"}
+_MAY_BE_NONE = {"adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m"}
+_MAY_BE_INFINITE = _RATES | {"adversary_s", "visitor_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
 
 def _check_number(name: str, value: object) -> None:

@@ -66,6 +66,8 @@ class Decision:
             decisions read from a black box.
         cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
             the best that was verified until then.
+        feared_s: how long from now this boat, an opponent, was taken to do its worst before it holds its course, s
+            (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
     """
 
     boat: str
@@ -82,6 +84,7 @@ class Decision:
     solve_time_s: float = field(compare=False)
     no_table: tuple[str, ...] | None = None
     cut_short: bool = False
+    feared_s: float | None = None
 
     def __eq__(self, other: object) -> bool:
         return self._said() == other._said() if isinstance(other, Decision) else NotImplemented
@@ -110,6 +113,7 @@ class Decisions(Sequence[Decision]):
         solve_time_s: time of the whole decision, s.
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
+        feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
     """
 
     fleet: Fleet
@@ -123,6 +127,7 @@ class Decisions(Sequence[Decision]):
     solve_time_s: float = field(compare=False)
     no_table: BoolArray | None = None
     cut_short: BoolArray | None = None
+    feared_s: Array | None = None
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -162,12 +167,18 @@ class Decisions(Sequence[Decision]):
             solve_time_s=self.solve_time_s,
             no_table=self._no_table(i),
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
+            feared_s=self._feared_s(i),
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:
         if bound == FIXED_THING:
             return (FIELD,)
         return (self.fleet.names[bound],) if bound >= 0 else ()
+
+    def _feared_s(self, i: int) -> float | None:
+        if self.feared_s is None or math.isnan(self.feared_s[i]):
+            return None
+        return float(self.feared_s[i])
 
     def _no_table(self, i: int) -> tuple[str, ...] | None:
         if self.no_table is None:

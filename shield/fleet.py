@@ -65,6 +65,10 @@ class Fleet:
             m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
             sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
             `certificates.foreseen`, unless they may be free before an escape ends, or are controlled.
+        adversary_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s; NaN, or
+            None for all: as the settings say, of which `ShieldConfig.adversary_s` tells more.
+        visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
+            `ShieldConfig.visitor_s`. None: of none it is known.
     """
 
     state: Array
@@ -75,6 +79,8 @@ class Fleet:
     age_s: Array | None = None
     position_error_m: Array | None = field(default=None)
     driven: Array | None = None
+    adversary_s: Array | None = None
+    visiting: BoolArray | None = None
 
     def __post_init__(self) -> None:
         """Bring arrays to the type and layout of compiled code; what cannot be is refused by `check`."""
@@ -102,6 +108,8 @@ class Fleet:
         heading_error_rad: ArrayLike | None = None,
         age_s: ArrayLike | None = None,
         position_error_m: ArrayLike | None = None,
+        adversary_s: ArrayLike | None = None,
+        visiting: ArrayLike | None = None,
     ) -> Fleet:
         """Fleet from plain arrays.
 
@@ -119,6 +127,8 @@ class Fleet:
             heading_error_rad: (n,) last error the heading controller saw where known, else NaN.
             age_s: (n,) age of each track, s.
             position_error_m: (n,) bound on the position error, m.
+            adversary_s: (n,) how long each may do its worst as an opponent, s; NaN: as the settings say.
+            visiting: (n,) bool, boats on the other team's side, where they can tag nobody.
 
         Raises:
             FleetError: shapes do not fit together, a value cannot be used, two boats have the same name, or one is
@@ -148,6 +158,8 @@ class Fleet:
             names=tuple(f"boat_{i}" for i in range(n)) if names is None else _names(names),
             age_s=_copied("age_s", age_s, n),
             position_error_m=_copied("position_error_m", position_error_m, n),
+            adversary_s=_copied("adversary_s", adversary_s, n),
+            visiting=None if visiting is None else _yes_or_no("visiting", visiting, n),
         )
         fleet.check()
         if FIELD in fleet.names:
@@ -175,7 +187,16 @@ class Fleet:
                 f"state has shape {self.state.shape} of {self.state.dtype}; give (n, {L.N_STATE}) of float64, see "
                 "platforms.layout"
             )
-        for name in ("team", "platforms", "controlled", "names", "age_s", "position_error_m"):
+        for name in (
+            "team",
+            "platforms",
+            "controlled",
+            "names",
+            "age_s",
+            "position_error_m",
+            "adversary_s",
+            "visiting",
+        ):
             self._check_length(name, n)
         if self.driven is not None and np.shape(self.driven) != (n, 4):
             raise FleetError(f"driven has shape {np.shape(self.driven)}; give ({n}, 4): speed m/s, x m, y m, time s")
@@ -186,10 +207,9 @@ class Fleet:
             ("team", np.int64),
             ("age_s", np.float64),
             ("position_error_m", np.float64),
-            (
-                "driven",
-                np.float64,
-            ),
+            ("driven", np.float64),
+            ("adversary_s", np.float64),
+            ("visiting", np.bool_),
         ):
             value = getattr(self, name)
             if value is not None and not isinstance(value, np.ndarray):
@@ -203,10 +223,12 @@ class Fleet:
             raise FleetError(
                 "position_error_m holds a value that is negative or not finite; give a bound in m per boat"
             )
+        if self.adversary_s is not None and (self.adversary_s < 0.0).any():
+            raise FleetError("adversary_s holds a negative time; give s per boat, or NaN where the settings say it")
 
     def _check_length(self, name: str, n: int) -> None:
         value = getattr(self, name)
-        if value is None and name in ("age_s", "position_error_m"):
+        if value is None and name in _OPTIONAL:
             return
         flat = value.ndim == 1 if isinstance(value, np.ndarray) else hasattr(value, "__len__")
         if not flat or isinstance(value, (str, bytes)):
@@ -253,6 +275,8 @@ def _laid_out(value: np.ndarray) -> np.ndarray:
     return np.require(np.asarray(value), None, ["C", "A", "W"])
 
 
+_OPTIONAL = ("age_s", "position_error_m", "adversary_s", "visiting")
+
 _FORMS: dict[str, Callable[[Any], Any]] = {
     "state": _laid_out,
     "team": whole_numbers,
@@ -260,6 +284,8 @@ _FORMS: dict[str, Callable[[Any], Any]] = {
     "age_s": numbers,
     "position_error_m": numbers,
     "driven": numbers,
+    "adversary_s": numbers,
+    "visiting": _laid_out,
 }
 
 

@@ -52,6 +52,8 @@ def ordered(fleet: Fleet, wanted: Commands, order: IntArray) -> tuple[Fleet, Com
         age_s=None if fleet.age_s is None else fleet.age_s[order],
         position_error_m=None if fleet.position_error_m is None else fleet.position_error_m[order],
         driven=None if fleet.driven is None else fleet.driven[order],
+        visiting=None if fleet.visiting is None else fleet.visiting[order],
+        adversary_s=None if fleet.adversary_s is None else fleet.adversary_s[order],
     )
     return boats, replace(wanted, values=wanted.values[order])
 
@@ -74,4 +76,5 @@ def as_given(decisions: Decisions, fleet: Fleet, wanted: Commands, order: IntArr
         bound=np.where(bound >= 0, order[bound], bound),
         no_table=None if missing is None else missing[np.ix_(place, place)],
         cut_short=None if cut_short is None else cut_short[place],
+        feared_s=None if decisions.feared_s is None else decisions.feared_s[place],
     )

@@ -44,7 +44,6 @@ class Boats(NamedTuple):
         cap_m: margins above this may shrink freely, (n,), m.
         tables: value tables.
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
-        adversary_s: time from now for which an opponent may do its worst before it holds its course, s.
         table_margin_m: added to the radius where a table is looked into, m.
         look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
         joint_decay: factor by which the margin on such runs may shrink in one step.
@@ -78,7 +77,6 @@ class Boats(NamedTuple):
     cap_m: Array
     tables: Tables
     table: IntArray
-    adversary_s: float
     table_margin_m: float
     look: IntArray
     joint_decay: float

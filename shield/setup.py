@@ -21,7 +21,7 @@ from .scene import Boats, Tuning
 from .shared import share
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
-from .tables.lookup import WHOLE_S, Tables, no_tables
+from .tables.lookup import Tables, no_tables
 from .tables.settings import OtherMay
 from .tables.told import ranges_told_m
 
@@ -121,7 +121,6 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
             tables=looked.tables,
             table=looked.table,
-            adversary_s=min(config.feared_s, WHOLE_S),
             table_margin_m=config.table_margin_m,
             look=np.where(with_table, looked.steps, 0),
             joint_decay=_decay(config.response_per_s, config),

@@ -11,6 +11,7 @@ import numpy as np
 
 from .answer import Answer, less_turn, to_send
 from .autopilots import Autopilots, all_told, unknown_memory
+from .certificates import CERTIFICATES
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -179,6 +180,7 @@ class Shield:
     def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
         """`decide`, of boats in the order of their names."""
         boats = self._foresee(fleet, self._scene(fleet))
+        feared_s = self._fear(fleet)
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
         state, margin = prepare(seen, self.config, boats.params, self._pending)
@@ -207,6 +209,7 @@ class Shield:
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
             cut_short=answer.cut_short,
+            feared_s=feared_s,
         )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
@@ -250,6 +253,24 @@ class Shield:
         if key not in self._foreseen:
             self._foreseen[key] = without_hunters(boats, known)
         return self._foreseen[key]
+
+    def _fear(self, fleet: Fleet) -> Array:
+        """Note how long each boat may do its worst, by what the fleet says, else the settings.
+
+        Returns:
+            (n,) s, NaN for boats that are nobody's opponent; 0 where the way of one is known.
+        """
+        visiting = np.zeros(len(fleet), np.bool_) if fleet.visiting is None else fleet.visiting
+        fear_s = np.where(visiting, self.config.visitor_feared_s, self.config.feared_s)
+        if fleet.adversary_s is not None:
+            fear_s = np.where(np.isnan(fleet.adversary_s), fear_s, fleet.adversary_s)
+        if not CERTIFICATES[self.config.certificate].hunters:
+            fear_s[:] = 0.0
+        for seat in self._seats:
+            seat.work.fear_s[:] = fear_s
+            fear_s[seat.work.known] = 0.0
+        ours = np.unique(fleet.team[fleet.controlled])
+        return np.where(np.isin(fleet.team, ours) & (len(ours) == 1) | fleet.controlled, np.nan, fear_s)
 
     def _seat(self, fleet: Fleet, boats: Boats) -> None:
         """Make room for the boats of a fleet; those that were there before keep what is remembered of them."""

@@ -61,6 +61,7 @@ class Work(NamedTuple):
         hunter: (5,) where a hunter is at the end of its run: x, y, m, heading as a unit vector, speed m/s.
         nobody: (n,) False.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
+        fear_s: (n,) time from now for which each opponent may do its worst before it holds its course, s.
         first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
         first_refuser: (n,) the same of the opponents that tables tell of, see `certificates.laying`.
         first_manner: (n, n) how it is followed first.
@@ -114,6 +115,7 @@ class Work(NamedTuple):
     hunter: Array
     nobody: BoolArray
     searched: IntArray
+    fear_s: Array
     first_hunter: IntArray
     first_refuser: IntArray
     first_manner: IntArray
@@ -171,6 +173,7 @@ def new_work(boats: int, samples: int) -> Work:
             hunter=np.zeros(5),
             nobody=np.zeros(boats, np.bool_),
             searched=np.full(boats, -1, np.int64),
+            fear_s=np.full(boats, np.inf),
             first_hunter=np.zeros(boats, np.int64),
             first_refuser=np.zeros(boats, np.int64),
             first_manner=np.zeros((boats, boats), np.int64),

@@ -147,7 +147,7 @@ def _run_hunter(
         (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
         sample_s,
         samples,
-        _adverse_samples(samples, boats),
+        _adverse_samples(samples, work.fear_s[j], boats),
         closely,
         closing(i, j, state, boats, tuning),
         work.radius[i, j],
@@ -161,11 +161,11 @@ def _run_hunter(
 
 
 @lean_kernel
-def _adverse_samples(samples: int, boats: Boats) -> int:
-    """Sample from which on hunters hold their course and speed: until then they may do their worst."""
-    if boats.adversary_s >= WHOLE_S:
+def _adverse_samples(samples: int, fear_s: float, boats: Boats) -> int:
+    """Sample from which on a hunter feared for so long holds its course and speed: until then it may do its worst."""
+    if fear_s >= WHOLE_S:
         return samples
-    return min(samples, math.ceil(boats.adversary_s / boats.sample_s))
+    return min(samples, math.ceil(fear_s / boats.sample_s))
 
 
 @lean_kernel

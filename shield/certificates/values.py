@@ -182,7 +182,7 @@ def margin_when_ready(
     value = table_value(
         boats.tables,
         table,
-        boats.adversary_s,
+        work.fear_s[j],
         x - path[k, 0],
         y - path[k, 1],
         ready[READY_HEADING],
@@ -208,7 +208,7 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boa
         value = table_value(
             boats.tables,
             table,
-            boats.adversary_s,
+            work.fear_s[j],
             other[PLACE_X] - own[PLACE_X],
             other[PLACE_Y] - own[PLACE_Y],
             own[PLACE_HEADING],
@@ -253,7 +253,7 @@ def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
     return table_gradient(
         boats.tables,
         boats.table[i, j],
-        boats.adversary_s,
+        work.fear_s[j],
         other[PLACE_X] - own[PLACE_X],
         other[PLACE_Y] - own[PLACE_Y],
         own[PLACE_HEADING],

@@ -64,7 +64,15 @@ class MctfReader:
             controlled = controlled & ~driven
         # a copy: decisions are read after the step has moved the boats
         state = core.state[0].copy()
-        return Fleet(state, core.team, self._platforms, controlled, self.agent_ids, driven=driven_boats(core))
+        return Fleet(
+            state,
+            core.team,
+            self._platforms,
+            controlled,
+            self.agent_ids,
+            driven=driven_boats(core),
+            visiting=~core.on_side[0],
+        )
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind the env understands."""

@@ -97,7 +97,15 @@ class PyquaticusReader:
         teams = self._teams()
         driven = np.array([_driven(player) for player in players])
         ours = (teams == team) & ~driven
-        return Fleet(state, teams, self._platforms, ours, self.agent_ids, driven=driven_players(self.env, players))
+        return Fleet(
+            state,
+            teams,
+            self._platforms,
+            ours,
+            self.agent_ids,
+            driven=driven_players(self.env, players),
+            visiting=np.array([not player.on_own_side for player in players], np.bool_),
+        )
 
     def _teams(self) -> IntArray:
         return np.array([_team(player) for player in self.env.players.values()], dtype=np.int64)
