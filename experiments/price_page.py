@@ -13,6 +13,7 @@ from .tables import interval_text
 from .tally import RADII_M, breach_column
 
 STEM = "price"
+_DIALS = ("adversary_s", "visitor_s", "profile")
 _HEADS = (
     "feared, s",
     "changed, %",
@@ -30,7 +31,7 @@ _HEADS = (
 def is_dial(content: Mapping[str, Any]) -> bool:
     """Whether results are of an ablation that was told how long opponents are feared for."""
     shield = content.get("settings", {}).get("shield") or {}
-    return content.get("command") == "ablate" and bool({"adversary_s", "profile"} & set(shield))
+    return content.get("command") == "ablate" and bool(set(_DIALS) & set(shield))
 
 
 def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
@@ -44,7 +45,8 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
     words = (
         "How long an opponent may do its worst before it holds its course (`adversary_s`) decides what safety costs. "
         "Hits are entries into the distance kept, per game; differences are paired, shield on less off, same seeds; "
-        "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever."
+        "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is "
+        "for those on our side of the field (`visitor_s`), which can tag nobody there."
     )
     lines = ["# Safety and its price", "", MADE, "", words, ""]
     picture = folder / f"{STEM}.png"
@@ -56,7 +58,10 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
     return f"{STEM}.md", "\n".join(lines), [picture]
 
 
-_Run = tuple[float, Mapping[str, Any], Mapping[str, Any]]
+_Fear = tuple[float, float]
+"""How long opponents are feared for, and how long on our side of the field, s."""
+
+_Run = tuple[_Fear, Mapping[str, Any], Mapping[str, Any]]
 _Groups = dict[tuple[str, float, str], list[_Run]]
 
 
@@ -65,7 +70,8 @@ def _groups(found: Sequence[Mapping[str, Any]]) -> _Groups:
     groups: _Groups = {}
     for content in found:
         shield = content["settings"]["shield"]
-        fear_s = ShieldConfig.of(**{k: v for k, v in shield.items() if k in ("adversary_s", "profile")}).feared_s
+        config = ShieldConfig.of(**{k: v for k, v in shield.items() if k in _DIALS})
+        fear_s = config.feared_s, config.visitor_feared_s
         radius_m = float(shield.get("separation_m", RADII_M[0]))
         for summary in content["pairings"]:
             key = (content["settings"]["preset"], radius_m, summary["pairing"])
@@ -73,14 +79,19 @@ def _groups(found: Sequence[Mapping[str, Any]]) -> _Groups:
     return {key: sorted(groups[key], key=lambda run: run[0]) for key in sorted(groups)}
 
 
-def _row(fear_s: float, content: Mapping[str, Any], summary: Mapping[str, Any], radius_m: float) -> list[str]:
+def _told_fear(fear_s: _Fear) -> str:
+    always, visiting = fear_s
+    return f"{always:g}" if always == visiting else f"{always:g} / {visiting:g}"
+
+
+def _row(fear_s: _Fear, content: Mapping[str, Any], summary: Mapping[str, Any], radius_m: float) -> list[str]:
     metrics = summary["metrics"]
 
     def told(name: str, state: str) -> str:
         return interval_text(metrics[name][state]) if state in metrics.get(name, {}) else "-"
 
     return [
-        f"{fear_s:g}",
+        _told_fear(fear_s),
         told("changed_share", "on"),
         told(breach_column("opponent", radius_m), "on"),
         told(breach_column("teammate", radius_m), "on"),
@@ -108,7 +119,7 @@ def _plot(groups: _Groups, path: Path) -> None:
             values = [summary["metrics"][name][state]["value"] for _, _, summary in runs]
             axis.plot(changed, values, "o-", ms=4, label=f"{preset} {radius_m:g} m, {pairing}")
             for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True):
-                axis.annotate(f"{fear_s:g}", (x, y), fontsize=7, xytext=(3, 3), textcoords="offset points")
+                axis.annotate(_told_fear(fear_s), (x, y), fontsize=7, xytext=(3, 3), textcoords="offset points")
     hits.set_ylabel("hits with opponents, per game")
     net.set_ylabel("net of captures, on - off, per game")
     for axis in (hits, net):

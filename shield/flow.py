@@ -13,8 +13,8 @@ import numpy as np
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
+from .choosing import choose, forget_candidates, mark_answer, note_candidate, opposed
 from .jit import Array, BoolArray, copy_row, lean_kernel
-from .ladder import ladder, mark_answer
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .memory import Memory
 from .plan import BEST_EFFORT, ESCAPE, QP, Plan, unchanged
@@ -22,14 +22,14 @@ from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .right_of_way import forget_pressing, note_pressing
 from .scene import Boats, Scene, Tuning
-from .screening import lost, screen
+from .screening import screen
 from .work import Work
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the ladder takes over."""
 
-PASSES, TO_SOLVE, TO_ESCAPE = range(3)
-"""What is left to do once the wanted commands are screened: nothing, the program, or the ladder at once."""
+PASSES, TO_SOLVE, TO_BACK_UP = range(3)
+"""What is left to do once the wanted commands are screened: nothing, the program, or the backups at once."""
 
 NO_ANSWER, UNSAFE, SAFE = range(3)
 """What an answer of the program comes to: none that can be sent, or none but what failed already, one that fails the
@@ -94,21 +94,23 @@ def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) 
         mark_answer(count, QP, plan)
     else:
         count = pick_movers(ours, work, plan)
-        ladder(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
+        choose(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
     _tell_of_fixed_things(ours, work, plan)
     commit(state, ours, boats, tuning, memory, work, plan)
 
 
 @lean_kernel
 def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> int:
-    """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_ESCAPE`."""
+    """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_BACK_UP`."""
     boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
     if screen(state, wanted, margin_m, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan):
         plan.cause[:] = -1
         finish(scene, True, 0, state, ours)
         return PASSES
     _note_causes(ours, work, plan)
-    return TO_ESCAPE if lost(ours, memory, work) else TO_SOLVE
+    forget_candidates(plan)
+    note_candidate(ours, work, plan)
+    return TO_BACK_UP if opposed(ours, plan) else TO_SOLVE
 
 
 @lean_kernel
@@ -125,12 +127,12 @@ def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
 
 @lean_kernel
 def _as_before(count: int, boats: Boats, plan: Plan) -> bool:
-    """Whether some mover looks opponents up, and all movers' commands are those in ``plan.answer``, bit for bit."""
+    """Whether some mover looks opponents up, and all movers' commands are those in ``plan.escape``, bit for bit."""
     looking = False
     for m in range(count):
         i = plan.movers[m]
         looking = looking or boats.look[i] > 0
-        if plan.commands[i, 0] != plan.answer[i, 0] or plan.commands[i, 1] != plan.answer[i, 1]:
+        if plan.commands[i, 0] != plan.escape[i, 0] or plan.commands[i, 1] != plan.escape[i, 1]:
             return False
     return looking
 
@@ -145,11 +147,12 @@ def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) ->
     """
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
     for m in range(count):
-        copy_row(plan.answer[plan.movers[m]], plan.commands[plan.movers[m]])
+        copy_row(plan.escape[plan.movers[m]], plan.commands[plan.movers[m]])
     if not take_answer(z, count, state, boats, tuning, plan) or _as_before(count, boats, plan):
         return NO_ANSWER
     if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
         return SAFE
+    note_candidate(ours, work, plan)
     return UNSAFE
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .active_set import OPTIMAL, project
 from .certificates.assign import hold, recheck
 from .certificates.effort import ROW_COST, spend
@@ -15,17 +13,13 @@ from .memory import Memory
 from .plan import Plan
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn
-from .rows import BOX_ROW, FIXED_ROW, build_rows, inputs_of
+from .rows import build_rows, inputs_of
 from .scene import Boats, Fixed, Tuning
 from .screening import predict
 from .work import Work
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
-
-SLACK_COST = np.array([1e4, 1e2])
-"""Weight of the squared slack of boat rows and of fixed-thing rows when they cannot all hold."""
-
 
 @lean_kernel
 def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
@@ -102,38 +96,9 @@ def build(
 
 
 @lean_kernel
-def add_slack(count: int, rows: int, plan: Plan) -> int:
-    """Give rows their slack inputs, the last columns; returns the number of all inputs.
-
-    Every boat has one for its rows from boats that do not take part and one for those of fixed things, so that none is
-    let off by what another cannot do. Rows between boats that take part share one. Limits have none.
-    """
-    own, shared = 2 * count, 3 * count
-    beside, inputs = shared + 1, 4 * count + 1
-    for r in range(rows):
-        for s in range(own, inputs):
-            plan.C[r, s] = 0.0
-        if plan.kind[r] == BOX_ROW:
-            continue
-        place, other = plan.place[plan.label[r, 0]], plan.label[r, 1]
-        column = own + place
-        if plan.kind[r] == FIXED_ROW:
-            column = beside + place
-        elif other >= 0 and plan.place[other] >= 0:
-            column = shared
-        plan.C[r, column] = 1.0 / math.sqrt(SLACK_COST[plan.kind[r]])
-    plan.z0[own:inputs] = 0.0
-    return inputs
-
-
-@lean_kernel
 def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
-    """Solve the program by projection; relaxed with slack when it has no solution. False when neither works."""
+    """Solve the program by projection; False when it has no solution."""
     n = 2 * count
-    status = project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n])
-    if status == OPTIMAL:
-        return True
-    n = add_slack(count, rows, plan)
     return project(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n], plan.z[:n]) == OPTIMAL
 
 

@@ -31,8 +31,6 @@ class Plan(NamedTuple):
     answer: Array
     answer_held: Array
     escape: Array
-    escape_held: Array
-    keeps: BoolArray
     merit: Array
     cause: IntArray
     eased: Array
@@ -62,8 +60,6 @@ def new_plan(boats: int, rows: int) -> Plan:
             answer=np.zeros((boats, 2)),
             answer_held=np.zeros((boats, 3)),
             escape=np.zeros((boats, 2)),
-            escape_held=np.zeros((boats, 3)),
-            keeps=np.zeros(boats, np.bool_),
             merit=np.zeros(boats),
             cause=np.full(boats, -1, np.int64),
             eased=np.zeros((boats, 3)),
@@ -71,10 +67,10 @@ def new_plan(boats: int, rows: int) -> Plan:
             place=np.full(boats, -1, np.int64),
             moving=np.zeros(boats, np.bool_),
             gain=np.zeros((boats, 3)),
-            z_now=np.zeros(4 * boats + 1),
-            z0=np.zeros(4 * boats + 1),
-            z=np.zeros(4 * boats + 1),
-            C=np.zeros((rows, 4 * boats + 1)),
+            z_now=np.zeros(2 * boats),
+            z0=np.zeros(2 * boats),
+            z=np.zeros(2 * boats),
+            C=np.zeros((rows, 2 * boats)),
             d=np.zeros(rows),
             kind=np.zeros(rows, np.int64),
             label=np.zeros((rows, 2), np.int64),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from .certificates.assign import assign_plans
 from .certificates.clearance import FAR
 from .certificates.manoeuvre import look_around
-from .certificates.rating import STRAIGHT_SAFE
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .memory import Memory
 from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
@@ -97,17 +96,3 @@ def screen(
     for i in range(n):
         copy_row(plan.kept_commands[i], plan.commands[i])
     return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
-
-
-@lean_kernel
-def lost(ours: BoolArray, memory: Memory, work: Work) -> bool:
-    """Whether some boat is short of its margin, as it was on its escape: then the escape goes on until all is safe.
-
-    One step of the program cannot win back what no manoeuvre could; searching for it costs time and makes the boat
-    dither.
-    """
-    found = False
-    for i in range(ours.shape[0]):
-        short = memory.escaping[i] and memory.margin_m[i] < 0.0 and work.merit[i] < STRAIGHT_SAFE
-        found = found or (ours[i] and short)
-    return found

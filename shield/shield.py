@@ -21,7 +21,6 @@ from .fleet import Fleet, usable_drives
 from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
 from .limiting import tell_of_limits, within_limits
-from .linearised import add_slack
 from .memory import Memory, new_memory
 from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
@@ -362,12 +361,8 @@ class Shield:
         finish(scene, found == SAFE, count, state, ours)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
-        """Answer of the program, relaxed with slack when it has none."""
+        """Answer of the program, if it has one."""
         n = 2 * count
-        z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
-        if z is not None:
-            return z
-        n = add_slack(count, rows, plan)
         return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
 
     def _each(

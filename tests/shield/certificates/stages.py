@@ -38,6 +38,8 @@ def stages_of(config, state, platforms, team, surroundings=None):
     """Fresh stages for a fleet's state rows; the boats of team 0 are ours."""
     n = len(state)
     boats = boats_of(config, tuple(platforms), tuple(team))
+    work = new_work(n, path_samples(boats))
+    work.fear_s[:] = config.feared_s
     return Stages(
         state.copy(),
         np.array(team) == 0,
@@ -46,7 +48,7 @@ def stages_of(config, state, platforms, team, surroundings=None):
         plans_of(config),
         tuning_of(config),
         new_memory(n),
-        new_work(n, path_samples(boats)),
+        work,
         plan.new_plan(n, n * (n + 5) + 2),
     )
 
@@ -115,7 +117,7 @@ def built(at):
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
     count, found = 0, flow.SAFE if safe else flow.UNSAFE
-    for _ in range(0 if screening.lost(at.ours, at.memory, at.work) else flow.ROUNDS):
+    for _ in range(flow.ROUNDS):
         if found != flow.UNSAFE:
             break
         count, rows = built(at)
@@ -129,8 +131,4 @@ def decided(at, safe, solver="quadprog"):
 
 def _answer(at, count, rows, solver):
     n, plan = 2 * count, at.plan
-    z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
-    if z is None:
-        n = linearised.add_slack(count, rows, plan)
-        z = solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)
-    return z
+    return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), solver)

@@ -1,0 +1,107 @@
+"""Whom the shield fears for how long: by the settings, by where a boat is in a game, by what the caller says of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shield_loops import scattered
+from shield_scenes import bits, fleet_of, relative
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.exceptions import ConfigError, FleetError
+from steerclear.shield.fleet import Fleet
+from steerclear.shield.platforms import layout as L
+
+STRAIGHT = relative((3.0, 0.0), (3.0, 0.0))
+
+
+def near(**more):
+    """A surveyor of ours and an opponent that only a hunter's turn brings near, both at full thrust."""
+    fleet = fleet_of([(0.0, 0.0, 0.0, 3.0), (14.0, 14.0, 0.0, 3.0)], [0, 1], "surveyor")
+    state = fleet.state.copy()
+    state[:, L.THRUST] = 100.0
+    return replace(fleet, state=state, **more)
+
+
+def certificate_m(fleet, **settings):
+    return Shield(**settings).decide(fleet, STRAIGHT)[0].certificate_m
+
+
+@pytest.mark.parametrize(
+    ("settings", "always_s", "visiting_s"),
+    [
+        ({}, 12.0, 6.0),
+        ({"profile": "rammers"}, np.inf, np.inf),
+        ({"profile": "hold-course"}, 0.0, 0.0),
+        ({"adversary_s": 9.0}, 9.0, 9.0),
+        ({"visitor_s": 3.0}, 12.0, 3.0),
+        ({"adversary_s": 20.0, "visitor_s": 0.0}, 20.0, 0.0),
+    ],
+)
+def test_a_profile_says_both_and_one_dial_turns_both(settings, always_s, visiting_s):
+    config = ShieldConfig(**settings)
+    assert (config.feared_s, config.visitor_feared_s) == (always_s, visiting_s)
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, "6", True])
+def test_a_time_that_is_none_is_refused(value):
+    with pytest.raises(ConfigError, match="visitor_s"):
+        ShieldConfig(visitor_s=value)
+
+
+def test_a_visitor_is_feared_as_if_all_were_for_its_time():
+    visiting = near(visiting=np.array([False, True]))
+    assert certificate_m(visiting) == certificate_m(near(), adversary_s=6.0)
+    assert certificate_m(visiting) > certificate_m(near()) + 0.1, "else the scene shows nothing"
+
+
+def test_of_our_own_it_does_not_matter_where_they_are():
+    assert certificate_m(near(visiting=np.array([True, False]))) == certificate_m(near())
+
+
+def test_what_the_caller_says_of_a_boat_comes_first():
+    fleet = near(visiting=np.array([False, True]), adversary_s=np.array([np.nan, 20.0]))
+    assert certificate_m(fleet) == certificate_m(near(), adversary_s=20.0)
+    unsaid = near(adversary_s=np.array([np.nan, np.nan]))
+    assert certificate_m(unsaid) == certificate_m(near())
+
+
+def test_a_decision_says_how_long_it_feared_whom():
+    told = Shield().decide(near(visiting=np.array([False, True])), STRAIGHT)
+    assert [decision.feared_s for decision in told] == [None, 6.0]
+    assert [d.feared_s for d in Shield(profile="rammers").decide(near(), STRAIGHT)] == [None, np.inf]
+    assert [d.feared_s for d in Shield(certificate="braking").decide(near(), STRAIGHT)] == [None, 0.0]
+
+
+def test_it_is_told_in_the_fleets_order():
+    fleet = fleet_of([(0.0, 0.0, 0.0, 1.0), (30.0, 0.0, 0.0, 1.0), (0.0, 30.0, 0.0, 1.0)], [1, 0, 1], names="cab")
+    fleet = replace(fleet, adversary_s=np.array([3.0, np.nan, 5.0]))
+    told = Shield().decide(fleet, relative((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
+    assert [decision.feared_s for decision in told] == [3.0, None, 5.0]
+
+
+@pytest.mark.parametrize("more", [{"adversary_s": [0.0, -1.0]}, {"adversary_s": [1.0]}, {"visiting": [0.0, 0.5]}])
+def test_what_cannot_be_is_refused(more):
+    with pytest.raises(FleetError, match=next(iter(more))):
+        Fleet.of(
+            position_m=[[0, 0], [9, 9]], heading_deg=[0, 0], speed_mps=[1, 1], team=[0, 1], platforms="heron", **more
+        )
+
+
+def test_a_batch_fears_as_single_decisions_do():
+    random, count = np.random.default_rng(3), 40
+    platforms, team = ("surveyor",) * 3, (0, 1, 1)
+    states = scattered(random, count, list(platforms), 30.0, gap_m=6.0)
+    wanted = np.zeros((count, 3, 2))
+    wanted[..., 0] = 3.0
+    ours = np.broadcast_to(np.array([True, False, False]), (count, 3)).copy()
+    visiting = random.uniform(size=(count, 3)) < 0.5
+    guard = BatchedShield(ShieldConfig(), count, platforms, team)
+    sent = guard.decide(states, wanted, ours, visiting)
+    for b in range(count):
+        fleet = Fleet(states[b], np.array(team), platforms, ours[b], ("a", "b", "c"), visiting=visiting[b])
+        one = Shield().decide(fleet, relative(*wanted[b]))
+        assert bits(np.isinf(one.certificate_m)) == bits(np.isinf(guard.certificate_m[b]))
+        np.testing.assert_allclose(one.sent.values, sent[b], atol=1e-6)
+    plain = BatchedShield(ShieldConfig(), count, platforms, team).decide(states, wanted, ours)
+    assert (plain != sent).any(), "else visiting changes nothing"
