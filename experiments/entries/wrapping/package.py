@@ -15,9 +15,10 @@ from steerclear.shield.tables.files import find_table, load_table
 from steerclear.shield.tables.settings import OtherMay
 
 from .sources import ONBOARD, ROOT, STAND_INS, Source, sources
-from .translate import compiled_names, translate
+from .translate import compiled_names, small_functions, translate
 
-CREW = ("crew", "deck", "state")
+ONBOARD_NAME = f"{ROOT}.experiments.entries.onboard"
+CREW = ("crew", "state")
 """Modules of `onboard` that lie at the private package's top."""
 
 
@@ -29,13 +30,18 @@ def code() -> dict[str, str]:
         name: compiled_names(ast.parse(source.path.read_text())) if name not in STAND_INS else {"copy_row"}
         for name, source in found.items()
     }
+    short = {
+        name: small_functions(ast.parse(source.path.read_text()))
+        for name, source in found.items()
+        if name not in STAND_INS
+    }
     files = {f"{part}/__init__.py": "" for source in found.values() for part in _folders(source)}
     for source in found.values():
         if source.name in STAND_INS:
             files[f"{source.inside}.py"] = (ONBOARD / f"{STAND_INS[source.name]}.py").read_text()
         elif not source.is_package or source.name.count(".") > 1:
             inside = f"{source.inside}/__init__" if source.is_package else source.inside
-            files[f"{inside}.py"] = translate(source, compiled)
+            files[f"{inside}.py"] = translate(source, compiled, short)
     files["__init__.py"] = '"""The safety shield of steerclear, as plain Python. BSD-3-Clause."""\n'
     for name in CREW:
         files[f"{name}.py"] = (ONBOARD / f"{name}.py").read_text()
@@ -49,9 +55,7 @@ def _folders(source: Source) -> list[str]:
 
 def renamed(text: str, package: str) -> str:
     """A source whose imports of the shield are of the private package."""
-    for how in ("from", "import"):
-        text = text.replace(f"{how} {ROOT}.", f"{how} {package}.")
-    return text
+    return text.replace(f"from {ONBOARD_NAME}.", f"from {package}.").replace(f"from {ROOT}.", f"from {package}.")
 
 
 def data(platforms: Iterable[str | Platform]) -> dict[str, bytes]:

@@ -7,6 +7,7 @@
     a / b            ->  a / b if b else by_zero(a)
     math.sqrt(x)     ->  math_sqrt(x)
     f(x)             ->  plain_f(x)          of a compiled function f, on lists
+    clamp(x, a, b)   ->  b if x > b else ... of those that are short, see `inline`
 
 A function f that was compiled is there twice: as ``plain_f``, for its like, and as ``f``, for those who have arrays. The
 order of operations is left as it is, and so are the results, bit for bit where the compiler did the same.
@@ -19,6 +20,7 @@ import math
 from types import ModuleType
 from typing import Any
 
+from .inline import GREATER, LESSER, Inliner, Small, small
 from .sources import SHIELD, STAND_INS, Source
 
 DECORATORS = {"kernel", "lean_kernel"}
@@ -39,27 +41,36 @@ def _is_compiled(node: ast.FunctionDef) -> bool:
     return any(isinstance(one, ast.Name) and one.id in DECORATORS for one in node.decorator_list)
 
 
-def translate(source: Source, compiled: dict[str, set[str]]) -> str:
+def small_functions(tree: ast.Module) -> dict[str, Small]:
+    """The compiled functions of a module that are written out where they are called."""
+    _drop_words(tree)
+    found = {node.name: small(node) for node in tree.body if isinstance(node, ast.FunctionDef) and _is_compiled(node)}
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def translate(source: Source, compiled: dict[str, set[str]], short: dict[str, dict[str, Small]]) -> str:
     """The plain source of a module.
 
     Args:
         source: the module.
         compiled: names of compiled functions by full name of their module.
+        short: the same of those that are written out.
     """
     tree = ast.parse(source.path.read_text())
     _drop_words(tree)
-    known = set(compiled.get(source.name, ()))
+    known, written = set(compiled.get(source.name, ())), dict(short.get(source.name, {}))
     for node in tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
             of = {one.name for one in node.names} & compiled.get(source.imports(node), set())
             node.names = [one for one in node.names if one.name not in DECORATORS]
             node.names += [ast.alias(f"{PLAIN}{name}") for name in sorted(of)]
             known |= of
+            written |= {name: one for name, one in short.get(source.imports(node), {}).items() if name in of}
     if source.name in ON_ARRAYS:
         body = [part for node in tree.body for part in _as_it_is(node)]
     else:
         module = source.module()
-        body = [part for node in tree.body for part in _on_lists(node, module, known)]
+        body = [part for node in tree.body for part in _on_lists(node, module, known, written)]
     tree.body = _with_helpers([node for node in body if not _is_empty(node)], source, bool(known))
     return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
 
@@ -82,13 +93,13 @@ def _as_it_is(node: ast.stmt) -> list[ast.stmt]:
     return [node, *ast.parse(f"{PLAIN}{node.name} = {node.name}").body]
 
 
-def _on_lists(node: ast.stmt, module: ModuleType, known: set[str]) -> list[ast.stmt]:
+def _on_lists(node: ast.stmt, module: ModuleType, known: set[str], short: dict[str, Small]) -> list[ast.stmt]:
     if not isinstance(node, ast.FunctionDef) or not _is_compiled(node):
         return [node]
     name, node.name, node.decorator_list, node.returns = node.name, f"{PLAIN}{node.name}", [], None
     for argument in node.args.args:
         argument.annotation = None
-    _Function(node, module, known).visit(node)
+    _Function(node, module, known, short).visit(node)
     return [node, *ast.parse(f"{name} = entered({PLAIN}{name})").body]
 
 
@@ -106,8 +117,11 @@ def _with_helpers(body: list[ast.stmt], source: Source, needed: bool) -> list[as
 class _Function(ast.NodeTransformer):
     """Rewrites the body of one compiled function."""
 
-    def __init__(self, function: ast.FunctionDef, module: ModuleType, known: set[str]) -> None:
+    def __init__(
+        self, function: ast.FunctionDef, module: ModuleType, known: set[str], short: dict[str, Small]
+    ) -> None:
         self._module, self._known, self._temporaries = module, known, 0
+        self._short, self._inliner = {"min": LESSER, "max": GREATER, **short}, Inliner("of")
         names = {one.arg for one in function.args.args}
         self._local = names | {
             one.id for one in ast.walk(function) if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
@@ -151,6 +165,13 @@ class _Function(ast.NodeTransformer):
         for one in node.slice.elts[:-1]:
             value = ast.Subscript(value, one, ast.Load())
         return ast.Subscript(value, node.slice.elts[-1], node.ctx)
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        of = self._short.get(node.func.id) if isinstance(node.func, ast.Name) else None
+        self.generic_visit(node)
+        if of is None or len(node.args) != len(of.parameters) or node.keywords:
+            return node
+        return self._inliner.written_out(of, node.args) or node
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
