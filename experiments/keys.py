@@ -155,6 +155,16 @@ RESULTS = {
     "files.*": "what was written, relative to the folder",
 }
 
+ENTRY_WRAP = {
+    **_PROVENANCE,
+    "entry": "what was put behind the shield",
+    "zip": "the file written",
+    "bytes": "its size",
+    "package": "name of the private package in it, which tells one content from another",
+    "preset": "rules of the game it is for",
+    "shield.*": "every setting of the shield in it",
+}
+
 ENTRY_CHECK = {
     **_PROVENANCE,
     "entry": "what was checked",
@@ -286,6 +296,7 @@ KEYS = {
     "tournament": _TOURNAMENT,
     "entry check": ENTRY_CHECK,
     "entry report": RESULTS,
+    "entry wrap": ENTRY_WRAP,
     "play": PLAY,
     "parity": PARITY,
     "bench": BENCH,

@@ -14,6 +14,7 @@ from ..ablation import quick as small_version
 from ..entries.checking import check_entry
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
+from ..entries.wrapping.wrap import wrap_entry
 from ..match import play_match
 from ..pool import check_jobs, run_all
 from ..provenance import machine, versions
@@ -134,6 +135,31 @@ def report(
     if json_file is not None:
         write_json(json_file, results)
     check_complete(results)
+
+
+@app.command()
+@command
+def wrap(
+    entry: Entry,
+    out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; none may be there.")],
+    preset: o.Preset = "mctf2026",
+    separation: Annotated[float, typer.Option(metavar="M", help="Radius the shield keeps, m.")] = KEEPS_M,
+    profile: o.Profile = None,
+    shield_set: o.ShieldSet = None,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Put an entry behind the shield: a zip to hand in, which needs numpy and what the entry itself needs.
+
+    Exit status: 0 written, 2 bad input or an entry that cannot be loaded.
+    """
+    check_path(entry)
+    made = wrap_entry(entry, out_file, preset, o.shield_settings(separation, None, profile, None, shield_set))
+    settings = made["shield"]
+    console = out()
+    words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
+    console.print(words, markup=False, soft_wrap=True)
+    if json_file is not None:
+        write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})
 
 
 def _show(settings: AblationSettings, folder: Path, results: dict[str, Any], looks: int, processes: int) -> None:

@@ -1,0 +1,191 @@
+"""The crew of a shielded zip: asks the entry for its team's actions, and answers with safe ones.
+
+Nothing here may end a game. An action that is none, and one that the entry raises instead of, count as a command that
+is not finite: the shield tells that boat to stop, and keeps it clear meanwhile. Where the shield itself cannot decide
+(the state lacks a boat, or is normalised), the team's boats are told to stop. The log (standard error) says so, once.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.experiments.entries.onboard.state import Facts, Sight, fleet_of, see
+from steerclear.shield.actions import Command, Seat, read_action
+from steerclear.shield.commands import Commands
+from steerclear.shield.config import ShieldConfig
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.shield import Shield
+from steerclear.shield.surroundings import Surroundings
+
+logger = logging.getLogger("steerclear")
+
+Ask = Callable[[str], Any]
+STOP = (0.0, 0.0)
+JUMP_M = 5.0
+"""A boat that is farther than this beyond its reach from where it was, m, is in another game."""
+
+
+class Crew:
+    """Keeps one entry's boats apart, whichever team it plays.
+
+    Args:
+        facts: of the game.
+    """
+
+    def __init__(self, facts: Facts) -> None:
+        self._facts = facts
+        self._decks: dict[int, Deck] = {}
+
+    @classmethod
+    def packed(cls) -> Crew:
+        """The crew of the zip that this file is in."""
+        packed = json.loads((Path(__file__).parent / "facts.json").read_text())
+        crew = cls(Facts(**{name: _tuples(value) for name, value in packed.items()}))
+        crew._deck(0)  # what has to be read and worked out once is, before boats move
+        return crew
+
+    def action(self, ask: Ask, agent_id: Any, state: Mapping[Any, Any]) -> Any:
+        """The safe action of a boat, an array (speed m/s, relative heading deg).
+
+        Args:
+            ask: asks the entry for the action of one of its boats.
+            agent_id: the boat that is asked for.
+            state: the global state.
+        """
+        if agent_id not in self._facts.agent_ids:
+            _say_once(f"unknown boat {agent_id!r}: it is told to stop")
+            return np.array(STOP)
+        if (agent_id, "pos") not in state and isinstance(state.get(agent_id), Mapping):
+            state = state[agent_id]
+        place = self._facts.agent_ids.index(agent_id)
+        team = int(2 * place >= len(self._facts.agent_ids))
+        return np.array(self._deck(team).command(ask, place, state))
+
+    def _deck(self, team: int) -> Deck:
+        if team not in self._decks:
+            self._decks[team] = Deck(self._facts, team)
+        return self._decks[team]
+
+
+class Deck:
+    """The boats of one team: all are decided for when the first of them is asked for in a moment of the game.
+
+    Args:
+        facts: of the game.
+        team: 0 for blue, 1 for red.
+    """
+
+    def __init__(self, facts: Facts, team: int) -> None:
+        self._facts, self._team = facts, team
+        half = len(facts.agent_ids) // 2
+        self._places = range(team * half, (team + 1) * half)
+        stops = tuple(tuple(circle) for circle in facts.stops[team])
+        self._around = Surroundings((0.0, 0.0, *facts.size), stops=stops)
+        self._shield = Shield(ShieldConfig.of(**facts.shield))
+        self._answered: dict[int, Command] = {}
+        self._sight: Sight | None = None
+        self._disabled_s = np.zeros(2 * half)
+        self._get_ready()
+
+    def command(self, ask: Ask, place: int, state: Mapping[Any, Any]) -> Command:
+        """The safe command of a boat."""
+        try:
+            sight = see(self._facts, state)
+        except Exception as error:
+            _say_once(f"the global state cannot be read ({type(error).__name__}: {error}); all boats are told to stop")
+            return STOP
+        if place not in self._answered or self._sight is None or not np.array_equal(sight.rows, self._sight.rows, True):
+            self._answered = self._decide(ask, sight)
+        return self._answered.pop(place)
+
+    def _decide(self, ask: Ask, sight: Sight) -> dict[int, Command]:
+        """Safe commands of all boats of the team."""
+        self._follow(sight)
+        wanted = np.zeros((len(self._facts.agent_ids), 2))
+        for place in self._places:
+            wanted[place] = self._asked(ask, place, sight)
+        try:
+            fleet = fleet_of(self._facts, sight, self._team, self._disabled_s)
+            sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
+        except Exception as error:  # whatever it is, boats that nobody decides for must stop
+            _say_once(f"the shield could not decide ({type(error).__name__}: {error}); all boats are told to stop")
+            return dict.fromkeys(self._places, STOP)
+        return {
+            place: (float(sent[place, 0]), float(sent[place, 1])) if np.isfinite(sent[place]).all() else STOP
+            for place in self._places
+        }
+
+    def _asked(self, ask: Ask, place: int, sight: Sight) -> Command:
+        """The entry's command for a boat; not finite where it has none."""
+        name = self._facts.agent_ids[place]
+        try:
+            return read_action(self._seat(place, sight), ask(name))
+        except Exception as error:
+            _say_once(f"the entry has no usable action for {name} ({type(error).__name__}: {error}); it is told to stop")
+            return math.nan, math.nan
+
+    def _seat(self, place: int, sight: Sight) -> Seat:
+        top_mps = float(get_platform(self._facts.platforms[place]).max_speed_mps)
+        row = sight.rows[place]
+
+        def to_point(name: str) -> Command:
+            x, y = self._facts.points[name]
+            if self._team == 1:
+                x, y = self._facts.size[0] - x, self._facts.size[1] - y
+            bearing = math.degrees(math.atan2(x - row[L.X], y - row[L.Y]))
+            return top_mps, (bearing - row[L.HEADING] + 180.0) % 360.0 - 180.0
+
+        return Seat(name_of(self._facts, place), top_mps, to_point, tuple(self._facts.points), lowest=-17, longer=True)
+
+    def _follow(self, sight: Sight) -> None:
+        """Note for how long boats are disabled yet, at least; and that another game has begun."""
+        before, self._sight = self._sight, sight
+        if before is None or self._is_another_game(before, sight):
+            self._shield.reset()
+            self._disabled_s[:] = 0.0
+            return
+        fresh = sight.disabled & ~before.disabled
+        self._disabled_s = np.where(fresh, self._facts.power_s, self._disabled_s)
+        self._disabled_s = np.where(sight.disabled, np.maximum(self._disabled_s - self._facts.decision_s, 0.0), 0.0)
+
+    def _is_another_game(self, before: Sight, now: Sight) -> bool:
+        gone_m = np.hypot(*(now.rows[:, [L.X, L.Y]] - before.rows[:, [L.X, L.Y]]).T)
+        fastest = np.maximum(np.abs(before.rows[:, L.SPEED]), np.abs(now.rows[:, L.SPEED]))
+        return bool((gone_m > fastest * self._facts.decision_s + JUMP_M).any())
+
+    def _get_ready(self) -> None:
+        """One decision about boats far apart, which reads tables and works out what the boats can do."""
+        rows = np.zeros((len(self._facts.agent_ids), L.N_STATE))
+        rows[:, [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]] = math.nan
+        rows[:, L.X] = 10.0 + 20.0 * np.arange(len(rows))
+        rows[:, L.Y] = 30.0
+        nobody = np.zeros(len(rows), np.bool_)
+        fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody), self._team, self._disabled_s)
+        self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
+        self._shield.reset()
+
+
+def name_of(facts: Facts, place: int) -> str:
+    """Name of a boat."""
+    return facts.agent_ids[place]
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+_SAID: set[str] = set()
+
+
+def _say_once(words: str) -> None:
+    kind = words.partition("(")[0]
+    if kind not in _SAID:
+        _SAID.add(kind)
+        logger.warning("shielded entry: %s", words)

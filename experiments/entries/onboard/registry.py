@@ -1,0 +1,35 @@
+"""The boats of the game that the zip was made for, by name, from a file beside this one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from steerclear.shield.exceptions import PlatformError
+from steerclear.shield.platforms.platform import Gains, Platform
+from steerclear.shield.platforms.proving import reference_models
+
+
+def _platform(entries: dict[str, Any]) -> Platform:
+    pids = {name: Gains(**entries.pop(name)) for name in ("speed_pid", "heading_pid")}
+    points = tuple(tuple(point) for point in entries.pop("thrust_map"))
+    return Platform(thrust_map=points, **pids, **entries)
+
+
+with reference_models():  # those who packed them have tried them
+    _TEXT = (Path(__file__).parent / "platforms.json").read_text()
+    PLATFORMS: dict[str, Platform] = {entries["name"]: _platform(entries) for entries in json.loads(_TEXT)}
+
+
+def get_platform(name: str | Platform) -> Platform:
+    """The platform of that name; a `Platform` passes through.
+
+    Raises:
+        PlatformError: no platform has that name.
+    """
+    if isinstance(name, Platform):
+        return name
+    if name not in PLATFORMS:
+        raise PlatformError(f"unknown platform {name!r}; packed are {', '.join(sorted(PLATFORMS))}")
+    return PLATFORMS[name]

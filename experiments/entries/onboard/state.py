@@ -1,0 +1,122 @@
+"""The fleet as a competition's global state tells it: places, headings, speeds, and what the game drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from steerclear.shield.fleet import Fleet
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.wrappers.driving import inwards, time_until
+
+UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
+NORMALISED_M = 1.5
+"""Where no boat is farther than this from (0, 0), m, the state is normalised, and tells no metres."""
+
+
+class Facts(NamedTuple):
+    """What a zip knows of its game; lengths in m, times in s, speeds in m/s.
+
+    Attributes:
+        agent_ids: names of all boats, blue's first.
+        platforms: name of each boat's platform.
+        size: of the field.
+        marks: for each team, where its tagged boats are driven to: the nearest of these.
+        ends: for each team, the places near which its boats are untagged.
+        untag_m: how near.
+        oob_share: share of top speed at which boats are driven in.
+        tag_share: share at which tagged boats are.
+        power_s: how long a power play lasts.
+        decision_s: time from decision to decision.
+        points: named points of the field, in blue's naming.
+        stops: for each team, circles (x, y, radius) to keep out of.
+        shield: settings of the shield.
+    """
+
+    agent_ids: tuple[str, ...]
+    platforms: tuple[str, ...]
+    size: tuple[float, float]
+    marks: Any
+    ends: Any
+    untag_m: float
+    oob_share: float
+    tag_share: float
+    power_s: float
+    decision_s: float
+    points: Mapping[str, tuple[float, float]]
+    stops: Any
+    shield: Mapping[str, Any]
+
+
+class Sight(NamedTuple):
+    """All boats in one moment: (n, N_STATE) rows without autopilot memory, and (n,) what the game does with them."""
+
+    rows: Any
+    tagged: Any
+    oob: Any
+    disabled: Any
+
+
+def see(facts: Facts, state: Mapping[Any, Any]) -> Sight:
+    """Read the global state.
+
+    Raises:
+        KeyError, ValueError, TypeError: it lacks a boat, or tells no metres.
+    """
+    rows = np.zeros((len(facts.agent_ids), L.N_STATE))
+    rows[:, [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]] = math.nan
+    flags = np.zeros((3, len(facts.agent_ids)), np.bool_)
+    for i, name in enumerate(facts.agent_ids):
+        x, y = state[name, "pos"]
+        rows[i, [L.X, L.Y]] = float(x), float(y)
+        rows[i, L.HEADING], rows[i, L.SPEED] = float(state[name, "heading"]), float(state[name, "speed"])
+        flags[:, i] = state[name, "is_tagged"], state[name, "oob"], state.get((name, "is_disabled"), False)
+    if not np.isfinite(rows[:, : L.SPEED + 1]).all() or (np.abs(rows[:, [L.X, L.Y]]) <= NORMALISED_M).all():
+        raise ValueError("the global state is normalised or not finite; the shield needs it in metres")
+    return Sight(rows, *flags)
+
+
+def fleet_of(facts: Facts, sight: Sight, team: int, disabled_for_s: Any) -> Fleet:
+    """The fleet to decide for: the team's boats but those that the game drives."""
+    half = len(facts.agent_ids) // 2
+    teams = np.array([0] * half + [1] * half)
+    driven = sight.tagged | sight.oob | sight.disabled
+    rows = None
+    if driven.any():
+        rows = np.array([_drive(facts, sight, i, int(teams[i]), disabled_for_s[i]) for i in range(2 * half)])
+    ours = (teams == team) & ~driven
+    return Fleet(sight.rows, teams, facts.platforms, ours, facts.agent_ids, driven=rows)
+
+
+def _drive(facts: Facts, sight: Sight, i: int, team: int, disabled_for_s: float) -> tuple[float, float, float, float]:
+    """What drives a boat, as in `Fleet.driven`."""
+    if sight.disabled[i]:
+        return 0.0, math.nan, math.nan, disabled_for_s
+    if sight.tagged[i]:
+        return _home(facts, sight, i, team)
+    return _in(facts, sight, i) if sight.oob[i] else UNKNOWN
+
+
+def _home(facts: Facts, sight: Sight, i: int, team: int) -> tuple[float, float, float, float]:
+    x, y, speed = sight.rows[i, [L.X, L.Y, L.SPEED]].tolist()
+    share = min(facts.tag_share, facts.oob_share) if sight.oob[i] else facts.tag_share
+    commanded = share * _top_mps(facts, i)
+    marks = np.array(facts.marks[team], dtype=np.float64)
+    mark = marks[int(np.argmin(np.hypot(*(marks - (x, y)).T)))]
+    until_s = time_until(x, y, np.array(facts.ends[team]), facts.untag_m, max(commanded, speed))
+    return commanded, float(mark[0]), float(mark[1]), until_s
+
+
+def _in(facts: Facts, sight: Sight, i: int) -> tuple[float, float, float, float]:
+    x, y, speed = sight.rows[i, [L.X, L.Y, L.SPEED]].tolist()
+    commanded = facts.oob_share * _top_mps(facts, i)
+    place_x, place_y, beyond_m = inwards(x, y, np.array(facts.size))
+    return commanded, place_x, place_y, beyond_m / max(commanded, speed, 1e-6)
+
+
+def _top_mps(facts: Facts, i: int) -> float:
+    from steerclear.shield.platforms import get_platform
+
+    return float(get_platform(facts.platforms[i]).max_speed_mps)

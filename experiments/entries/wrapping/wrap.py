@@ -1,0 +1,146 @@
+"""A shielded zip out of an entry."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
+from steerclear.shield.exceptions import ConfigError
+
+from ..team import EntryTeam
+from .facts import facts_for
+from .package import code, data, renamed
+
+TEMPLATE = Path(__file__).parent.parent.parent / "templates" / "shielded_solution.txt"
+PREFIX = "steerclear_"
+"""Of private packages' names; the rest tells one content from another, so that two zips can meet in one process."""
+MARK = "crew.py"
+ANSWER_S = 30.0
+"""Time an entry has to be built when it is tried, s."""
+EPOCH = (2020, 1, 1, 0, 0, 0)
+
+
+def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> dict[str, Any]:
+    """Write a shielded zip of an entry, and try that it loads.
+
+    Args:
+        entry: folder or zip with ``solution.py``.
+        out: the zip to write.
+        preset: rules of the game it is for.
+        shield: settings of the shield that are not the default.
+
+    Returns:
+        What `keys.ENTRY_WRAP` describes.
+
+    Raises:
+        PolicyError: there is no entry, or it cannot be loaded.
+        ConfigError: the output exists or is no zip, the entry is shielded already, or a setting is unusable.
+    """
+    check_out(out)
+    facts = facts_for(preset, shield)
+    stage = Stage(entry)
+    try:
+        check_bare(stage.folder, entry)
+        EntryTeam(entry, ANSWER_S).close()
+        package, added = shielded_files(facts)
+        own = own_files(stage.folder, package)
+        write_zip(out, {**own, **added})
+    finally:
+        stage.close()
+    try:
+        EntryTeam(str(out), ANSWER_S).close()
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise
+    return {
+        "entry": entry,
+        "zip": str(out),
+        "bytes": out.stat().st_size,
+        "package": package,
+        "preset": preset,
+        "shield": facts["shield"],
+    }
+
+
+def check_out(out: Path) -> None:
+    """Check that a zip can be written there.
+
+    Raises:
+        ConfigError: it cannot.
+    """
+    if out.suffix != ".zip":
+        raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
+    if out.exists() or out.is_symlink():
+        raise ConfigError(f"{out} exists; give another name with --out, or remove it")
+    if not out.absolute().parent.is_dir():
+        raise ConfigError(f"there is no folder {out.absolute().parent} for --out; make it first")
+
+
+def check_bare(folder: Path, entry: str) -> None:
+    """Check that an entry has no shield yet.
+
+    Raises:
+        ConfigError: it has.
+    """
+    if any(folder.glob(f"{PREFIX}*/{MARK}")):
+        raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
+
+
+def shielded_files(facts: dict[str, Any]) -> tuple[str, dict[str, bytes]]:
+    """Name of the private package, and all files that a shielded zip has beside the entry's own."""
+    plain: dict[str, bytes] = {name: text.encode() for name, text in code().items()}
+    plain |= data(facts["platforms"])
+    plain["facts.json"] = json.dumps(facts).encode()
+    digest = hashlib.sha256()
+    for name in sorted(plain):
+        digest.update(name.encode() + b"\0" + plain[name])
+    package = PREFIX + digest.hexdigest()[:12]
+    files = {
+        f"{package}/{name}": renamed(content.decode(), package).encode() if name.endswith(".py") else content
+        for name, content in plain.items()
+    }
+    text = TEMPLATE.read_text().replace("ENTRY_FILE", f"{entry_name(package)}.py")
+    text = text.replace("ENTRY_NAME", entry_name(package)).replace("PACKAGE", package)
+    return package, {**files, ENTRY_FILE: text.encode()}
+
+
+def entry_name(package: str) -> str:
+    """Module name of the entry itself in its shielded zip."""
+    return f"unshielded_{package.removeprefix(PREFIX)}"
+
+
+def own_files(folder: Path, package: str) -> dict[str, Path]:
+    """The entry's own files by their names in the zip; its ``solution.py`` under another one."""
+    files: dict[str, Path] = {}
+    for place, folders, names in os.walk(folder, followlinks=True):
+        folders[:] = sorted(one for one in folders if one not in ("__pycache__", WORKING_DIR))
+        for name in sorted(names):
+            inside = (Path(place) / name).relative_to(folder).as_posix()
+            files[f"{entry_name(package)}.py" if inside == ENTRY_FILE else inside] = Path(place) / name
+    return files
+
+
+def write_zip(out: Path, files: dict[str, Any]) -> None:
+    """Write a zip of files, given by path or content; never leaves half of one under its name.
+
+    Raises:
+        ConfigError: it cannot be written.
+    """
+    part = out.with_name(out.name + ".part")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
+            for name, content in files.items():
+                raw = content.read_bytes() if isinstance(content, Path) else content
+                info = zipfile.ZipInfo(name, EPOCH)
+                info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+                packed.writestr(info, raw)
+        part.replace(out)
+    except OSError as error:
+        raise ConfigError(f"{out} cannot be written ({error}); give another place with --out") from error
+    finally:
+        part.unlink(missing_ok=True)
