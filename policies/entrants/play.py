@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,10 +15,10 @@ from .plane import Order, wrap
 from .sight import Sight, is_turned, look
 
 
-class EntrantTeam:
+class EntrantTeam(ABC):
     """A `TeamPolicy` that sees the live game in its own-end frame.
 
-    Subclasses override `decide`, and `begin` where they remember something between steps.
+    Subclasses give `decide`, and `begin` where they remember something between steps.
 
     Attributes:
         name: for records and reports.
@@ -62,9 +63,9 @@ class EntrantTeam:
             for agent_id, boat, (speed, heading) in zip(self._ids, sight.own, orders, strict=True)
         }
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, sight: Sight) -> None:  # noqa: B027 (most entrants remember nothing)
         """Begin a game at what is seen of its start."""
 
+    @abstractmethod
     def decide(self, sight: Sight) -> list[Order]:
         """An order for each own boat."""
-        raise NotImplementedError
