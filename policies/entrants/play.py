@@ -23,7 +23,7 @@ class EntrantTeam(ABC):
     Attributes:
         name: for records and reports.
         seed: of the game, set before `begin`.
-        dt_s: the game's step, s.
+        dt_s: time between decisions, s.
     """
 
     name = "entrant"
@@ -45,7 +45,7 @@ class EntrantTeam(ABC):
             raise PolicyError(f"entrant {self.name!r} plays whole teams; give all of its boats, got {list(agent_ids)}")
         self._ids, self.team = sorted(agent_ids, key=self.core.config.agent_ids.index), int(self.core.team[boats[0]])
         self._turn = math.pi if is_turned(self.core, self.team) else 0.0
-        self.seed, self.dt_s = seed, self.core.config.dt_s
+        self.seed, self.dt_s = seed, self.core.config.decision_s
         self.begin(look(self.core, self.team))
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

@@ -14,6 +14,7 @@ from steerclear.policies.entrants import catalogue, plane
 from steerclear.policies.entrants.chao import pddl
 from steerclear.policies.entrants.chao.grid import GridProblem
 from steerclear.policies.entrants.chao.search import bolt, search, way_home
+from steerclear.policies.entrants.lucas.model import home_of
 from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.sight import Boat, look
@@ -252,3 +253,30 @@ def test_what_the_planner_is_given_holds_every_cell_of_a_shortest_way():
         cells = set(pddl.cells_of(problem))
         assert way is None or set(way) <= cells
         assert not cells & problem.blocked
+
+
+@pytest.mark.parametrize(("side", "corner"), [("blue", (10.0, 70.0)), ("red", (150.0, 10.0))])
+@pytest.mark.parametrize("name", ["chao", "options"])
+def test_a_carrier_takes_the_flag_to_the_nearer_corner_where_it_counts_there(name, side, corner):
+    env = MctfEnv("mctf2026")
+    carrier, place = ("agent_1", (60.0, 60.0)) if side == "blue" else ("agent_4", (100.0, 20.0))
+    env.reset(seed=1)
+    number = env.possible_agents.index(carrier)
+    env.core.state[0, number, :2] = place  # back from the other side
+    env.core.has_flag[0, number] = env.core.on_side[0, number] = True
+    team = policies.make(name)
+    team.reset(env, env.possible_agents[SIDES[side]], 1)
+    speed, bearing = team.act({}, {})[carrier]
+    heading = env.core.state[0, number, 2] + bearing
+    towards = math.degrees(math.atan2(corner[0] - place[0], corner[1] - place[1]))
+    assert speed > 0.0
+    assert (heading - towards + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-6)
+
+
+def test_lucas_plans_home_to_a_corner_and_in_decisions_of_a_second():
+    env = MctfEnv("mctf2026")
+    env.reset(seed=1, options={"init_dict": {"agent_position": {"agent_1": (60.0, 60.0)}}})
+    team = policies.make("lucas", population=2, generations=1, horizon=2)
+    team.reset(env, env.possible_agents[SIDES["blue"]], 1)
+    assert team.dt_s == 1.0
+    np.testing.assert_allclose(home_of(env.core, 0, 1), (10.0, 70.0))

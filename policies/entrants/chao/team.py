@@ -7,7 +7,7 @@ import math
 from steerclear.shield.exceptions import PolicyError
 
 from ..catalogue import entrant
-from ..plane import STOP_MPS, Order, heading_to
+from ..plane import STOP_MPS, Order, dock, heading_to
 from ..play import EntrantTeam
 from ..sight import Boat, Sight
 from .follow import farthest
@@ -117,7 +117,9 @@ class Chao(EntrantTeam):
 
     def _follow(self, sight: Sight) -> Order:
         boat = sight.own[self._middle]
-        here = cell_at(sight, boat.at)
+        here, at = cell_at(sight, boat.at), dock(boat, sight)
+        if boat.carries and boat.on_side and at is not None:
+            return boat.top, heading_to(boat.at, at)  # in the own zone nobody tags it: plans end at the line
         if here in self._plan[: 1 if self._aim is None else self._aim + 1]:
             self._plan, self._aim = self._plan[self._plan.index(here) + 1 :], None
         if not self._plan:
