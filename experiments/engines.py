@@ -113,9 +113,17 @@ def _outcomes(
             job = running.pop(reference)
             try:
                 code, outcome = ray.get(reference)
+            except ray.exceptions.RayTaskError as error:  # before the job began: its code or data cannot be read there
+                yield Outcome(job, None, f"a node could not begin it: {_last_line(error)}")
+                continue
             except ray.exceptions.RayError:
                 yield Outcome(job, None, DIED)
                 continue
             if code != own:
                 raise ConfigError("a node of the cluster runs other code or packages; install the same on all nodes")
             yield outcome
+
+
+def _last_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[-1].strip()[:300] if lines else type(error).__name__

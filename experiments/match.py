@@ -20,6 +20,7 @@ from steerclear.shield.platforms import layout as L
 from .entries.team import make_team
 from .judging import StateLog, judge_game
 from .openings import opening
+from .playing_env import PlayingEnv, live_view, read_infos
 from .score import scores
 from .seat import Failures, Seat
 from .shielding import Seen, Shielding, shield_game
@@ -61,7 +62,7 @@ class Match:
     def __init__(self, spec: MatchSpec, render_mode: str | None = None, speedup: float = 1.0) -> None:
         self.spec = spec
         self.speedup = speedup
-        self.env = MctfEnv(spec.config(), render_mode=render_mode)
+        self.env = PlayingEnv(spec.config(), render_mode=render_mode)
         self.shielding: Shielding = shield_game(self.env, spec)
         ids = self.env.possible_agents
         size = self.env.config.team_size
@@ -105,13 +106,15 @@ class Match:
 
     def _start(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         spec = self.spec
+        self.env.tells = read_infos(seat.policy for seat in self.teams)
         options = None if spec.fixed_start else {"init_dict": opening(self.env.config, spec.seed)}
         answer = self.shielding.env.reset(seed=spec.seed, options=options)
         self.shielding.listen(self._note_commands)
         for number, team in enumerate(self.teams):
             team.reset(self.shielding.env, 2 * spec.seed + number)
         meta = self._meta()
-        self._recorder.start(self.env.view(), meta)
+        self._live = live_view(self.env.core)
+        self._recorder.start(self._live, meta)
         if self._log is not None:
             self._log.start(self.env.core)
         if self.env.renderer is not None:
@@ -167,7 +170,7 @@ class Match:
         if self._moment is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
-        self._recorder.step(self.env.view(), wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        self._recorder.step(self._live, wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
         if self._log is not None:
             self._log.step(self.env.core)
         if seen.solve_time_s is not None:

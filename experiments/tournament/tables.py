@@ -111,13 +111,13 @@ def price(results: Results) -> Table:
             _interval(line["net_captures"]),
             f"{number_text(line['hits_off'])} → {number_text(line['hits_on'])}",
             _interval(line["hits"]),
-            "-" if line["avoidable"] is None else f"{line['avoidable']} of {line['judged']} games",
+            "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
             {True: "yes", False: "no", None: "-"}[line["kept"]],
         ]
         for line in results["prices"]
     ]
-    heads = ["team", "net captures a game", "change", "hits a game", "change", "avoidable, shielded", "keeps 95 %"]
-    return "Price of safety, per team", heads, rows
+    heads = ["team", "net captures", "change", "hits", "change", "avoidable", "keeps 95 %"]
+    return "Price of safety, per team and game; avoidable hits in judged games", heads, rows
 
 
 def qualifying(results: Results) -> Table:

@@ -56,7 +56,7 @@ def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Bu
         team: its name in the paper's tables.
 
     Raises:
-        PolicyError: a name that is taken or that could be read as a path.
+        PolicyError: a name that is taken or that could be read as a path, or a class that cannot play.
     """
 
     def enter(build: Build) -> Build:
@@ -67,6 +67,9 @@ def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Bu
             raise PolicyError(
                 f"there is an entrant {name!r} already ({before.build.__qualname__}); choose another name"
             )
+        if inspect.isabstract(build):
+            missing = ", ".join(sorted(getattr(build, "__abstractmethods__", ())))
+            raise PolicyError(f"entrant {name!r} cannot play; give its class: {missing}")
         _ENTRANTS[name] = Entrant(name, description, team, build)
         return build
 

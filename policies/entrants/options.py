@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from steerclear.shield.exceptions import PolicyError
 
 from .catalogue import entrant
-from .plane import STOP_MPS, Order, ahead, clip, distance, go, heading_to, meeting_point
+from .plane import STOP_MPS, Order, ahead, clip, distance, dock, go, heading_to, meeting_point
 from .play import EntrantTeam
 from .posts import arc
 from .sight import Boat, Sight
@@ -62,7 +62,10 @@ def avoid(sight: Sight, number: int) -> Order:
 
 
 def retreat(sight: Sight, number: int) -> Order:
-    """Straight home."""
+    """Straight home; with the flag to where it counts."""
+    at = dock(sight.own[number], sight) if sight.own[number].carries else None
+    if at is not None:
+        return sight.own[number].top, heading_to(sight.own[number].at, at)
     return go(sight.own[number], sight.home, sight.keepout + sight.own[number].radius + 1.0)
 
 
@@ -119,7 +122,7 @@ def _pressed(sight: Sight, number: int) -> bool:
 
 def _at_home(sight: Sight, number: int) -> bool:
     boat = sight.own[number]
-    return distance(boat.at, sight.home) <= sight.reach and not boat.tagged
+    return distance(boat.at, sight.home) <= sight.reach and not boat.tagged and not boat.carries
 
 
 def _can_tag(sight: Sight, number: int) -> bool:

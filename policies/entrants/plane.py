@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .sight import Boat, Point
+from .sight import Boat, Point, Sight
 
 Order = tuple[float, float]
 """Speed m/s and absolute heading rad in the own-end frame."""
@@ -44,6 +44,11 @@ def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
     if way_m <= near_m:
         return STOP_MPS, boat.heading
     return boat.top * clip(way_m / SLOWING_M, SLOWEST, 1.0), towards
+
+
+def dock(boat: Boat, sight: Sight) -> Point | None:
+    """The nearest place that a flag has to be taken to; None where the own side is enough."""
+    return min(sight.docks, key=lambda point: distance(boat.at, point), default=None)
 
 
 def meeting_point(hunter: Boat, target: Boat) -> Point:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,15 +15,15 @@ from .plane import Order, wrap
 from .sight import Sight, is_turned, look
 
 
-class EntrantTeam:
+class EntrantTeam(ABC):
     """A `TeamPolicy` that sees the live game in its own-end frame.
 
-    Subclasses override `decide`, and `begin` where they remember something between steps.
+    Subclasses give `decide`, and `begin` where they remember something between steps.
 
     Attributes:
         name: for records and reports.
         seed: of the game, set before `begin`.
-        dt_s: the game's step, s.
+        dt_s: time between decisions, s.
     """
 
     name = "entrant"
@@ -44,7 +45,7 @@ class EntrantTeam:
             raise PolicyError(f"entrant {self.name!r} plays whole teams; give all of its boats, got {list(agent_ids)}")
         self._ids, self.team = sorted(agent_ids, key=self.core.config.agent_ids.index), int(self.core.team[boats[0]])
         self._turn = math.pi if is_turned(self.core, self.team) else 0.0
-        self.seed, self.dt_s = seed, self.core.config.dt_s
+        self.seed, self.dt_s = seed, self.core.config.decision_s
         self.begin(look(self.core, self.team))
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
@@ -62,9 +63,9 @@ class EntrantTeam:
             for agent_id, boat, (speed, heading) in zip(self._ids, sight.own, orders, strict=True)
         }
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, sight: Sight) -> None:  # noqa: B027 (most entrants remember nothing)
         """Begin a game at what is seen of its start."""
 
+    @abstractmethod
     def decide(self, sight: Sight) -> list[Order]:
         """An order for each own boat."""
-        raise NotImplementedError

@@ -58,6 +58,7 @@ class Sight:
         keepout: distance from the own flag that own boats keep while it is home, without their radius, m.
         line: the dividing line's x, m.
         time: game time, s.
+        docks: where a carrier has to take the flag, m; none where the own side is enough.
     """
 
     own: tuple[Boat, ...]
@@ -72,6 +73,7 @@ class Sight:
     keepout: float
     line: float
     time: float
+    docks: tuple[Point, ...] = ()
 
 
 def is_turned(core: BatchedMctf, team: int) -> bool:
@@ -103,7 +105,17 @@ def look(core: BatchedMctf, team: int) -> Sight:
         keepout=core.config.flag_keepout_m,
         line=0.5 * (place(homes[0])[0] + place(homes[1])[0]),
         time=float(core.time_s[0]),
+        docks=tuple(place(dock) for dock in docks_of(core, team)),
     )
+
+
+def docks_of(core: BatchedMctf, team: int) -> list[list[float]]:
+    """Where a team's carrier has to take the flag, in the field's own frame, m; empty where its own side is enough."""
+    rules, at = core.rules, core.config.capture_at
+    if at == "own_side":
+        return []
+    found = rules.corner_marks[team] if at == "own_corners" else rules.flag_home[team][None]
+    return [list(dock) for dock in found.tolist()]
 
 
 def _boats(core: BatchedMctf, place: object, turn: float) -> list[Boat]:

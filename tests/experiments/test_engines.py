@@ -2,6 +2,7 @@
 
 import os
 import time
+from pathlib import Path
 
 import pytest
 from steerclear.experiments import engines
@@ -49,8 +50,15 @@ def test_the_extra_is_named_where_ray_is_missing(monkeypatch):
         engine_of("ray", None, 2)
 
 
+@pytest.fixture
+def jobs_of_this_file(monkeypatch):
+    """Ray's workers import what a job calls, as they do with our own code; this file lies on no path of theirs."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+
+
 @pytest.mark.study
 @pytest.mark.filterwarnings("default")
+@pytest.mark.usefixtures("jobs_of_this_file")
 def test_ray_here_gives_what_the_pool_gives():
     pytest.importorskip("ray")
     found = {outcome.job: (outcome.answer, outcome.error) for outcome in RayEngine(2).run(double, range(6))}
@@ -59,6 +67,15 @@ def test_ray_here_gives_what_the_pool_gives():
 
 @pytest.mark.study
 @pytest.mark.filterwarnings("default")
+def test_a_job_that_no_node_can_read_says_why():
+    pytest.importorskip("ray")
+    outcome = next(RayEngine(1).run(double, [1]))
+    assert outcome.error == f"a node could not begin it: ModuleNotFoundError: No module named {__name__!r}"
+
+
+@pytest.mark.study
+@pytest.mark.filterwarnings("default")
+@pytest.mark.usefixtures("jobs_of_this_file")
 def test_a_node_killed_in_the_middle_costs_no_job():
     pytest.importorskip("ray")
     from ray.cluster_utils import Cluster

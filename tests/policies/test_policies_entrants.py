@@ -13,7 +13,8 @@ from steerclear.env.presets import PRESETS
 from steerclear.policies.entrants import catalogue, plane
 from steerclear.policies.entrants.chao import pddl
 from steerclear.policies.entrants.chao.grid import GridProblem
-from steerclear.policies.entrants.chao.search import search, way_home
+from steerclear.policies.entrants.chao.search import bolt, search, way_home
+from steerclear.policies.entrants.lucas.model import home_of
 from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.sight import Boat, look
@@ -194,3 +195,88 @@ def test_a_newcomer_is_a_policy_by_name(monkeypatch):
         policies.entrant("ohto", "another")(Rush)
     with pytest.raises(PolicyError, match="cannot be named 'a/b'"):
         policies.entrant("a/b", "a path")(Rush)
+    with pytest.raises(PolicyError, match="entrant 'idle' cannot play; give its class: decide"):
+        policies.entrant("idle", "says nothing")(type("Idle", (EntrantTeam,), {}))
+
+
+def test_another_package_enters_a_team_by_an_entry_point(tmp_path, monkeypatch, caplog):
+    (tmp_path / "their_team.py").write_text(
+        "from steerclear.policies import entrant\n"
+        "from steerclear.policies.entrants.play import EntrantTeam\n"
+        "@entrant('theirs', 'stays')\n"
+        "class Theirs(EntrantTeam):\n"
+        "    def decide(self, sight):\n"
+        "        return [(0.0, boat.heading) for boat in sight.own]\n"
+    )
+    info = tmp_path / "their_team-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: their-team\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{catalogue.GROUP}]\nteam = their_team\nbroken = there_is_no_such\n")
+    monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    catalogue._load_others.cache_clear()
+    try:
+        assert "theirs" in policies.names()
+        assert "entrants of there_is_no_such cannot be loaded: ModuleNotFoundError" in caplog.text
+        sent, _ = play("theirs", steps=2)
+        assert (sent[..., 0] == 0.0).all()
+    finally:
+        catalogue._load_others.cache_clear()
+
+
+def test_a_boat_with_the_flag_and_no_way_home_bolts():
+    shut = frozenset((8, row) for row in range(8))
+    problem = GridProblem((12, 3), True, FLAG, 8, frozenset(), shut)
+    assert search(problem) is None
+    assert bolt(problem) == [(11, 3), (10, 3), (9, 3), (8, 3), (7, 3)]
+
+
+def test_chao_takes_the_flag_of_holding_boats_home():
+    env = MctfEnv("aamas2024")
+    env.reset(seed=2)
+    team = policies.make("chao", planner="astar")
+    team.reset(env, env.possible_agents[SIDES["blue"]], 2)
+    env.core.tagging_cooldown_s[:] = 0.0  # they hold, and none of them can tag
+    for _ in range(900):
+        env.core.tagging_cooldown_s[0, 3:] = 0.0
+        actions = team.act({}, {})
+        env.core.advance(env.core.commands(env.decode(actions)[None]))
+        if env.core.captures[0, 0]:
+            break
+    team.close()
+    assert env.core.grabs[0, 0] == env.core.captures[0, 0] == 1
+
+
+def test_what_the_planner_is_given_holds_every_cell_of_a_shortest_way():
+    for problem in problems(40):
+        way = search(problem)
+        cells = set(pddl.cells_of(problem))
+        assert way is None or set(way) <= cells
+        assert not cells & problem.blocked
+
+
+@pytest.mark.parametrize(("side", "corner"), [("blue", (10.0, 70.0)), ("red", (150.0, 10.0))])
+@pytest.mark.parametrize("name", ["chao", "options"])
+def test_a_carrier_takes_the_flag_to_the_nearer_corner_where_it_counts_there(name, side, corner):
+    env = MctfEnv("mctf2026")
+    carrier, place = ("agent_1", (60.0, 60.0)) if side == "blue" else ("agent_4", (100.0, 20.0))
+    env.reset(seed=1)
+    number = env.possible_agents.index(carrier)
+    env.core.state[0, number, :2] = place  # back from the other side
+    env.core.has_flag[0, number] = env.core.on_side[0, number] = True
+    team = policies.make(name)
+    team.reset(env, env.possible_agents[SIDES[side]], 1)
+    speed, bearing = team.act({}, {})[carrier]
+    heading = env.core.state[0, number, 2] + bearing
+    towards = math.degrees(math.atan2(corner[0] - place[0], corner[1] - place[1]))
+    assert speed > 0.0
+    assert (heading - towards + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-6)
+
+
+def test_lucas_plans_home_to_a_corner_and_in_decisions_of_a_second():
+    env = MctfEnv("mctf2026")
+    env.reset(seed=1, options={"init_dict": {"agent_position": {"agent_1": (60.0, 60.0)}}})
+    team = policies.make("lucas", population=2, generations=1, horizon=2)
+    team.reset(env, env.possible_agents[SIDES["blue"]], 1)
+    assert team.dt_s == 1.0
+    np.testing.assert_allclose(home_of(env.core, 0, 1), (10.0, 70.0))

@@ -38,6 +38,11 @@ class GridProblem:
         return inside and cell not in self.blocked and cell not in self.watched
 
 
+def beside(cell: Cell) -> list[Cell]:
+    """Where the four moves lead, the field's edges not looked at."""
+    return [(cell[0] + column, cell[1] + row) for column, row in MOVES]
+
+
 def cell_at(sight: Sight, point: Point) -> Cell:
     """The cell of a point; of one outside the field the nearest."""
     column = int(point[0] / sight.size[0] * COLUMNS)
@@ -62,7 +67,7 @@ def problem_at(sight: Sight, planner: int, contact_m: float) -> GridProblem:
     cells = [(column, row) for column in range(COLUMNS) for row in range(ROWS)]
     start = cell_at(sight, boat.at)
     mates = {cell_at(sight, mate.at) for number, mate in enumerate(sight.own) if number != planner}
-    taggers = [foe for foe in sight.foes if _may_tag(foe)]
+    taggers = [foe for foe in sight.foes if _may_tag(foe, sight)]
     # the middle of the cell on the line counts as foreign: the zone begins where a boat surely is inside
     own = int(sight.line / sight.size[0] * COLUMNS)
     watched = {
@@ -76,5 +81,7 @@ def problem_at(sight: Sight, planner: int, contact_m: float) -> GridProblem:
     )
 
 
-def _may_tag(foe: Boat) -> bool:
-    return not foe.tagged and foe.recharged and foe.on_side
+def _may_tag(foe: Boat, sight: Sight) -> bool:
+    """Whether it may tag now, or will by the time a boat is there: near its base a tagged one is soon free again."""
+    soon_free = distance(foe.at, sight.base) < 2.0 * sight.reach
+    return foe.recharged and foe.on_side and (soon_free or not foe.tagged)

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
-from .grid import COLUMNS, MOVES, ROWS, Cell, GridProblem
+from .grid import Cell, GridProblem, beside
 
 TIMEOUT_S = 2.0
 """The planner itself gives up then, s."""
@@ -44,8 +44,8 @@ def available() -> bool:
 
 
 def problem_text(problem: GridProblem) -> str:
-    """The PDDL+ problem: cells with a mate are left out, watched ones are there and make contact."""
-    cells = [(c, r) for c in range(COLUMNS) for r in range(ROWS) if (c, r) not in problem.blocked]
+    """The PDDL+ problem of the cells that matter; watched ones among them are there and make contact."""
+    cells = cells_of(problem)
     known = set(cells)
     facts = [f"(at {_name(problem.start)})", *(["(carrying)"] if problem.carrying else [])]
     # nobody gains by moving off a watched cell, where contact ends the plan
@@ -53,7 +53,7 @@ def problem_text(problem: GridProblem) -> str:
         f"(next {_name(cell)} {_name(to)})"
         for cell in cells
         if cell not in problem.watched
-        for to in ((cell[0] + column, cell[1] + row) for column, row in MOVES)
+        for to in beside(cell)
         if to in known
     ]
     facts += _about("flag", problem.flag & known) + _about("watched", problem.watched & known)
@@ -63,6 +63,22 @@ def problem_text(problem: GridProblem) -> str:
     return (
         f"(define (problem now) (:domain capture-the-flag) (:objects {names} - cell) (:init {init}) (:goal (captured)))"
     )
+
+
+def cells_of(problem: GridProblem) -> list[Cell]:
+    """What can be reached without contact, the watched cells beside it, and no more of the own zone than a way needs.
+
+    The planner's time goes with the number of cells. A shortest way never turns back by more than a column in the own
+    zone, where only mates stand in it.
+    """
+    first = min(problem.start[0], problem.own - 1) - 1
+    seen, edge = {problem.start}, [problem.start]
+    while edge:
+        found = {to for cell in edge for to in beside(cell) if to[0] >= first and problem.open_to(to)} - seen
+        seen |= found
+        edge = list(found)
+    contacts = {to for cell in seen for to in beside(cell) if to in problem.watched}
+    return sorted(seen | contacts)
 
 
 def plan(problem: GridProblem, timeout_s: float = TIMEOUT_S) -> list[Cell] | None:

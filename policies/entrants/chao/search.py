@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 
-from .grid import MOVES, Cell, GridProblem
+from .grid import Cell, GridProblem, beside
 
 State = tuple[Cell, bool]
 
@@ -38,8 +38,7 @@ def way_home(problem: GridProblem) -> list[Cell] | None:
             return [cell for cell, _ in _pairs(came, inside)]
         further = []
         for cell in edge:
-            for column, row in MOVES:
-                to = (cell[0] + column, cell[1] + row)
+            for to in beside(cell):
                 if to not in seen and problem.open_to(to):
                     seen.add(to)
                     came[to] = cell
@@ -48,10 +47,15 @@ def way_home(problem: GridProblem) -> list[Cell] | None:
     return None
 
 
+def bolt(problem: GridProblem) -> list[Cell]:
+    """Straight into the own zone, whatever is in the way."""
+    column, row = problem.start
+    return [(to, row) for to in range(column - 1, problem.own - 2, -1)]
+
+
 def _following(problem: GridProblem, state: State) -> list[State]:
-    (column, row), carrying = state
-    cells = [(column + across, row + along) for across, along in MOVES]
-    return [(cell, carrying or cell in problem.flag) for cell in cells if problem.open_to(cell)]
+    here, carrying = state
+    return [(cell, carrying or cell in problem.flag) for cell in beside(here) if problem.open_to(cell)]
 
 
 def _least(problem: GridProblem, state: State) -> int:

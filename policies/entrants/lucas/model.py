@@ -10,6 +10,7 @@ from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import layout as L
 
 from ... import rollout as R
+from ..sight import docks_of
 
 STEP_S = 0.2
 """Step of the forward model, s: twice the game's, which costs a tenth of a metre over a plan and halves the time."""
@@ -43,10 +44,12 @@ class ForwardModel:
     """
 
     def __init__(self, core: BatchedMctf, rollouts: int, move_s: float, weights: Weights) -> None:
-        step_s = max(STEP_S, core.config.dt_s)
+        config = core.config
+        # decisions of several steps are played as they are: their relative headings are held through them
+        step_s = config.dt_s if config.decision_steps > 1 else max(STEP_S, config.dt_s)
         self._live, self._weights = core, weights
-        self._batch = BatchedMctf(core.config.replace(dt_s=step_s), n_games=rollouts, seed=0)
-        self._repeats = max(round(move_s / step_s), 1)
+        self._batch = BatchedMctf(config.replace(dt_s=step_s), n_games=rollouts, seed=0)
+        self._repeats = max(round(move_s / (step_s * config.decision_steps)), 1)
         n = core.n_boats
         self._wanted, self._commands = np.zeros((rollouts, n, 2)), np.zeros((rollouts, n, 2))
         self._touching, self._counted = np.zeros((rollouts, n, n)), np.zeros((rollouts, R.N_COUNTED))
@@ -73,5 +76,15 @@ class ForwardModel:
         games, rules = self._batch.games, self._batch.rules
         place = games.state[:, boat][:, [L.X, L.Y]]
         carrying = games.has_flag[:, boat] | games.is_tagged[:, boat]
-        aim = np.where(carrying[:, None], rules.flag_home[team], games.flag_position[:, 1 - team])
+        back = home_of(self._live, team, boat)
+        aim = np.where(carrying[:, None], back, games.flag_position[:, 1 - team])
         return np.asarray(1.0 - np.linalg.norm(place - aim, axis=1) / rules.size[0])
+
+
+def home_of(core: BatchedMctf, team: int, boat: int) -> Array:
+    """Where a boat takes the flag, m: the nearest dock from where it is now, else the base."""
+    docks = np.array(docks_of(core, team)).reshape(-1, 2)
+    if not len(docks):
+        return np.asarray(core.flag_home[team])
+    place = core.state[0, boat, [L.X, L.Y]]
+    return np.asarray(docks[int(np.linalg.norm(docks - place, axis=1).argmin())])

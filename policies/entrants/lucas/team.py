@@ -14,7 +14,7 @@ from ..plane import STOP_MPS, Order, distance, heading_to, wrap
 from ..play import EntrantTeam
 from ..sight import Boat, Sight
 from .evolution import Plans
-from .model import ForwardModel, Weights
+from .model import ForwardModel, Weights, home_of
 
 MOVE_S = 1.2
 HORIZON = 15
@@ -80,7 +80,7 @@ class Lucas(EntrantTeam):
     def _hints(self, boat: int) -> np.ndarray:
         """Macro-actions straight to the other flag and home, and a stop."""
         place, team = self.core.state[0, boat, :2], int(self.core.team[boat])
-        aims = (self.core.flag_position[0, 1 - team], self.core.flag_home[team])
+        aims = (self.core.flag_position[0, 1 - team], home_of(self.core, team, boat))
         headings = [math.degrees(math.atan2(aim[0] - place[0], aim[1] - place[1])) for aim in aims]
         return np.array([*(round(heading / 45.0) % HEADINGS for heading in headings), STOP], dtype=np.int64)
 

@@ -1,6 +1,10 @@
 """A tournament end to end, small: kept, gone on with, reported; what one team does reaches no other."""
 
+import json
+import subprocess
+import sys
 import textwrap
+import time
 
 import pytest
 from steerclear.experiments.keys import KEYS, undocumented
@@ -93,6 +97,28 @@ def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatc
     again.run()
     assert without_times(again.rows()) == without_times(whole.rows())
     assert str(results(again)["states"]) == str(results(whole)["states"])
+
+
+@pytest.mark.study
+def test_a_tournament_that_was_killed_goes_on_to_the_same_table(tmp_path):
+    command = [sys.executable, "-m", "steerclear.experiments.cli", "tournament", "--teams", "ohto,meo,hold"]
+    command += ["--shield", "off", "--max-time", "20", "--jobs", "1", "--no-replays", "--out"]
+    lines = tmp_path / "cut" / "games.jsonl"
+    killed = subprocess.Popen([*command, str(tmp_path / "cut")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 300.0
+    while time.monotonic() < deadline and not (lines.exists() and lines.read_bytes().count(b"\n") >= 2):
+        time.sleep(0.02)
+    killed.kill()
+    killed.wait(60.0)
+    kept = lines.read_bytes().count(b"\n")
+    assert 2 <= kept < 6
+    lines.write_bytes(lines.read_bytes() + b'{"key": "half a li')  # what a kill in the middle of a write leaves
+    for folder, more in (("cut", ["--resume"]), ("whole", [])):
+        subprocess.run([*command, str(tmp_path / folder), *more], check=True, capture_output=True, timeout=300.0)
+    cut, whole = (json.loads((tmp_path / folder / "results.json").read_text()) for folder in ("cut", "whole"))
+    assert cut["games_resumed"] == kept
+    assert cut["states"] == whole["states"]
+    assert cut["complete"]
 
 
 def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
