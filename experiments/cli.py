@@ -14,24 +14,18 @@ from .commands.attack import attack
 from .commands.bench import bench
 from .commands.console import leave_failed
 from .commands.demonstrate import demonstrate
-from .commands.deploy import deploy
 from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
-from .commands.fit import fit
 from .commands.parity import parity
 from .commands.platform import app as platform_app
 from .commands.play import play
-from .commands.preflight import preflight
 from .commands.reach import app as reach_app
-from .commands.referee import referee
 from .commands.render import render
-from .commands.replay import replay
-from .commands.sea_trial import sea_trial
-from .commands.sim_boats import sim_boats
 from .commands.tournament import tournament
 from .commands.warm_up import warm_up
+from .optional import optional_command
 from .provenance import package_version
 from .terminal import prepare
 
@@ -54,16 +48,11 @@ for function in (
     parity,
     bench,
     render,
-    deploy,
-    preflight,
-    replay,
-    referee,
-    fit,
     docs,
 ):
     app.command()(function)
-app.command("sim-boats")(sim_boats)
-app.command("sea-trial")(sea_trial)
+for name in ("deploy", "preflight", "replay", "referee", "fit", "sim-boats", "sea-trial"):
+    optional_command(app, name)
 app.command("warm-up")(warm_up)
 app.add_typer(reach_app, name="reach")
 app.add_typer(platform_app, name="platform")

@@ -60,7 +60,21 @@ def parts_of_all() -> list[tuple[str, Callable[[], object]]]:
         ("the game", lambda: play_match(game)),
         ("the judge", compile_oracle),
         ("encounters", lambda: measure("rammer_1", n=1)),
+        ("the reachability filter", lambda: measure("rammer_1", "reach", n=1, judge=False)),
     ]
+
+
+def compile_share(number: int, of: int) -> None:
+    """Compile everything beside ``of - 1`` other processes that do so: each begins elsewhere and waits for the others.
+
+    Args:
+        number: which of them this one is, from 0.
+        of: how many there are.
+    """
+    parts = parts_of_all()
+    first = number * len(parts) // of
+    for _, compile_it in parts[first:] + parts[:first]:
+        compile_it()
 
 
 def compile_part(part: WarmUp) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from steerclear.shield.exceptions import PolicyError
 
-from .entrants.catalogue import entrants
+from .entrants.listing import entrants
 from .registry import SB3_PREFIX, names
 
 RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"

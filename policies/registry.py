@@ -11,7 +11,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import PolicyError
 
-from .entrants.catalogue import entrants
+from .entrants.listing import entrants
 from .keyboard import KeyboardTeam, Keys
 from .protocol import BatchPolicy, TeamPolicy
 from .scripted.batch import ScriptedBatch

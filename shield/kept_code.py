@@ -26,6 +26,7 @@ from numba.core.caching import (
 )
 
 from .code_places import private_folder
+from .compile_turns import Turns
 from .compiling import COMPILING
 
 LOG = logging.getLogger(__name__)
@@ -52,6 +53,7 @@ class KeptCode(_Cache):
         self.name = f"{function.__module__}.{function.__qualname__}"
         self._own, self._remark = _own_cache(function)
         self._beside = _cache_beside(function, self._own)
+        self._turns = Turns(None if self._own is None else self._own._cache_file._index_path)
         COMPILING.knows(self.name)
 
     @property
@@ -74,7 +76,23 @@ class KeptCode(_Cache):
             cache._cache_file._source_stamp = stamp
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The code of a signature, None when it must be compiled."""
+        """The code of a signature, None when it must be compiled; what another process compiles is waited for."""
+        found = self._found(sig, target_context)
+        if found is None:
+            self._turns.take(sig)
+            found = self._found(sig, target_context)
+            if found is not None:
+                self._turns.give(sig)
+        if found is not None:
+            COMPILING.loaded(self.name)
+            return found
+        if self._remark:
+            _say("place", self._remark)
+        COMPILING.begins(self.name)
+        return None
+
+    def _found(self, sig: Any, target_context: Any) -> Any:
+        """The code of a signature, None when none is kept."""
         for cache in self._all:
             try:
                 found = cache.load_overload(sig, target_context)
@@ -84,22 +102,19 @@ class KeptCode(_Cache):
                 )
                 continue
             if found is not None:
-                COMPILING.loaded(self.name)
                 return found
-        if self._remark:
-            _say("place", self._remark)
-        COMPILING.begins(self.name)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code of a signature."""
         COMPILING.ended(self.name)
-        if self._own is None:
-            return
         try:
-            self._own.save_overload(sig, data)
+            if self._own is not None:
+                self._own.save_overload(sig, data)
         except Exception as error:  # the code itself is there and right
             _say("full", f"compiled code cannot be kept in {self._own.cache_path} ({_words(error)}): {ANEW}")
+        finally:
+            self._turns.give(sig)
 
     def enable(self) -> None:
         """Use what is kept."""

@@ -1,5 +1,8 @@
 """Fixtures that several folders of tests share."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from steerclear.env.config import GameConfig
@@ -7,6 +10,18 @@ from steerclear.env.record import find_breaches, make_record
 from steerclear.env.record_meta import meta_of
 
 REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
+
+COMPILING = "from steerclear.experiments.warming import compile_share; compile_share({}, {})"
+
+
+def pytest_configure(config):
+    """Compile before workers start (``-n``), a share in each of as many processes: they would else do it twice."""
+    workers = getattr(config.option, "numprocesses", None) or 0
+    if workers < 2 or hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, workers)]) for k in range(workers)]
+    for share in shares:  # what goes wrong is for the tests to tell
+        share.wait()
 
 
 @pytest.fixture

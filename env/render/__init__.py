@@ -1,14 +1,47 @@
-"""Pictures of a game: ``Renderer`` for a live one, ``save_frame`` and ``save_animation`` for a record."""
+"""Pictures of a game: ``Renderer`` for a live one, ``save_frame`` and ``save_animation`` for a record.
+
+Each is imported when it is asked for: what draws needs pygame (extra ``game``), films need ffmpeg (extra ``film``).
+"""
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from steerclear.shield.extras import missing
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # else importing pygame writes to standard output
 
-from steerclear.env.render.animation import save_animation, save_frame
-from steerclear.env.render.arena import Arena
-from steerclear.env.render.picture import Picture
-from steerclear.env.render.renderer import MODES, Renderer
-from steerclear.env.render.scene import Overlay, Scene
-from steerclear.env.render.theme import THEMES
+if TYPE_CHECKING:
+    from steerclear.env.render.animation import save_animation, save_frame
+    from steerclear.env.render.arena import Arena
+    from steerclear.env.render.picture import Picture
+    from steerclear.env.render.renderer import MODES, Renderer
+    from steerclear.env.render.scene import Overlay, Scene
+    from steerclear.env.render.theme import THEMES
 
 __all__ = ["MODES", "THEMES", "Arena", "Overlay", "Picture", "Renderer", "Scene", "save_animation", "save_frame"]
+_HOME = {
+    "MODES": "renderer",
+    "Renderer": "renderer",
+    "THEMES": "theme",
+    "Arena": "arena",
+    "Overlay": "scene",
+    "Scene": "scene",
+    "Picture": "picture",
+    "save_animation": "animation",
+    "save_frame": "animation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """One of the names, from the module that holds it.
+
+    Raises:
+        ConfigError: what it draws with is not installed; the message names the extra.
+    """
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    except ModuleNotFoundError as error:
+        raise missing(error, f"{__name__}.{name}") or error from error

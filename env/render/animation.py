@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 from PIL import Image
 from steerclear.env.record_file import read_meta, validate
@@ -16,6 +15,7 @@ from steerclear.env.render.scene import Scene
 from steerclear.env.render.theme import mix
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import missing
 
 FORMATS = (".mp4", ".gif")
 Progress = Callable[[int, int], None]
@@ -128,6 +128,10 @@ def _frames(
 
 
 def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
+    try:
+        import imageio_ffmpeg  # brings ffmpeg: only where a film is wanted
+    except ModuleNotFoundError as error:
+        raise missing(error, "a film (.mp4)") or error from error
     quality = ["-crf", "20", "-preset", "veryfast", "-movflags", "+faststart"]
     writer = imageio_ffmpeg.write_frames(
         os.fspath(path), size_px, fps=fps, codec="libx264", quality=None, output_params=quality, macro_block_size=1

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.platforms import PLATFORMS, get_platform
+from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import is_path
 
 from ..encounters.campaign import Campaign, Pair, Settings
@@ -141,7 +141,7 @@ def _pair(piece: str) -> Pair:
         return piece, piece
     for k in (k for k, letter in enumerate(piece) if letter == "/"):
         own, other = piece[:k], piece[k + 1 :]
-        known = [name in PLATFORMS or (is_path(name) and Path(name).is_file()) for name in (own, other)]
+        known = [name in known_platforms() or (is_path(name) and Path(name).is_file()) for name in (own, other)]
         if all(known):
             return own, other
     own, _, other = piece.partition("/")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.platforms import PLATFORMS, get_platform
+from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import PlatformFile, is_path, load_platform, to_text
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
 
@@ -50,7 +50,7 @@ def show(name: Annotated[str | None, typer.Argument(metavar="[NAME|FILE]", show_
     out().print(table)
     for kind, words in KIND_WORDS.items():
         out().print(f"{kind}: {words}", soft_wrap=True)
-    out().print(f"boats: {', '.join(sorted(PLATFORMS))}", soft_wrap=True)
+    out().print(f"boats: {', '.join(sorted(known_platforms()))}", soft_wrap=True)
 
 
 @app.command("check")

@@ -1,5 +1,5 @@
-"""The competition's teams, rebuilt from what its paper says of them; see `catalogue` for entering one."""
+"""The competition's teams, rebuilt from what its paper says of them: `catalogue` enters one, `listing` lists all."""
 
 from .catalogue import Entrant as Entrant
 from .catalogue import entrant as entrant
-from .catalogue import entrants as entrants
+from .listing import entrants as entrants

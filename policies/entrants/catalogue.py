@@ -1,23 +1,17 @@
-"""The competition's entrants by name: a decorator enters a team, an entry point of another package does too."""
+"""The competition's entrants by name: a decorator enters a team."""
 
 from __future__ import annotations
 
 import hashlib
 import inspect
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypeVar
 
 from steerclear.shield.exceptions import PolicyError
 
-GROUP = "steerclear.entrants"
-"""Entry points of this group name modules that hold ``@entrant`` classes."""
 Build = TypeVar("Build", bound=Callable[..., Any])
-logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -76,26 +70,6 @@ def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Bu
     return enter
 
 
-def entrants() -> dict[str, Entrant]:
-    """All entrants, ours first, then those of other packages."""
-    _load_ours()
-    _load_others()
+def entered() -> dict[str, Entrant]:
+    """Those entered so far."""
     return dict(_ENTRANTS)
-
-
-def _load_ours() -> None:
-    from . import alamer, chao, lucas, meo, ohto, options  # noqa: F401 (each enters its team)
-
-
-@cache
-def _load_others() -> None:
-    for point in entry_points(group=GROUP):
-        _load(point)
-
-
-def _load(point: EntryPoint) -> None:
-    """Load another package's entrants; what is broken there is said and costs no one else theirs."""
-    try:
-        point.load()
-    except Exception as error:  # another package may raise anything
-        logger.warning("entrants of %s cannot be loaded: %s: %s", point.value, type(error).__name__, error)

@@ -1,14 +1,25 @@
-"""The boats the package knows, by name: the files of ``shipped``, and the simulator's two integrators."""
+"""The boats the package knows, by name: the files of ``shipped``, the simulator's two integrators, registered ones."""
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
 
 from ..exceptions import PlatformError
 from .files import is_path, load_platform
 from .platform import Platform
 from .proving import reference_models
 
+GROUP = "steerclear.platforms"
+"""Entry points of this group name boats of other packages: a `Platform`, a function that builds one, or a module that
+registers some."""
+Boat = TypeVar("Boat", bound="Platform | str | Path | Callable[[], Platform]")
+LOG = logging.getLogger(__name__)
 SHIPPED = Path(__file__).parent / "shipped"
 
 with reference_models():  # proved by the tests: importing them compiles nothing
@@ -32,6 +43,34 @@ PLATFORMS: dict[str, Platform] = {
 HERON = PLATFORMS["heron"]
 
 
+def register_platform(boat: Boat) -> Boat:
+    """Make a boat known by its name, in this process; a decorator, too, of a function that builds one.
+
+    Args:
+        boat: the platform, its file (``.yaml``), or a function that builds it.
+
+    Returns:
+        What was given.
+
+    Raises:
+        PlatformError: another boat has that name, it could be read as a file's, or it is no boat.
+    """
+    found = boat() if callable(boat) else load_platform(boat).platform if isinstance(boat, str | Path) else boat
+    if not isinstance(found, Platform):
+        raise PlatformError(f"{found!r} is no platform; give a Platform, its file, or a function that builds one")
+    if is_path(found.name) or PLATFORMS.get(found.name, found) != found:
+        why = "ends like a file" if is_path(found.name) else "is another boat's"
+        raise PlatformError(f"a platform cannot be named {found.name!r}, which {why}; choose another name")
+    PLATFORMS.setdefault(found.name, found)
+    return boat
+
+
+def known_platforms() -> dict[str, Platform]:
+    """All boats by name: ours, those registered here, and those of other packages' entry points."""
+    _load_others()
+    return dict(PLATFORMS)
+
+
 def get_platform(name: str | Platform) -> Platform:
     """The platform of that name, or of that file (``.yaml``); a `Platform` passes through.
 
@@ -42,7 +81,26 @@ def get_platform(name: str | Platform) -> Platform:
         return name
     if isinstance(name, str) and is_path(name):
         return load_platform(name).platform
-    if not isinstance(name, str) or name not in PLATFORMS:
-        known = ", ".join(sorted(PLATFORMS))
+    if isinstance(name, str) and name in PLATFORMS:
+        return PLATFORMS[name]
+    boats = known_platforms()
+    if not isinstance(name, str) or name not in boats:
+        known = ", ".join(sorted(boats))
         raise PlatformError(f"unknown platform {name!r}; known platforms: {known}; or give a file, NAME.yaml")
-    return PLATFORMS[name]
+    return boats[name]
+
+
+@cache
+def _load_others() -> None:
+    for point in entry_points(group=GROUP):
+        _load(point)
+
+
+def _load(point: EntryPoint) -> None:
+    """Load another package's boats; what is broken there is said and costs no one else theirs."""
+    try:
+        found = point.load()
+        if not isinstance(found, ModuleType):  # a module registers its boats itself
+            register_platform(found)
+    except Exception as error:  # another package may raise anything
+        LOG.warning("platforms of %s cannot be loaded: %s: %s", point.value, type(error).__name__, error)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from .games_shield import games_shield
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
+from .readers import game_reader, reader_of
+from .reading import GameReader
 from .team_batch import TeamBatch
 from .vector_gym import MctfVectorEnv
 
@@ -14,12 +16,15 @@ if TYPE_CHECKING:
     from .vector_sb3 import MctfVecEnv as MctfVecEnv
 
 __all__ = [
+    "GameReader",
     "MctfVectorEnv",
     "ShieldedCallable",
     "ShieldedParallelEnv",
     "ShieldedTeamPolicy",
     "TeamBatch",
+    "game_reader",
     "games_shield",
+    "reader_of",
 ]
 
 

@@ -19,7 +19,8 @@ from ..game_facts import (
     with_distances,
 )
 from ..shield import Shield
-from .reading import GameReader, reader_of
+from .readers import reader_of
+from .reading import GameReader
 
 _INNER = ("env", "aec_env", "par_env")
 """Where PettingZoo's wrappers and conversions keep what they wrap."""

@@ -12,7 +12,8 @@ from ..game_facts import GameFacts
 from ..jit import Array
 from ..shield import Shield
 from .checks import check_unchanged, facts_now, refuse_second, shield_for
-from .reading import GameReader, one_game_shield, parallel_game, reader_of, team_number
+from .readers import reader_of
+from .reading import GameReader, one_game_shield, parallel_game, team_number
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types

@@ -15,7 +15,8 @@ from ..fleet import Fleet
 from ..game_facts import GameFacts
 from ..shield import Shield
 from .checks import check_unchanged, facts_now, shield_for
-from .reading import GameReader, one_game_shield, reader_of
+from .readers import reader_of
+from .reading import GameReader, one_game_shield
 
 logger = logging.getLogger(__name__)
 

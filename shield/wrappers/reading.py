@@ -91,26 +91,6 @@ def one_game_shield(shield: Any) -> Any:
     return shield
 
 
-def reader_of(env: Any) -> GameReader:
-    """The reader for an environment: ours, or a real Pyquaticus one.
-
-    Raises:
-        ConfigError: neither of the two.
-    """
-    from .mctf import MctfReader
-    from .pyquaticus import PyquaticusReader
-
-    base = getattr(env, "unwrapped", env)
-    if hasattr(base, "core") and hasattr(base, "command_filter"):
-        return MctfReader(base)
-    if hasattr(base, "players") and hasattr(base, "flag_homes"):
-        return PyquaticusReader(base)
-    raise ConfigError(
-        f"cannot read a game from {type(base).__name__}; give an MctfEnv, a Pyquaticus env, or use Shield.decide "
-        "with a Fleet of your own"
-    )
-
-
 def parallel_game(env: Any) -> Any:
     """The environment itself, if all boats of it act at once.
 

@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn, full_turn
 from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 from steerclear.shield.wrappers.policy import ShieldedTeamPolicy
-from steerclear.shield.wrappers.reading import reader_of
+from steerclear.shield.wrappers.readers import reader_of
 
 BLUE, RED = ("agent_0", "agent_1", "agent_2"), ("agent_3", "agent_4", "agent_5")
 SAME_M = 1e-6

@@ -1,0 +1,1 @@
+../../shield/root/__init__.py

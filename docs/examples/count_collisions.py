@@ -1,0 +1,9 @@
+"""Count collisions, and ask of each whether it was avoidable."""
+
+from steerclear.experiments.match import play_match
+from steerclear.experiments.spec import MatchSpec
+
+spec = MatchSpec("aamas2024", own="easy", opponent="rammer", seed=1, rules={"max_time_s": 60.0}, judge="all")
+row = play_match(spec).row
+print("entries into 2.5 m:", row["breaches"]["2.5"])
+print("judged in hindsight:", row["verdicts"])

@@ -1,0 +1,18 @@
+"""One decision: two boats head on."""
+
+import math
+
+from steerclear.shield import Commands, Fleet, Shield
+
+shield = Shield(separation_m=2.5)
+fleet = Fleet.of(
+    position_m=[[0, 0], [0, 5.5]],  # east, north
+    heading_rad=[0, math.pi],  # clockwise from north: head on
+    speed_mps=[2, 2],
+    team=[0, 1],  # ours, theirs
+    platforms="heron",
+    names=["ours", "theirs"],
+)
+wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])  # speed, heading: straight on
+d = shield.decide(fleet, wanted)[0]
+print(d.reason.name, f"{math.degrees(d.sent_heading_rad):.1f} deg", d.binding, f"margin {d.certificate_m:.3f} m")

@@ -1,0 +1,117 @@
+"""What a policy, a boat or a reader must be to be registered; each check raises with the first thing that is not so.
+
+Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mine")``, ``check_reader(make_env)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.policies.protocol import TeamPolicy
+from steerclear.shield.exceptions import SteerclearError
+from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.files import PlatformFile, parse_platform, to_text
+from steerclear.shield.wrappers import reader_of
+
+STEPS = 20
+
+
+class NotConforming(SteerclearError):
+    """Something registered is not what its registry promises."""
+
+
+def _hold(condition: bool, what: str) -> None:
+    if not condition:
+        raise NotConforming(what)
+
+
+def check_policy(name: str, preset: str = "aamas2024", **options: Any) -> None:
+    """A policy plays both sides, gives every boat a usable action, and the same ones again from the same seed.
+
+    Raises:
+        NotConforming: it does not.
+        PolicyError: it cannot be built.
+    """
+    for side in (0, 1):
+        games = [_actions_of(name, preset, side, options) for _ in range(2)]
+        _hold(games[0] == games[1], f"policy {name!r} gives other actions from the same seed; draw from reset's seed")
+
+
+def _actions_of(name: str, preset: str, side: int, options: dict[str, Any]) -> list[list[tuple[float, float]]]:
+    policy, env = policies.make(name, **options), MctfEnv(preset)
+    _hold(isinstance(policy, TeamPolicy), f"policy {name!r} is no TeamPolicy; give it name, reset and act")
+    _hold(policy.name == name, f"policy {name!r} calls itself {policy.name!r}; its name is what finds it")
+    observations, infos = env.reset(seed=1)
+    size = env.config.team_size
+    agents = env.possible_agents[side * size : (side + 1) * size]
+    policy.reset(env, agents, seed=3)
+    reader, played = policies.ActionReader(env), []
+    for _ in range(STEPS):
+        actions = policy.act(observations, infos)
+        _hold(set(actions) == set(agents), f"policy {name!r} answers for {sorted(actions)}, not for {agents}")
+        played.append([reader.command(agent, actions[agent]) for agent in agents])
+        observations, _, _, _, infos = env.step(actions)
+    env.close()
+    return played
+
+
+def check_platform(name: str | Platform) -> None:
+    """A boat is known by its name, is written to a file and read again the same, and stays finite and within its speed.
+
+    Raises:
+        NotConforming: it does not.
+        PlatformError: there is no such boat.
+    """
+    boat = get_platform(name)
+    if isinstance(name, str):
+        _hold(boat.name == name, f"platform {name!r} calls itself {boat.name!r}")
+    again = parse_platform(to_text(PlatformFile(boat, {}))).platform
+    _hold(again == boat, f"platform {boat.name!r} is another boat once it was written to a file and read")
+    params, state = boat.pack(), fresh_state(0.0, 0.0, 0.0, 0.0)
+    for error_deg in (0.0, 170.0, -170.0, 5.0):
+        for _ in range(100):
+            step_boat(params, state, boat.max_speed_mps, error_deg, 0.1)
+            _hold(bool(np.isfinite(state[: L.SPEED + 1]).all()), f"platform {boat.name!r} leaves the numbers")
+            fast = state[L.SPEED] > boat.max_speed_mps * (1.0 + 1e-9)
+            _hold(not fast, f"platform {boat.name!r} exceeds its top speed of {boat.max_speed_mps:g} m/s")
+
+
+def check_reader(make_env: Callable[[], Any]) -> None:
+    """A reader sees all boats, and lets commands through as they are when nothing filters them.
+
+    Args:
+        make_env: builds the environment; each one, reset with the same seed, is the same game.
+
+    Raises:
+        NotConforming: it does not.
+        ConfigError: nobody reads the environment, or no shield can be built for it.
+    """
+    plain, filtered = make_env(), make_env()
+    readers = [reader_of(env) for env in (plain, filtered)]
+    facts, seen = readers[0].facts(), []
+    for env in (plain, filtered):
+        env.reset(seed=5)
+    n = len(readers[0].agent_ids)
+    _hold(len(facts.team) == n == len(facts.radius_m), f"facts are of {len(facts.team)} boats, agent_ids of {n}")
+    moments = {readers[0].moment()}
+    for step in range(STEPS):
+        actions = {agent: (step + i) % 16 for i, agent in enumerate(readers[0].agent_ids)}
+        plain.step(readers[0].playable(actions))
+        with readers[1].filtering(lambda commands: seen.append(np.array(commands)) or commands):
+            filtered.step(readers[1].playable(actions))
+        _same_game(*(reader.fleet(0, True) for reader in readers), n)
+        moments.add(readers[0].moment())
+    _hold(len(moments) == STEPS + 1, "moment() is the same after a step; give the game's time")
+    _hold(bool(seen) and all(c.shape == (n, 2) for c in seen), f"filtering hands over no commands of shape ({n}, 2)")
+    for team in (0, 1):
+        readers[0].surroundings(team, True)
+
+
+def _same_game(plain: Any, filtered: Any, n: int) -> None:
+    _hold(len(plain.names) == n and bool(np.isfinite(plain.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
+    _hold(np.array_equal(plain.state, filtered.state), "the game is another one under a filter that changes nothing")

@@ -1,0 +1,72 @@
+"""Turns at compiling: what one process compiles, others that share the cache wait for instead of compiling it, too.
+
+A turn is an advisory lock on a file beside the kept code. The system gives it back when its holder dies. Nothing
+hangs on it: where there are no such locks, or the wait gets long, a function is compiled twice, which costs time only.
+Callees are compiled within their caller's turn and never call back, so nobody waits in a circle.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Hashable
+from pathlib import Path
+from typing import IO
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
+LONGEST_WAIT_S = 300.0
+_POLL_S = 0.02
+
+
+class Turns:
+    """The turns this process holds for one function.
+
+    Args:
+        path: where the lock files go, less their endings; None: nothing is kept, and nobody waits.
+    """
+
+    def __init__(self, path: str | None) -> None:
+        self._path = path
+        self._held: dict[Hashable, IO[str]] = {}
+
+    def take(self, key: Hashable) -> None:
+        """Wait until nobody else compiles the function for ``key``, a signature; look again for its code then."""
+        if self._path is None or fcntl is None or key in self._held:
+            return
+        digest = hashlib.sha256(str(key).encode()).hexdigest()[:12]
+        try:
+            file = open(f"{self._path}.{digest}.lock", "w")  # noqa: SIM115 (held until `give`)
+        except OSError:
+            return
+        if _locked(file):
+            self._held[key] = file
+        else:
+            file.close()
+
+    def give(self, key: Hashable) -> None:
+        """Let the next one go on."""
+        file = self._held.pop(key, None)
+        if file is None:
+            return
+        Path(file.name).unlink(missing_ok=True)
+        fcntl.flock(file, fcntl.LOCK_UN)  # a forked child has the file, too: closing ours alone would not do
+        file.close()
+
+
+def _locked(file: IO[str]) -> bool:
+    """Whether the lock was got in time."""
+    until = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < until:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(_POLL_S)
+        except OSError:  # a file system without locks
+            return False
+        else:
+            return True
+    return False

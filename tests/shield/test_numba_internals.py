@@ -1,0 +1,77 @@
+"""What of numba's inside is built on (`shield.kept_code`, `shield.shared`, `shield.jit`): a new version shows here."""
+
+import inspect
+
+import pytest
+from numba import njit
+from numba.core import caching, cgutils, config, imputils
+from numba.core.registry import cpu_target
+from numba.core.typing import templates
+from steerclear.shield.jit import copy_row, lean_kernel
+from steerclear.shield.kept_code import KeptCode, SealedFile
+
+
+def parameters(function):
+    return list(inspect.signature(function).parameters)
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (caching._Cache.load_overload, ["self", "sig", "target_context"]),
+        (caching._Cache.save_overload, ["self", "sig", "data"]),
+        (caching.IndexDataCacheFile.__init__, ["self", "cache_path", "filename_base", "source_stamp"]),
+        (caching.IndexDataCacheFile.save, ["self", "key", "data"]),
+        (caching.IndexDataCacheFile.load, ["self", "key"]),
+        (caching.IndexDataCacheFile._load_index, ["self"]),
+        (caching.IndexDataCacheFile._save_index, ["self", "overloads"]),
+        (caching.IndexDataCacheFile._load_data, ["self", "name"]),
+        (caching.IndexDataCacheFile._save_data, ["self", "name", "data"]),
+        (caching.InTreeCacheLocator.from_function, ["py_func", "py_file"]),
+        (caching.UserWideCacheLocator.__init__, ["self", "py_func", "py_file"]),
+    ],
+    ids=lambda value: getattr(value, "__qualname__", None),
+)
+def test_what_is_overridden_has_the_form_it_is_overridden_in(function, expected):
+    assert parameters(function) == expected
+
+
+def test_a_dispatcher_asks_the_cache_that_stands_in_its_place():
+    asked = []
+
+    class Listening(KeptCode):
+        def load_overload(self, sig, target_context):
+            asked.append(sig)
+
+        def save_overload(self, sig, data):
+            asked.append(data)
+
+    compiled = njit(lambda x: x + 1)
+    compiled._cache = Listening(test_a_dispatcher_asks_the_cache_that_stands_in_its_place)
+    assert compiled(1.5) == 2.5
+    assert len(asked) == 2
+
+
+def test_a_cache_has_the_attributes_that_are_replaced():
+    file = copy_row._cache._own._cache_file
+    assert isinstance(file, SealedFile)
+    assert {"_source_stamp", "_index_path", "_cache_path", "_version"} <= set(vars(file))
+    assert hasattr(config, "CACHE_DIR")
+
+
+def test_lean_kernels_are_compiled_without_counting():
+    assert lean_kernel(lambda x: x).targetoptions["_nrt"] is False
+
+
+@pytest.mark.parametrize(
+    "name", ["cgutils.alloca_once_value", "imputils.impl_ret_borrowed", "imputils.lower_getattr_generic"]
+)
+def test_helpers_of_shared_tuples_are_there(name):
+    module, _, function = name.partition(".")
+    assert callable(getattr({"cgutils": cgutils, "imputils": imputils}[module], function))
+
+
+def test_targets_and_templates_are_where_they_were():
+    assert cpu_target.typing_context is not None
+    assert callable(templates.infer_getattr)
+    assert issubclass(templates.AttributeTemplate, object)

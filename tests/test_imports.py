@@ -1,0 +1,72 @@
+"""What imports what: no circles, and ``shield/`` nothing of the rest."""
+
+import ast
+from pathlib import Path
+
+import pytest
+import steerclear.shield
+
+ROOT = Path(steerclear.shield.__file__).parent.parent
+FOLDERS = ("shield", "env", "policies", "experiments")
+KNOWN = {("steerclear.shield.shield", "steerclear.shield.wrappers")}
+"""Imports within a function that close a circle: `Shield.wrap` and `Shield.for_game` are short ways to the wrappers."""
+
+
+def module_of(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(("steerclear", *parts[: -1 if parts[-1] == "__init__" else None]))
+
+
+FILES = {module_of(path): path for name in FOLDERS for path in sorted((ROOT / name).rglob("*.py"))}
+
+
+def statements(tree):
+    """All imports, those within functions, too, but not those for types alone."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+        elif not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+            yield from statements(node)
+
+
+def imported(name):
+    """Our modules that a module imports, deepest first."""
+    path, found = FILES[name], set()
+    for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name in FILES}
+            continue
+        base = name.split(".")
+        base = base[: len(base) - node.level + (path.name == "__init__.py")] if node.level else []
+        source = ".".join([*base, *([node.module] if node.module else [])])
+        for alias in node.names:
+            whole = f"{source}.{alias.name}"
+            found |= {whole} if whole in FILES else {source} & FILES.keys()
+    return {other for other in found if other != name and not any(a == name and other.startswith(b) for a, b in KNOWN)}
+
+
+GRAPH = {name: imported(name) for name in FILES}
+
+
+def test_nothing_imports_itself_by_way_of_others():
+    left = {name: set(others) for name, others in GRAPH.items()}
+    while free := [name for name, others in left.items() if not others & left.keys()]:
+        for name in free:
+            del left[name]
+    asked = {other for others in left.values() for other in others}
+    assert sorted(left.keys() & asked) == []
+
+
+def test_a_circle_would_be_seen():
+    assert {"steerclear.shield.shield", "steerclear.shield.flow"} <= GRAPH.keys()
+    assert "steerclear.shield.config" in GRAPH["steerclear.shield.shield"]
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.startswith("steerclear.shield")])
+def test_the_shield_imports_nothing_of_the_rest(name):
+    assert not [other for other in GRAPH[name] if not other.startswith("steerclear.shield")]
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.startswith("steerclear.env")])
+def test_the_game_imports_nothing_of_policies_and_experiments(name):
+    assert not [other for other in GRAPH[name] if other.startswith(("steerclear.policies", "steerclear.experiments"))]

@@ -1,0 +1,98 @@
+"""The distribution: version, typed packages, a light base with extras, and what a source archive holds."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import numba
+import pytest
+import steerclear
+from packaging.specifiers import SpecifierSet
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import EXTRA_OF, missing
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+DISTRIBUTIONS = {"pygame": "pygame-ce", "imageio_ffmpeg": "imageio-ffmpeg", "stable_baselines3": "stable-baselines3"}
+BARE = """
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {modules!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Missing())
+sys.argv = ["steerclear", *{arguments!r}]
+from steerclear.experiments.cli import main
+main()
+"""
+
+
+def bare(*arguments):
+    """The command where no module of any extra is installed (pydantic is typer's own, too)."""
+    code = BARE.format(modules=set(EXTRA_OF) - {"pydantic"}, arguments=arguments)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_the_root_tells_the_version():
+    assert steerclear.__version__ == version("steerclear") == PROJECT["project"]["version"]
+
+
+def test_every_folder_with_code_is_a_package():
+    folders = {
+        path.parent for name in ("shield", "env", "policies", "experiments") for path in (ROOT / name).rglob("*.py")
+    }
+    named = PROJECT["tool"]["setuptools"]["package-dir"]
+    assert {path.relative_to(ROOT).as_posix() for path in folders} == set(named.values())
+    assert set(PROJECT["tool"]["setuptools"]["packages"]) == set(named)
+
+
+@pytest.mark.parametrize("folder", ["shield/root", "shield", "env", "policies", "experiments"])
+def test_packages_are_typed(folder):
+    assert (ROOT / folder / "py.typed").is_file()
+
+
+@pytest.mark.parametrize("module", EXTRA_OF)
+def test_the_extra_named_brings_the_module(module):
+    brought = {re.split(r"[<>=\[]", line)[0] for line in EXTRAS[EXTRA_OF[module]]}
+    assert DISTRIBUTIONS.get(module, module) in brought
+    told = missing(ModuleNotFoundError(name=f"{module}.sub"), "this")
+    assert isinstance(told, ConfigError)
+    assert f"pip install 'steerclear[{EXTRA_OF[module]}]'" in str(told)
+
+
+def test_other_modules_are_of_no_extra():
+    assert missing(ModuleNotFoundError(name="nowhere"), "this") is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "extra"),
+    [(("deploy", "FLEET.yaml", "--policy", "medium"), "boats"), (("fit", "LOG", "--out", "boat.yaml"), "boats")],
+)
+def test_without_its_extra_a_command_is_one_line_that_names_it(arguments, extra):
+    done = bare(*arguments)
+    assert done.returncode == 2, done.stderr
+    assert f"pip install 'steerclear[{extra}]'" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_base_runs_commands_that_need_no_extra():
+    done = bare("platform", "show")
+    assert done.returncode == 0, done.stderr
+    assert "heron" in done.stdout
+
+
+def test_numba_is_one_that_was_tested():
+    pinned = next(line for line in PROJECT["project"]["dependencies"] if line.startswith("numba"))
+    assert "<" in pinned
+    assert numba.__version__ in SpecifierSet(pinned.removeprefix("numba"))
+
+
+def test_a_source_archive_holds_tests_and_docs():
+    told = (ROOT / "MANIFEST.in").read_text(encoding="utf-8").split()
+    assert {"tests", "docs", "mkdocs.yml", "CONTRIBUTING.md", "CHANGELOG.md"} <= set(told)
