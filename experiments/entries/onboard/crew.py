@@ -128,7 +128,9 @@ class Deck:
         try:
             return read_action(self._seat(place, sight), ask(name))
         except Exception as error:
-            _say_once(f"the entry has no usable action for {name} ({type(error).__name__}: {error}); it is told to stop")
+            _say_once(
+                f"the entry has no usable action for {name} ({type(error).__name__}: {error}); it is told to stop"
+            )
             return math.nan, math.nan
 
     def _seat(self, place: int, sight: Sight) -> Seat:

@@ -65,9 +65,9 @@ class Inliner:
         """The call as an expression; None where something would not be worked out before it is used."""
         given: dict[str, ast.expr] = {}
         for name, argument in zip(of.parameters, arguments, strict=True):
-            if not isinstance(argument, (ast.Name, ast.Constant)):
-                if _uses(name, of.expression) > 1 and not _first_in_test(name, of.expression):
-                    return None
+            at_hand = isinstance(argument, (ast.Name, ast.Constant)) or _uses(name, of.expression) <= 1
+            if not at_hand and not _first_in_test(name, of.expression):
+                return None
             given[name] = argument
         return _Filled(given, self).visit(copy.deepcopy(of.expression))
 

@@ -9,8 +9,8 @@
     f(x)             ->  plain_f(x)          of a compiled function f, on lists
     clamp(x, a, b)   ->  b if x > b else ... of those that are short, see `inline`
 
-A function f that was compiled is there twice: as ``plain_f``, for its like, and as ``f``, for those who have arrays. The
-order of operations is left as it is, and so are the results, bit for bit where the compiler did the same.
+A function f that was compiled is there twice: as ``plain_f``, for its like, and as ``f``, for those who have arrays.
+The order of operations is left as it is, and so are the results, bit for bit where the compiler did the same.
 """
 
 from __future__ import annotations
@@ -117,9 +117,7 @@ def _with_helpers(body: list[ast.stmt], source: Source, needed: bool) -> list[as
 class _Function(ast.NodeTransformer):
     """Rewrites the body of one compiled function."""
 
-    def __init__(
-        self, function: ast.FunctionDef, module: ModuleType, known: set[str], short: dict[str, Small]
-    ) -> None:
+    def __init__(self, function: ast.FunctionDef, module: ModuleType, known: set[str], short: dict[str, Small]) -> None:
         self._module, self._known, self._temporaries = module, known, 0
         self._short, self._inliner = {"min": LESSER, "max": GREATER, **short}, Inliner("of")
         names = {one.arg for one in function.args.args}

@@ -1,0 +1,198 @@
+"""``entry wrap``: a shielded zip runs where only numpy is, and decides as the compiled shield does."""
+
+import ast
+import json
+import math
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import alone
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.experiments import cli
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.entries.onboard import program
+from steerclear.experiments.entries.wrapping.facts import facts_for
+from steerclear.experiments.entries.wrapping.inline import Inliner, small
+from steerclear.experiments.entries.wrapping.package import code
+from steerclear.experiments.entries.wrapping.sources import sources
+from steerclear.experiments.keys import KEYS, undocumented
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
+from steerclear.shield import shield as shield_module
+from typer.testing import CliRunner
+
+STATES = Path(__file__).parents[2] / "data" / "plain_states.npz"
+CHASE = """
+    import numpy as np
+    from helper import TOP
+    class Net: pass
+    class solution:
+        def __init__(self): self.asked = []
+        def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
+            self.asked.append(agent_id)
+            away = np.array([80.0, 40.0]) - global_state[agent_id, "pos"]
+            bearing = np.degrees(np.arctan2(*away))
+            return TOP, float((bearing - global_state[agent_id, "heading"] + 180) % 360 - 180)
+"""
+"""An entry that sends all its boats to one place."""
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, ["entry", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def folder_of_entry(tmp_path_factory):
+    import textwrap
+
+    folder = tmp_path_factory.mktemp("bare") / "team"
+    folder.mkdir()
+    (folder / "solution.py").write_text(textwrap.dedent(CHASE))
+    (folder / "helper.py").write_text("TOP = 3.0\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wrapped(folder_of_entry, tmp_path_factory):
+    """A shielded zip, what was told of it, and a folder it is unpacked in."""
+    place = tmp_path_factory.mktemp("wrapped")
+    done = run("wrap", folder_of_entry, "--out", place / "s.zip", "--profile", "rammers", "--json", place / "s.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    with zipfile.ZipFile(place / "s.zip") as packed:
+        packed.extractall(place / "unpacked")
+    return place / "s.zip", json.loads((place / "s.json").read_text()), place / "unpacked"
+
+
+def answers_alone(folder, what, tmp_path):
+    out = tmp_path / f"{what}.npy"
+    command = [sys.executable, "-W", "error", alone.__file__, str(folder), what, str(STATES), str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    return np.load(out), done.stderr
+
+
+def test_it_decides_as_the_compiled_shield_does_where_only_numpy_is(wrapped, tmp_path, monkeypatch):
+    sent, _ = answers_alone(wrapped[2], "shield", tmp_path)
+    monkeypatch.setattr(shield_module, "solve", program.solve)  # as batches of games solve their programs
+    settings = ShieldConfig.of(**wrapped[1]["shield"])
+    recorded = dict(np.load(STATES))
+    expected = alone.decide(Shield(settings), Fleet, Commands, Surroundings, recorded)
+    assert np.abs(sent - expected).max() <= 1e-6
+    assert (sent != recorded["wanted"]).any(axis=(1, 2)).sum() >= 10
+
+
+def test_it_answers_as_an_entry_does_and_tells_nothing(wrapped, tmp_path):
+    actions, told = answers_alone(wrapped[2], "entry", tmp_path)
+    assert actions.shape == (40, 3, 2)
+    assert np.isfinite(actions).all()
+    assert told == ""
+
+
+def test_it_is_small_and_says_what_is_in_it(wrapped):
+    path, told, folder = wrapped
+    assert path.stat().st_size == told["bytes"] <= 5e6
+    assert undocumented(told, KEYS["entry wrap"]) == []
+    assert (told["shield"]["separation_m"], told["shield"]["profile"]) == (4.0, "rammers")
+    assert (told["shield"]["dt_s"], told["shield"]["move_s"]) == (1.0, pytest.approx(0.1))
+    assert (folder / "helper.py").read_text() == "TOP = 3.0\n"
+
+
+def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
+    """In our own game, with the entry's class found by its name in the zip's module, as pickles do."""
+    env = MctfEnv("mctf2026", max_time_s=40.0)
+    observations, infos = env.reset(seed=3)
+    ids = list(env.possible_agents)
+    entry = policies.make(str(wrapped[0]))
+    entry.reset(env, ids[:3], 3)
+    hold = dict.fromkeys(ids[3:], 16)
+    least_m = math.inf
+    while env.agents:
+        observations, _, _, _, infos = env.step({**entry.act(observations, infos), **hold})
+        places = env.core.state[0, :3, :2]
+        apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+        least_m = min(least_m, apart[np.triu_indices(3, 1)].min())
+    report = entry.report()
+    assert report.held == 0, report
+    assert 4.0 <= least_m < 8.0
+    entry.close() if hasattr(entry, "close") else None
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["medium", "--out", "x.zip"], "medium is no entry"),
+        (["empty.zip", "--out", "x.zip"], "needs one solution.py"),
+        (["gone.zip", "--out", "x.zip"], "there is no submission at"),
+        (["{bare}", "--out", "there.zip"], "there.zip exists"),
+        (["{bare}", "--out", "shielded"], "give the name of a zip"),
+        (["{bare}", "--out", "nowhere/x.zip"], "there is no folder"),
+        (["{bare}", "--out", "x.zip", "--profile", "pirates"], "unknown profile 'pirates'"),
+        (["{bare}", "--out", "x.zip", "--separation", "-1"], "separation_m is -1"),
+        (["{bare}", "--out", "x.zip", "--shield-set", "speed=3"], "unknown shield setting 'speed'"),
+        (["{bare}", "--out", "x.zip", "--preset", "mctf2025"], "give --preset mctf2026"),
+        (["{zip}", "--out", "x.zip"], "is shielded already"),
+        (["broken", "--out", "x.zip"], "no luck"),
+    ],
+)
+def test_what_cannot_be_wrapped_is_one_line(arguments, words, wrapped, folder_of_entry, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("there.zip").write_text("mine")
+    with zipfile.ZipFile("empty.zip", "w") as archive:
+        archive.writestr("notes.txt", "nothing")
+    Path("broken").mkdir()
+    Path("broken/solution.py").write_text("raise RuntimeError('no luck')\n")
+    given = [one.format(bare=folder_of_entry, zip=wrapped[0]) for one in arguments]
+    done = run("wrap", *given)
+    assert done.exit_code == ExitCode.BAD_INPUT, done.output
+    assert words in done.stderr.replace("\n", " "), done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert not Path("x.zip").exists()
+    assert Path("there.zip").read_text() == "mine"
+
+
+def test_every_module_of_the_shield_that_is_needed_is_packed_and_is_python():
+    files = code()
+    for source in sources().values():
+        inside = f"{source.inside}/__init__" if source.is_package else source.inside
+        assert f"{inside}.py" in files or source.name == "steerclear.shield"
+    for name, text in files.items():
+        ast.parse(text, name)
+        assert "numba" not in text.replace('"""', ""), name
+
+
+def function_of(text):
+    return ast.parse(text).body[0]
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0, 3.0), (9.0, 2.0, 3.0), (-9.0, 2.0, 3.0), (math.nan, 2.0, 3.0)])
+def test_short_functions_are_written_out_as_they_are(values):
+    clamp = "def clamp(x, low, high):\n if x > high: return high\n if x < low: return low\n return x"
+    names = {}
+    exec(clamp, names)
+    call = ast.parse("clamp(a + 0.0, b * 1.0, c - 0.0)", mode="eval").body
+    out = ast.Expression(Inliner("t").written_out(small(function_of(clamp)), call.args))
+    found = eval(compile(ast.fix_missing_locations(out), "x", "eval"), dict(zip("abc", values, strict=True)))
+    expected = names["clamp"](*values)
+    assert found == expected or (math.isnan(found) and math.isnan(expected))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["def f(x):\n y = x\n return y", "def f(x):\n return g(x)", "def f(x):\n return x, 1", "def f(x):\n return x[0]"],
+)
+def test_functions_that_are_not_short_are_called(text):
+    assert small(function_of(text)) is None
+
+
+def test_facts_are_of_the_game():
+    facts = facts_for("mctf2026", {"separation_m": 4.0})
+    assert facts["agent_ids"] == [f"agent_{i}" for i in range(6)]
+    assert (facts["size"], facts["power_s"], facts["decision_s"]) == ([160.0, 80.0], 120.0, 1.0)
+    assert facts["stops"] == [[], []]
