@@ -36,6 +36,7 @@ class Window:
         pygame.display.set_caption(title)
         self._clock = pygame.time.Clock()
         self._keys: set[str] = set()
+        self._tapped: set[str] = set()
         self.closed = False
         """Whether the user has closed the window."""
 
@@ -58,15 +59,17 @@ class Window:
                 self.closed = True
             elif event.type == pygame.KEYDOWN:
                 self._keys.add(pygame.key.name(event.key))
+                self._tapped.add(pygame.key.name(event.key))
             elif event.type == pygame.KEYUP:
                 self._keys.discard(pygame.key.name(event.key))
             elif event.type == pygame.WINDOWFOCUSLOST:
                 self._keys.clear()
 
     def keys(self) -> set[str]:
-        """Return the names of the keys held down: "left", "w", "space" and so on."""
+        """Return the names of the keys held down, or pressed since the last call: "left", "w", "space" and so on."""
         self.pump()
-        return set(self._keys)
+        held, self._tapped = self._keys | self._tapped, set()
+        return held
 
     def close(self) -> None:
         """Close the window."""

@@ -18,11 +18,11 @@ def all_tables(results: Results) -> list[Table]:
     found: list[Table] = []
     if results["qualifying"]:
         found.append(qualifying(results))
+    if results["prices"]:
+        found.append(price(results))
     for state in results["states"]:
         if state["standings"]:
             found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
-    if results["prices"]:
-        found.append(price(results))
     return found
 
 

@@ -237,6 +237,10 @@ def test_a_window_opens_takes_keys_and_closes(monkeypatch, game):
     assert renderer.keys() == {"left", "w"}
     pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_w))
     assert renderer.keys() == {"left"}
+    for kind in (pygame.KEYDOWN, pygame.KEYUP):  # a tap between two pictures counts once
+        pygame.event.post(pygame.event.Event(kind, key=pygame.K_2))
+    assert renderer.keys() == {"left", "2"}
+    assert renderer.keys() == {"left"}
     assert not renderer.window_closed
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     renderer.draw(game.view())
