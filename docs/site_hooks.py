@@ -1,4 +1,4 @@
-"""Hooks of the site (`mkdocs build`): formulas become MathML, so that no page needs the network; the API finds its code.
+"""Hooks of the site (`mkdocs build`): formulas become MathML, so that no page needs the network; API pages find code.
 
 mkdocs calls ``on_config`` and ``on_page_content``.
 """

@@ -19,6 +19,7 @@ from .markdown import MADE, bars_table, line, table
 from .played_sets_page import played_page
 from .price_page import is_dial, price_page
 from .reach_show import tables_page
+from .settings_page import settings_page
 from .tables import interval_text
 from .tally import RADII_M, breach_column
 from .tournament.pages import write_markdown
@@ -32,7 +33,7 @@ _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off
 
 
 def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
-    """Write the pages that results give, and the page of JSON keys.
+    """Write the pages that results give, and the pages of JSON keys and of settings.
 
     Args:
         results: contents of JSON files that the commands of `SOURCES` wrote; those of commands in `POOLED` go into one
@@ -75,7 +76,7 @@ def check_source(content: Mapping[str, Any]) -> None:
 
 def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[str, str], list[Path]]:
     """Text of each page by file name, and the pictures written."""
-    pages: dict[str, str] = {"json_keys.md": keys_page()}
+    pages: dict[str, str] = {"json_keys.md": keys_page(), "settings.md": settings_page()}
     pictures: list[Path] = []
     for command, write in POOLED.items():
         found = [content for content in results if content.get("command") == command]

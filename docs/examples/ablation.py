@@ -10,5 +10,5 @@ off = MatchSpec("aamas2024", own="medium", opponent="rammer", rules={"max_time_s
 on = replace(off, shield={"profile": "rammers"})
 for name, spec in (("off", off), ("on", on)):
     rows = [play_match(replace(spec, game=k, seed=k)).row for k in range(GAMES)]
-    hits = sum(row["breaches"]["2.5"]["opponent"] + row["breaches"]["2.5"]["teammate"] for row in rows)
+    hits = sum(row["breaches_opponent_2.5m"] + row["breaches_teammate_2.5m"] for row in rows)
     print(f"shield {name}: {hits} hits at 2.5 m in {GAMES} games")

@@ -1,5 +1,7 @@
 """An encounter of your own: two boats cross, one of them shielded; how near do they come?"""
 
+from dataclasses import replace
+
 import numpy as np
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.platforms import get_platform, step_boat
@@ -18,7 +20,7 @@ def closest_m(shield):
     for _ in range(250):
         commands = WANTED.values
         if shield is not None:
-            now = Fleet(state=state.copy(), team=fleet.team, platforms=fleet.platforms, names=fleet.names)
+            now = replace(fleet, state=state.copy())
             commands = shield.decide(now, WANTED).sent.values
         for row, (speed_mps, heading_rad) in zip(state, commands, strict=True):
             error_deg = (np.degrees(heading_rad) - row[L.HEADING] + 180.0) % 360.0 - 180.0

@@ -59,7 +59,7 @@ def test_figures_become_tables_and_a_page(content, tmp_path):
     text = (tmp_path / "docs" / "bench.md").read_text()
     assert all(title in text for title in titles)
     assert "decision p99.9, us" in text
-    assert {page.name for page in pages} == {"bench.md", "json_keys.md"}
+    assert {page.name for page in pages} == {"bench.md", "json_keys.md", "settings.md"}
 
 
 def test_bars_judge_the_slower_policy(content):

@@ -1,0 +1,84 @@
+"""Pages: links and anchors lead somewhere, every page is in the site, and the site builds without a warning."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
+
+
+def text_of(page):
+    """A page without its code."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return re.sub(r"`[^`\n]*`", "", text)
+
+
+def anchors_of(page):
+    """What `page#...` may name: its headings, as sites and GitHub write them."""
+    heads = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(text_of(page)):
+        if re.match(r"[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors_of(target), link
+
+
+def test_a_link_and_an_anchor_are_found():
+    assert LINK.findall("see [a](b.md#c) and ![d](e.png)") == ["b.md#c", "e.png"]
+    assert "in-five-minutes" in anchors_of(DOCS / "shield.md")
+
+
+def nav_pages(entries):
+    """Files that a navigation names."""
+    for entry in entries:
+        for value in entry.values():
+            yield from [value] if isinstance(value, str) else nav_pages(value)
+
+
+def test_every_page_is_in_the_site():
+    nav = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
+    assert sorted(nav_pages(nav)) == sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
+
+
+def test_every_page_is_in_the_list_of_pages():
+    listed = (DOCS / "README.md").read_text(encoding="utf-8")
+    for page in DOCS.rglob("*.md"):
+        name = page.relative_to(DOCS).as_posix()
+        assert name == "README.md" or f"`{name}`" in listed, name
+
+
+def test_the_site_builds_without_a_warning(tmp_path):
+    pytest.importorskip("mkdocstrings_handlers.python", reason="extra [docs]")
+    for name in ("docs", "mkdocs.yml"):
+        whole = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        whole(ROOT / name, tmp_path / name)
+    shutil.copytree(ROOT / ".typing", tmp_path / ".typing")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "build" / "site").glob("*.html")}
+    assert "<math" in pages["shield.html"]
+    assert "arithmatex" not in pages["shield.html"]
+    assert "ShieldedParallelEnv" in pages["api.html"]
+    assert "check_platform(" in pages["extend.html"]

@@ -1,0 +1,56 @@
+"""Every example runs as it stands and prints what it is about."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+from steerclear.policies.entrants import catalogue
+from steerclear.shield.platforms.registry import PLATFORMS
+from steerclear.shield.wrappers import readers
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "docs" / "examples"
+LOG = ROOT / "tests" / "shield" / "bridge" / "blackbox" / "data" / "version_1.mcap"
+SAYS = {
+    "ablation": "shield off: ",
+    "batched_training": "24 learners",
+    "count_collisions": "judged in hindsight: ",
+    "first_decision": "QP 54.7 deg",
+    "own_encounter": "with it          2.5",
+    "own_platform": "QP",
+    "own_policy": "every boat straight to the flag",
+    "own_reader": "read by FoggyReader",
+    "read_black_box": "12 decisions of blue_1",
+    "wrap_env": "PASSED margin",
+    "wrap_policy": "commands changed: ",
+}
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays_registered(monkeypatch):
+    monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
+    monkeypatch.setattr(readers, "_REGISTERED", dict(readers._REGISTERED))
+    before = set(PLATFORMS)
+    yield
+    for name in set(PLATFORMS) - before:
+        del PLATFORMS[name]
+
+
+def test_every_example_is_run_and_shown():
+    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    assert names == set(SAYS)
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    assert all(f"examples/{name}.py" in page for name in names)
+
+
+@pytest.mark.parametrize("name", SAYS)
+def test_an_example_runs(name, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", [name, str(LOG)])
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    assert SAYS[name] in capsys.readouterr().out
+
+
+def test_examples_are_short():
+    for path in EXAMPLES.glob("*.py"):
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= 45, path.name
