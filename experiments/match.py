@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches
+from steerclear.env.record import Record, absolute_commands, find_breaches
 from steerclear.env.record_meta import meta_of
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import GameError, SteerclearError
@@ -26,6 +26,7 @@ from .seat import Failures, Seat
 from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
 from .tally import reason_counts, tally
+from .tape import Tape
 from .verdicts import verdict_columns
 
 Watcher = Callable[[MctfEnv], bool]
@@ -71,7 +72,7 @@ class Match:
         self.teams = [
             Seat(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
         ]
-        self._recorder = GameRecorder()
+        self._tape: Tape | None = None
         self._log = StateLog() if spec.judged else None
         self._decision_us: list[float] = []
         self._moment: tuple[Array, Array, Seen] | None = None
@@ -113,8 +114,7 @@ class Match:
         for number, team in enumerate(self.teams):
             team.reset(self.shielding.env, 2 * spec.seed + number)
         meta = self._meta()
-        self._live = live_view(self.env.core)
-        self._recorder.start(self._live, meta)
+        self._tape = Tape(live_view(self.env.core), meta)
         if self._log is not None:
             self._log.start(self.env.core)
         if self.env.renderer is not None:
@@ -167,10 +167,10 @@ class Match:
             self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.certificate_m)
 
     def _record_step(self) -> None:
-        if self._moment is None:
+        if self._moment is None or self._tape is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
-        self._recorder.step(self._live, wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        self._tape.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
         if self._log is not None:
             self._log.step(self.env.core)
         if seen.solve_time_s is not None:
@@ -178,7 +178,8 @@ class Match:
         self._moment = None
 
     def _result(self, wall_s: float) -> MatchResult:
-        record = self._recorder.finish()
+        assert self._tape is not None  # _start() made it
+        record = self._tape.finish()
         record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
         return MatchResult(self.spec, self._row(record, wall_s), record)
 
