@@ -12,6 +12,7 @@ import alone
 import numpy as np
 import pytest
 from steerclear import policies
+from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
@@ -104,7 +105,7 @@ def test_it_is_small_and_says_what_is_in_it(wrapped):
 
 def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
     """In our own game, with the entry's class found by its name in the zip's module, as pickles do."""
-    env = MctfEnv("mctf2026", max_time_s=40.0)
+    env = MctfEnv(GameConfig.preset("mctf2026", max_time_s=40.0))
     observations, infos = env.reset(seed=3)
     ids = list(env.possible_agents)
     entry = policies.make(str(wrapped[0]))

@@ -1,0 +1,85 @@
+"""Ten thousand decisions of real games: the plain shield sends what the compiled one does, and how long it takes."""
+
+import importlib
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.mctf import MctfEnv
+from steerclear.experiments.entries.onboard import program
+from steerclear.experiments.entries.wrapping.facts import facts_for
+from steerclear.experiments.entries.wrapping.wrap import shielded_files
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield import shield as shield_module
+from steerclear.shield.platforms import layout as L
+
+GAMES = [("easy", seed) for seed in range(9)] + [("medium", seed) for seed in range(9)]
+UNTOLD = [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]
+
+
+class Noting(Shield):
+    """Decides without autopilot memory, as in a zip, and notes what it was asked and what it sent."""
+
+    def __init__(self, config):
+        super().__init__(config)
+        self.noted = []
+
+    def decide(self, fleet, wanted, surroundings=None):
+        state = fleet.state.copy()
+        state[:, L.THRUST :] = 0.0
+        state[:, UNTOLD] = np.nan
+        fleet = replace(fleet, state=state)
+        decisions = super().decide(fleet, wanted, surroundings)
+        self.noted.append((fleet, wanted.values.copy(), surroundings, decisions.sent.values.copy()))
+        return decisions
+
+
+def noted_in(opponent, seed, settings):
+    env = MctfEnv("mctf2026")
+    observations, infos = env.reset(seed=seed)
+    shield, ids = Noting(settings), list(env.possible_agents)
+    teams = [(shield.wrap(policies.make("medium")), ids[:3]), (policies.make(opponent), ids[3:])]
+    for policy, own in teams:
+        policy.reset(env, own, seed)
+    noting = teams[0][0].shield
+    while env.agents:
+        actions = [policy.act(observations, infos) for policy, _ in teams]
+        observations, _, _, _, infos = env.step({**actions[0], **actions[1]})
+    env.close()
+    return noting.noted
+
+
+@pytest.mark.study
+def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(shield_module, "solve", program.solve)
+    facts = facts_for("mctf2026", {"separation_m": 4.0})
+    package, files = shielded_files(facts)
+    for name, content in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    parts = ("shield", "config", "fleet", "commands", "surroundings")
+    plain = {name: importlib.import_module(f"{package}.shield.{name}") for name in parts}
+    settings, worst, spent, changed = ShieldConfig.of(**facts["shield"]), 0.0, [], 0
+    for opponent, seed in GAMES:
+        shield = plain["shield"].Shield(plain["config"].ShieldConfig.of(**facts["shield"]))
+        for fleet, wanted, around, sent in noted_in(opponent, seed, settings):
+            names = tuple(kind if isinstance(kind, str) else kind.name for kind in fleet.platforms)
+            seen = plain["fleet"].Fleet(
+                fleet.state, fleet.team, names, fleet.controlled, fleet.names, driven=fleet.driven
+            )
+            edge = plain["surroundings"].Surroundings(around.field)
+            begun = time.process_time()
+            found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).sent.values
+            spent.append(time.process_time() - begun)
+            worst, changed = max(worst, np.abs(found - sent).max()), changed + bool((sent != wanted).any())
+    with capsys.disabled():
+        times = np.percentile(spent, [50, 95, 99]) * 1e3
+        sys.stderr.write(
+            f"\n{len(spent)} decisions, {changed} changed, worst {worst:g}; ms p50 p95 p99: {times.round(1)}\n"
+        )
+    assert len(spent) >= 10_000
+    assert worst <= 1e-6
