@@ -19,6 +19,7 @@ from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
+from .commands.export import export
 from .commands.fit import fit
 from .commands.parity import parity
 from .commands.platform import app as platform_app
@@ -31,6 +32,7 @@ from .commands.replay import replay
 from .commands.sea_trial import sea_trial
 from .commands.sim_boats import sim_boats
 from .commands.tournament import tournament
+from .commands.train import train
 from .commands.warm_up import warm_up
 from .provenance import package_version
 from .terminal import prepare
@@ -49,6 +51,8 @@ for function in (
     ablate,
     tournament,
     demonstrate,
+    train,
+    export,
     encounters,
     attack,
     parity,
