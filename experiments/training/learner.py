@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class Learner:
         self._callback = CallbackList([])
         self._callback.init_callback(self.model)
         self.model._last_episode_starts = np.ones(self.env.num_envs, bool)
-        self.model.ep_info_buffer = self.model.ep_info_buffer or None
+        self.model.ep_success_buffer = deque(maxlen=1)
         if settings.start:
             self._begin_with(settings.start)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class RoleExtractor(nn.Module):
         self.register_buffer("roles", torch.tensor(roles))
         widths = (size, *hidden)
         for who in ("policy", "value"):
-            pairs = list(zip(widths[:-1], widths[1:], strict=True))
+            pairs = list(pairwise(widths))
             weights = [nn.Parameter(_orthogonal(roles, one, two)) for one, two in pairs]
             setattr(self, f"{who}_weights", nn.ParameterList(weights))
             setattr(

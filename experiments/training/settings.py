@@ -1,4 +1,4 @@
-"""What a training is to be: frozen settings, each checked when it is built; the keys of a config file are their names."""
+"""What a training is to be: frozen settings, checked when they are built; a config file's keys are their names."""
 
 from __future__ import annotations
 
@@ -115,9 +115,9 @@ class Evaluation:
 class League:
     """Snapshots of the learner as opponents.
 
-    Matching rule: each game that begins draws its opponent from the stage's pool with weight (1 - s)^power + floor, where
-    s is the learner's mean score (1 won, 0.5 drawn, 0 lost by captures) in its last games against it; so those who beat
-    it come more often, and none is forgotten.
+    Matching rule: each game that begins draws its opponent from the stage's pool with weight (1 - s)^power + floor,
+    where s is the learner's mean score (1 won, 0.5 drawn, 0 lost by captures) in its last 50 games against it; so those
+    who beat it come more often, and none is forgotten.
 
     Attributes:
         every: rollouts between snapshots, while "self" is in the pool.

@@ -204,7 +204,8 @@ class Training:
         for name in now:
             if name not in ("decisions", "checkpoint_every", "device") and now[name] != before.get(name):
                 raise ConfigError(
-                    f"{self.folder} was begun with another {name}; resume with its own config.yaml, or name another --out"
+                    f"{self.folder} was begun with another {name}; resume with its own config.yaml, or "
+                    "name another --out"
                 )
 
     def _card(self) -> dict[str, Any]:

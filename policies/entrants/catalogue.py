@@ -82,6 +82,7 @@ def entrants() -> dict[str, Entrant]:
 
 def _load_ours() -> None:
     from . import alamer, chao, lucas, meo, ohto, options  # noqa: F401 (each enters its team)
+    from .learned import entered  # noqa: F401
 
 
 @cache

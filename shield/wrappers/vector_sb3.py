@@ -16,8 +16,8 @@ from .vector_gym import spaces_of
 class MctfVecEnv(VecEnv):
     """Every boat of one team in every game is one sub-environment of SB3; one policy learns to play them all.
 
-    An info holds the events of `tallies.EVENTS` that happened to the learner, and where its game ended ``episode``, which
-    SB3's own statistics read, with the game's totals.
+    An info holds the events of `tallies.EVENTS` that happened to the learner, and where its game ended ``episode``,
+    which SB3's own statistics read, with the game's totals.
 
     Args:
         batch: the games, see `TeamBatch`.
