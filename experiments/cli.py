@@ -33,6 +33,7 @@ from .commands.sea_trial import sea_trial
 from .commands.sim_boats import sim_boats
 from .commands.tournament import tournament
 from .commands.train import train
+from .commands.train_study import train_study
 from .commands.warm_up import warm_up
 from .provenance import package_version
 from .terminal import prepare
@@ -69,6 +70,7 @@ for function in (
 app.command("sim-boats")(sim_boats)
 app.command("sea-trial")(sea_trial)
 app.command("warm-up")(warm_up)
+app.command("train-study")(train_study)
 app.add_typer(reach_app, name="reach")
 app.add_typer(platform_app, name="platform")
 app.add_typer(entry_app, name="entry")
