@@ -1,4 +1,4 @@
-"""An id for Gymnasium: ``gymnasium.make_vec("steerclear.experiments.training.ids:steerclear/Mctf-v0", num_envs=192)``."""
+"""An id for Gymnasium, ``make_vec("steerclear.experiments.training.ids:steerclear/Mctf-v0", num_envs=192)``."""
 
 from __future__ import annotations
 

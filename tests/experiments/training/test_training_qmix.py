@@ -7,7 +7,7 @@ from steerclear.experiments.training.two_step import learned_return
 @pytest.mark.parametrize(("monotone", "earns"), [(True, 8.0), (False, 7.0)])
 def test_the_two_step_game_has_its_known_answer(monotone, earns):
     torch.set_num_threads(1)
-    assert learned_return(monotone, updates=600) == earns
+    assert learned_return(monotone, updates=400) == earns
 
 
 def test_the_mixture_never_falls_where_a_value_rises():
