@@ -18,12 +18,15 @@ from .commands.docs import docs
 from .commands.encounters import encounters
 from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
+from .commands.export import export
 from .commands.parity import parity
 from .commands.platform import app as platform_app
 from .commands.play import play
 from .commands.reach import app as reach_app
 from .commands.render import render
 from .commands.tournament import tournament
+from .commands.train import train
+from .commands.train_study import train_study
 from .commands.warm_up import warm_up
 from .optional import optional_command
 from .provenance import package_version
@@ -43,6 +46,8 @@ for function in (
     ablate,
     tournament,
     demonstrate,
+    train,
+    export,
     encounters,
     attack,
     parity,
@@ -54,6 +59,7 @@ for function in (
 for name in ("deploy", "preflight", "replay", "referee", "fit", "sim-boats", "sea-trial"):
     optional_command(app, name)
 app.command("warm-up")(warm_up)
+app.command("train-study")(train_study)
 app.add_typer(reach_app, name="reach")
 app.add_typer(platform_app, name="platform")
 app.add_typer(entry_app, name="entry")

@@ -23,12 +23,13 @@ from .settings_page import settings_page
 from .tables import interval_text
 from .tally import RADII_M, breach_column
 from .tournament.pages import write_markdown
+from .training.study_page import learning_page
 from .unsafe_sets_page import sets_page
 from .verdicts import HEADS, verdict_rows
 
 Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
-SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare or reach play"
+SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -106,6 +107,7 @@ POOLED: dict[str, Callable[[Sequence[Mapping[str, Any]], Path], Page]] = {
     "reach": lambda found, folder: ("table_cards.md", tables_page([content["card"] for content in found]), []),
     "reach-play": lambda found, folder: ("played_sets.md", played_page(found), []),
     "reach-compare": lambda found, folder: ("unsafe_sets.md", sets_page(found), []),
+    "train-study": learning_page,
 }
 """Commands whose results go into one page together, and what makes it."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from steerclear.shield.exceptions import PolicyError
 
 from .entrants.listing import entrants
-from .registry import SB3_PREFIX, names
+from .registry import SB3_PREFIX, WEIGHTS_PREFIX, names
 
 RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"
 """What tells folders of results and virtual environments, which are no part of a policy."""
@@ -31,12 +31,12 @@ def fingerprint(name_or_path: str | Path) -> str:
         PolicyError: a file cannot be read.
     """
     text = str(name_or_path)
-    path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
+    path = Path(text.removeprefix(SB3_PREFIX).removeprefix(WEIGHTS_PREFIX)).expanduser()
     if text in entrants():
         return entrants()[text].files()
     if text in names() or not path.exists():
         return ""
-    alone = text.startswith(SB3_PREFIX) or (path.is_file() and path.suffix != ".py")
+    alone = text.startswith((SB3_PREFIX, WEIGHTS_PREFIX)) or (path.is_file() and path.suffix != ".py")
     folder = path if path.is_dir() else path.parent
     try:
         return _digest(folder, [path] if alone else sorted(_files(folder, set())))

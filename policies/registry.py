@@ -113,11 +113,13 @@ ENTRIES: dict[str, Entry] = {
 KEYBOARD = "keyboard"
 HIDDEN = "hidden"
 SB3_PREFIX = "sb3:"
+WEIGHTS_PREFIX = "weights:"
+"""What ``steerclear export`` wrote: numbers only, so loading it runs no code."""
 KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..., others='medium')"
 
 
 def names() -> list[str]:
-    """Names `make` knows, besides paths of submissions and ``sb3:PATH.zip``."""
+    """Names `make` knows, besides paths of submissions, ``sb3:PATH.zip`` and ``weights:PATH.npz``."""
     return [*ENTRIES, *entrants(), KEYBOARD]
 
 
@@ -131,7 +133,8 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
     """A team policy by name or from a file.
 
     Args:
-        name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; or ``sb3:PATH.zip``.
+        name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; ``sb3:PATH.zip``; or
+            ``weights:PATH.npz``.
         game: number of the game in its series: which of its teams the hidden opponent fields; without it the seed
             decides. No other policy looks at it.
         **options: the policy's own options, see `describe`.
@@ -148,6 +151,10 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
         return _call(entrants()[text].build, text, options)
     if text == KEYBOARD:
         return _call(_keyboard, KEYBOARD, options)
+    if text.startswith(WEIGHTS_PREFIX):
+        from .entrants.learned import load_weights
+
+        return _call(load_weights, text, options, text.removeprefix(WEIGHTS_PREFIX))
     if text.startswith(SB3_PREFIX):
         from .sb3 import load_sb3
 
@@ -168,21 +175,33 @@ def check(name_or_path: str | Path) -> None:
     text = str(name_or_path)
     if text in names():
         return
-    path = Path(text.removeprefix(SB3_PREFIX)).expanduser()
-    if not text or not (text.startswith(SB3_PREFIX) or looks_like_path(text)):
+    path = Path(text.removeprefix(SB3_PREFIX).removeprefix(WEIGHTS_PREFIX)).expanduser()
+    if not text or not (text.startswith((SB3_PREFIX, WEIGHTS_PREFIX)) or looks_like_path(text)):
         raise unknown_policy(text)
     if not path.exists():
-        raise PolicyError(f"there is no policy at {path}; give a submission's folder or zip, or sb3:PATH.zip")
+        raise PolicyError(
+            f"there is no policy at {path}; give a submission's folder or zip, sb3:PATH.zip or weights:PATH.npz"
+        )
 
 
 def make_batch(name: str, **options: Any) -> BatchPolicy:
-    """A scripted policy for a whole batch of games.
+    """A scripted or learned policy for a whole batch of games.
+
+    Args:
+        name: a scripted policy's name, a learned entrant's, ``weights:PATH.npz``, or ``sb3:PATH.zip`` (whose loading
+            runs code of whoever made it).
+        **options: the policy's own options.
 
     Raises:
-        PolicyError: an unknown name or option, or a policy that only plays single games.
+        PolicyError: an unknown name or option, a file that cannot be loaded, or a policy that only plays single games.
     """
     if name in ENTRIES:
         return ScriptedBatch(name, _plan(name, options))
+    from .entrants.learned import batch_builder
+
+    found = batch_builder(name)
+    if found is not None:
+        return _call(found.build, name, options, *found.first)
     if name in entrants() or name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
         raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)}")
     raise unknown_policy(name)
@@ -197,7 +216,7 @@ def unknown_policy(name: str) -> PolicyError:
     """The error for a name nobody knows."""
     near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(near)}? " if near else ""
-    known = f"known: {', '.join(names())}; or give a submission's folder or zip, or sb3:PATH.zip"
+    known = f"known: {', '.join(names())}; or give a submission's folder or zip, sb3:PATH.zip or weights:PATH.npz"
     return PolicyError(f"unknown policy {name!r}; {hint}{known}")
 
 

@@ -13,7 +13,7 @@ from steerclear import policies
 from steerclear.policies.actions import HOLD, ActionReader
 from steerclear.policies.guard import game_facts
 from steerclear.policies.protocol import Action, TeamPolicy
-from steerclear.policies.registry import SB3_PREFIX, looks_like_path
+from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
 from steerclear.policies.scripted.team import boat_numbers, game_core
 from steerclear.policies.submissions.stage import ENTRY_FILE
@@ -162,7 +162,9 @@ def _check_exists(path: str) -> None:
 
 
 def is_entry(name: str) -> bool:
-    """Whether a policy's name is that of foreign code: a path, or ``sb3:`` and one."""
+    """Whether a policy's name is that of foreign code: a path, or ``sb3:`` and one. Exported weights are numbers."""
+    if name.startswith(WEIGHTS_PREFIX):
+        return False
     return name not in policies.names() and (name.startswith(SB3_PREFIX) or looks_like_path(name))
 
 

@@ -158,7 +158,7 @@ def label(team: str) -> str:
     """How a team is called in tables: its name, or that of its file or folder."""
     if team in policies.names() or not ("/" in team or "\\" in team or "." in team):
         return team
-    path = Path(team.removeprefix("sb3:"))
+    path = Path(team.removeprefix("sb3:").removeprefix("weights:"))
     return path.parent.name if path.name == "solution.py" else path.stem
 
 

@@ -8,6 +8,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from . import alamer, chao, lucas, meo, ohto, options  # noqa: F401 (each enters its team)
 from .catalogue import Entrant, entered
+from .learned import entered as _learned  # noqa: F401 (each team with weights)
 
 GROUP = "steerclear.entrants"
 """Entry points of this group name modules that hold ``@entrant`` classes."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +13,13 @@ from ..actions import Seat, read_flat
 from ..batch import BatchedShield
 from ..exceptions import ConfigError, GameError, PolicyError
 from ..jit import Array, BoolArray
+from ..platforms import layout as L
 from .reading import team_number
+from .tallies import Tallies, changed_by
 
-ACTIONS = ("discrete", "continuous")
+ACTIONS = ("discrete", "continuous", "normalised")
+MOST_INTERVAL = 1000
+"""Steps of the game a decision is held for at most."""
 
 
 class Stepped(NamedTuple):
@@ -25,6 +31,9 @@ class Stepped(NamedTuple):
         terminated: (L,) the game was won.
         truncated: (L,) its time was over.
         final_observations: (L, n_obs) before a new game began; only rows of ended games matter.
+        events: what happened in the decision, by name of `tallies.EVENTS`, each (L,).
+        episodes: totals of the games under way, ended ones included, each (L,): ``r`` reward, ``l`` decisions,
+            ``t`` s since the batch was made, and the same names.
     """
 
     observations: NDArray[np.float32]
@@ -32,6 +41,8 @@ class Stepped(NamedTuple):
     terminated: BoolArray
     truncated: BoolArray
     final_observations: NDArray[np.float32]
+    events: Mapping[str, Array] = {}
+    episodes: Mapping[str, Array] = {}
 
 
 class TeamBatch:
@@ -42,8 +53,12 @@ class TeamBatch:
         opponent: batch policy (`steerclear.policies.make_batch`) of the other team; None: they hold still.
         team: "blue" or "red", the learners' side.
         shield: shield for the learners' team, or None.
-        actions: "discrete" (17 numbers) or "continuous" (speed m/s, relative heading deg).
+        actions: "discrete" (17 numbers), "continuous" (speed m/s, relative heading deg) or "normalised" (the same, each
+            in [-1, 1]: stop to top speed, -180 to 180 deg).
         seed: seed of games and opponent.
+        interval: game steps for which a decision is held, as a course steered; the shield looks at every one of them.
+        reward: what rewards the learners instead of the game's own reward: an object with ``begin(batch, games)`` for
+            games (B,) that begin anew and ``reward(batch, changed)`` for every game step, which answers (B, n).
 
     Raises:
         ConfigError: unknown team or kind of actions, an opponent for single games, or a shield that is none of these
@@ -58,6 +73,8 @@ class TeamBatch:
         shield: BatchedShield | None = None,
         actions: str = "discrete",
         seed: int = 0,
+        interval: int = 1,
+        reward: Any = None,
     ) -> None:
         if opponent is not None and not callable(getattr(opponent, "restart", None)):
             raise ConfigError(
@@ -65,7 +82,10 @@ class TeamBatch:
             )
         if actions not in ACTIONS:
             raise ConfigError(f"unknown actions {actions!r}; choose one of {', '.join(ACTIONS)}")
+        if type(interval) is not int or not 1 <= interval <= MOST_INTERVAL:
+            raise ConfigError(f"interval is {interval!r}; give a whole number of game steps, 1 to {MOST_INTERVAL}")
         self.core, self.opponent, self.shield = core, opponent, shield
+        self.interval, self.reward = interval, reward
         self.team = team_number(team)
         self.actions = actions
         self.boats = np.flatnonzero(core.team == self.team)
@@ -75,6 +95,8 @@ class TeamBatch:
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
         self._begun = False
+        self._born_s = time.perf_counter()
+        self.tallies = Tallies(core, self.team, self.boats)
 
     @property
     def top_speed_mps(self) -> float:
@@ -104,23 +126,82 @@ class TeamBatch:
             self.opponent.reset(self.core, 1 - self.team, self._seed)
         if self.shield is not None:
             self.shield.reset()
+        self._begin_counts(np.ones(self.core.n_games, np.bool_))
         return self._flat(observations)
 
-    def step(self, actions: Any) -> Stepped:
-        """Step all games; ended games start anew.
+    def step(self, actions: Any, autoreset: bool = True, idle: Any = None) -> Stepped:
+        """One decision in all games, held for `interval` game steps.
+
+        Args:
+            actions: of all learners.
+            autoreset: ended games start anew.
+            idle: (B,) bool, games that begin anew instead of stepping: reward 0, not ended.
 
         Raises:
             PolicyError: the actions have the wrong shape, are out of range or not finite.
         """
-        self._commands[:, self.boats] = self._decode(actions)
+        own = self._decode(actions)
+        n_games, n_boats = self.core.n_games, len(self.boats)
+        waiting = np.zeros(n_games, np.bool_) if idle is None else idle
+        going, rewards = ~waiting, np.zeros((n_games, n_boats))
+        terminated, truncated = np.zeros(n_games, np.bool_), np.zeros(n_games, np.bool_)
+        course_deg = self._heading_deg() + own[..., 1]
+        final: Any = None
+        self.tallies.begin_decision()
+        for moved in range(self.interval):
+            if moved:
+                own[..., 1] = (course_deg - self._heading_deg() + 180.0) % 360.0 - 180.0
+            observations, earned = self._move(own, going)
+            rewards += earned * going[:, None]
+            ended = (self.core.terminated | self.core.truncated) & going
+            terminated |= self.core.terminated & going
+            truncated |= self.core.truncated & going
+            final = self._noted(final, observations, going)
+            going = going & ~ended
+            if not going.any():
+                break
+        ended = terminated | truncated
+        self.tallies.end_decision(rewards, ~waiting)
+        episodes = self.tallies.flat_totals()
+        episodes["t"] = np.full(self.learners, time.perf_counter() - self._born_s)
+        if ended.any() and hasattr(self.opponent, "ended"):
+            self.opponent.ended(self.core, ended)
+        anew = (ended if autoreset else np.zeros_like(ended)) | waiting
+        outcome = (self._spread(terminated), self._spread(truncated))
+        seen = self._begin_anew(anew, final)
+        return Stepped(seen, rewards.reshape(-1), *outcome, final, self.tallies.flat_step(), episodes)
+
+    def _move(self, own: Array, going: BoolArray) -> tuple[Any, Array]:
+        """One game step; observations of all games and the learners' rewards (B, n)."""
+        self._commands[:, self.boats] = own
         if self.opponent is not None:
             self._commands[:, self.others] = self.opponent.act(self.core, 1 - self.team)
-        observations, rewards, terminated, truncated = self.core.step(self._commands, self._filter)
-        final = self._flat(observations)
-        ended = terminated | truncated
-        outcome = (self._spread(terminated), self._spread(truncated))
-        flat_rewards = rewards[:, self.boats].reshape(-1).copy()
-        return Stepped(self._begin_anew(ended.copy(), final), flat_rewards, *outcome, final)
+        observations, rewards, _, _ = self.core.step(self._commands, self._filter)
+        changed = changed_by(self.shield, self.boats, (self.core.n_games, len(self.boats)))
+        self.tallies.count(going, changed)
+        if self.reward is not None:
+            return observations, self.reward.reward(self, changed)
+        return observations, rewards[:, self.boats]
+
+    def _noted(self, final: Any, observations: Any, going: BoolArray) -> NDArray[np.float32]:
+        """Last observations (L, n_obs) of the games: of those that have ended, what was seen then."""
+        now = self._flat(observations)
+        if final is None:
+            return now
+        still = self._spread(going)
+        final[still] = now[still]
+        seen: NDArray[np.float32] = final
+        return seen
+
+    def _heading_deg(self) -> Array:
+        """(B, n) headings of the learners' boats, deg."""
+        return np.array(self.core.state[:, self.boats, L.HEADING])
+
+    def _begin_counts(self, games: BoolArray) -> None:
+        """Count games (B,) that begin from nought."""
+        self.tallies.forget(games)
+        if self.reward is not None:
+            self.reward.begin(self, games)
 
     def _games_of(self, learners: Any) -> BoolArray:
         """(B,) bool, the games of learners (L,)."""
@@ -144,12 +225,18 @@ class TeamBatch:
             self.opponent.restart(ended, self._seed if seed is None else int(seed))
         if self.shield is not None:
             self.shield.reset(ended)
-        return self._flat(observations)
+        self._begin_counts(ended)
+        seen = final.copy()
+        anew = self._spread(ended)
+        seen[anew] = self._flat(observations)[anew]
+        return seen
 
     def _decode(self, actions: Any) -> Array:
         """Commands (B, boats, 2) of flat actions."""
-        pairs = self.actions == "continuous"
+        pairs = self.actions != "discrete"
         top_mps = np.tile(self.core.max_speed_mps[self.boats], self.core.n_games)
+        if self.actions == "normalised":
+            actions = _in_units(actions, top_mps)
         try:
             flat = read_flat(actions, top_mps, lambda i: Seat(f"learner {i}", float(top_mps[i]), pairs=pairs), pairs)
         except GameError as error:
@@ -162,6 +249,18 @@ class TeamBatch:
 
     def _spread(self, games: BoolArray) -> BoolArray:
         return np.repeat(games, len(self.boats))
+
+
+def _in_units(actions: Any, top_mps: Array) -> Any:
+    """Speed m/s and relative heading deg of actions in [-1, 1], which are clipped to that; nonsense stays nonsense."""
+    try:
+        given = np.asarray(actions, np.float64)
+    except (TypeError, ValueError):
+        return actions
+    if given.shape != (len(top_mps), 2):
+        return given
+    clipped = np.clip(given, -1.0, 1.0)
+    return np.stack([0.5 * (clipped[:, 0] + 1.0) * top_mps, 180.0 * clipped[:, 1]], axis=1)
 
 
 def _filter_of(shield: Any, core: Any, team: int) -> Any:

@@ -16,6 +16,9 @@ from .vector_gym import spaces_of
 class MctfVecEnv(VecEnv):
     """Every boat of one team in every game is one sub-environment of SB3; one policy learns to play them all.
 
+    An info holds the events of `tallies.EVENTS` that happened to the learner, and where its game ended ``episode``,
+    which SB3's own statistics read, with the game's totals.
+
     Args:
         batch: the games, see `TeamBatch`.
     """
@@ -51,11 +54,16 @@ class MctfVecEnv(VecEnv):
         return out.observations, out.rewards.astype(np.float32), done, self._infos(out, done)
 
     def _infos(self, out: Stepped, done: Any) -> list[dict[str, Any]]:
+        """What happened, only where something did: most learners of most steps have nothing to tell."""
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for name, counts in out.events.items():
+            for i in np.flatnonzero(counts):
+                infos[i][name] = float(counts[i])
         for i in np.flatnonzero(done):
-            infos[i] = {
+            infos[i] |= {
                 "terminal_observation": out.final_observations[i],
                 "TimeLimit.truncated": bool(out.truncated[i] and not out.terminated[i]),
+                "episode": {name: float(totals[i]) for name, totals in out.episodes.items()},
             }
         return infos
 

@@ -1,0 +1,71 @@
+"""``steerclear train``: learn a team from a config."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import copyfile
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from steerclear.shield.exceptions import ConfigError
+
+from ..folder_lock import lock_folder
+from ..training.config_file import read_config
+from .console import Interrupted, command, err, out
+
+Config = Annotated[Path, typer.Argument(metavar="CONFIG.yaml", help="What to train; see docs/train.md.")]
+Folder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder of the training.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")]
+CONFIG = "config.yaml"
+EXTRA = 'training needs torch and stable-baselines3; pip install "steerclear[train]"'
+
+
+@command
+def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> None:
+    """Learn a team; checkpoints, curve, best and last weights go into a folder.
+
+    Exit status: 0 done, 2 bad input or a loss that is not finite, 130 interrupted (all is kept, --resume goes on).
+    """
+    settings = read_config(config)
+    folder = out_folder or Path("trainings") / config.stem
+    if settings.algorithm == "ppo" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
+        raise ConfigError(EXTRA)
+    kept = folder / CONFIG
+    if not resume and (folder / "checkpoints").exists():
+        raise ConfigError(f"{folder} holds a training already; add --resume to go on with it, or name another --out")
+    _make(folder)
+    lock_folder(folder)  # until this process ends: no other may write here
+    if not (kept.exists() and kept.samefile(config)):
+        copyfile(config, kept)
+    _run(settings, folder, resume)
+    for name in ("curve.json", "best.npz", "final.npz", "model.zip"):
+        if (folder / name).exists():
+            out().print(f"{folder / name}", soft_wrap=True)
+
+
+def _run(settings: Any, folder: Path, resume: bool) -> None:
+    from ..training.algorithms import training_of
+
+    training = training_of(settings, folder, resume)
+    console = err()
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn(), TextColumn("left"))
+    try:
+        with Progress(
+            *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
+        ) as bar:
+            task = bar.add_task("training", total=settings.decisions, completed=training.decisions)
+            training.run(lambda done, words: bar.update(task, completed=done, description=words, refresh=True))
+    except KeyboardInterrupt:
+        raise Interrupted(
+            f"interrupted after {training.decisions:,} decisions: all up to the last rollout is kept in {folder}; "
+            f"the same command with --out {folder} --resume goes on from there"
+        ) from None
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error

@@ -1,0 +1,1 @@
+"""Learning teams: ``steerclear train`` and ``steerclear export``."""

@@ -1,0 +1,27 @@
+"""Which object trains which algorithm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .settings import TrainingSettings
+
+
+def training_of(settings: TrainingSettings, folder: Path, resume: bool) -> Any:
+    """An object with ``run(notice)`` and ``decisions``.
+
+    Raises:
+        ConfigError: a setting or checkpoint is unusable.
+    """
+    if settings.algorithm == "qmix":
+        from .qmix_training import QmixTraining
+
+        return QmixTraining(settings, folder, resume)
+    if settings.algorithm == "cloning":
+        from .cloning import CloningTraining
+
+        return CloningTraining(settings, folder, resume)
+    from .training import Training
+
+    return Training(settings, folder, resume)

@@ -1,0 +1,51 @@
+"""Checks of a config's values; each refuses in one line that says what to give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+from ..spec import near
+
+
+def choice(name: str, value: Any, known: tuple[str, ...]) -> None:
+    """Refuse what is not among the known words.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    if value not in known:
+        raise ConfigError(f"{name} is {value!r}; {near(str(value), known)}")
+
+
+def count(name: str, value: Any, low: int, high: int) -> int:
+    """Return a whole number within limits.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    if type(value) is not int or not low <= value <= high:
+        raise ConfigError(f"{name} is {value!r}; give a whole number from {low:,} to {high:,}")
+    return value
+
+
+def number(name: str, value: Any, low: float, high: float) -> None:
+    """Refuse what is no number within limits.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise ConfigError(f"{name} is {value!r}; give a number from {low:g} to {high:g}")
+
+
+def texts(name: str, value: Any) -> tuple[str, ...]:
+    """Return a list of names as a tuple.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    if isinstance(value, str) or not value or not all(isinstance(one, str) and one for one in value):
+        raise ConfigError(f"{name} is {value!r}; give a list of names, such as [medium]")
+    return tuple(value)

@@ -1,0 +1,83 @@
+"""The games of a training: core, opponents, shield, rewards, as one vector environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
+from steerclear.shield.config import ShieldConfig
+from steerclear.shield.game_facts import facts_of_games
+from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
+
+from .rewards import WeightedSum
+from .settings import TrainingSettings
+
+
+def core_of(settings: TrainingSettings, games: int, seed: int) -> BatchedMctf:
+    """So many games by a config's rules, starts drawn from the seed.
+
+    Raises:
+        ConfigError: the rules cannot be.
+    """
+    rules: dict[str, Any] = {"default_start": False, **settings.rules}
+    if settings.platform:
+        rules["platforms"] = settings.platform
+    return BatchedMctf(GameConfig.preset(settings.preset, **rules), n_games=games, seed=seed)
+
+
+def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue") -> Any:
+    """The shield of a config for some games."""
+    config = ShieldConfig.of(**{**facts_of_games(core).settings(), **settings.shield_settings})
+    return games_shield(core, config, team=team)
+
+
+def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
+    """The learners, blue, in games against an opponent."""
+    core = core_of(settings, settings.games, settings.seed)
+    return TeamBatch(
+        core,
+        opponent,
+        "blue",
+        shield=shield_of(settings, core) if settings.shielded_training else None,
+        actions=settings.actions,
+        seed=settings.seed,
+        interval=settings.interval,
+        reward=WeightedSum(settings.reward_weights()),
+    )
+
+
+def stagger(batch: TeamBatch, seed: int) -> None:
+    """Put the first games' clocks forward by random times, so that games do not all end in the same step."""
+    core = batch.core
+    longest_s = core.config.max_time_s
+    decision_s = core.config.decision_s * batch.interval
+    steps = np.random.default_rng([seed, 5]).integers(0, max(1, int(0.9 * longest_s / decision_s)), core.n_games)
+    core.time_s[:] = steps * decision_s
+
+
+class PlacedVecEnv(MctfVecEnv):
+    """Learners whose observations end in their place in the team, one-hot: for a network per role."""
+
+    def __init__(self, batch: TeamBatch) -> None:
+        super().__init__(batch)
+        size = len(batch.boats)
+        self._places = np.tile(np.eye(size, dtype=np.float32), (batch.core.n_games, 1))
+        self.observation_space = Box(-1.0, 1.0, (batch.core.n_obs + size,), np.float32)
+
+    def reset(self) -> Any:
+        """As `MctfVecEnv.reset`."""
+        return self._placed(super().reset())
+
+    def step_wait(self) -> Any:
+        """As `MctfVecEnv.step_wait`."""
+        observations, rewards, done, infos = super().step_wait()
+        for i in np.flatnonzero(done):
+            last = infos[i]["terminal_observation"]
+            infos[i]["terminal_observation"] = np.concatenate([last, self._places[i]])
+        return self._placed(observations), rewards, done, infos
+
+    def _placed(self, observations: Any) -> Any:
+        return np.concatenate([observations, self._places], axis=1)

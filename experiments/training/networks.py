@@ -1,0 +1,153 @@
+"""The torch side of a policy: features, a network per role, and the way to numpy."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from steerclear.policies.entrants.learned.network import Features, Network
+from steerclear.policies.entrants.learned.sb3_file import network_of_tensors
+from torch import nn
+
+NEAR_M = 10.0
+"""Distances below about this are told apart by the features' nearness, m."""
+
+
+def features_of(core: Any, wanted: bool) -> Features:
+    """What a network is given of the observations of some games."""
+    names = [key if isinstance(key, str) else key[1] for key in core.observation_keys]
+    angles = [k for k, name in enumerate(names) if name.endswith(("bearing", "heading"))]
+    distances = [k for k, name in enumerate(names) if name.endswith("distance")]
+    longest_m = float(np.max(core.observation_high[distances]))
+    if not wanted:
+        return Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
+    return Features(np.array(angles), np.array(distances), 0.5 * longest_m / NEAR_M)
+
+
+class TeamFeatures(BaseFeaturesExtractor):
+    """`Features` in torch; of an observation with a place in the team behind it, that place is passed on.
+
+    Args:
+        space: of the observations.
+        features: what to make of them.
+        n_obs: length of an observation, without the place.
+        interval: game steps for which decisions are held; kept with the weights.
+    """
+
+    def __init__(self, space: Any, features: Features, n_obs: int, interval: int) -> None:
+        self._n_obs = n_obs
+        super().__init__(space, features.size(n_obs) + space.shape[0] - n_obs)
+        for name, values in (
+            ("angles", features.angles),
+            ("distances", features.distances),
+            ("plain", features.plain(n_obs)),
+            ("interval", np.array(interval)),
+        ):
+            self.register_buffer(name, torch.as_tensor(values))
+        self.register_buffer("gain", torch.tensor(features.gain, dtype=torch.float32))
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Features (N, size) of observations (N, n)."""
+        seen, place = observations[:, : self._n_obs], observations[:, self._n_obs :]
+        turn = np.float32(np.pi) * seen[:, self.angles]
+        near = torch.exp(-self.gain * (seen[:, self.distances] + 1.0))
+        return torch.cat([seen[:, self.plain], torch.sin(turn), torch.cos(turn), near, place], dim=1)
+
+
+class RoleExtractor(nn.Module):
+    """A network per role, of actor and critic: only the own role's part is not zero, so that heads are its own too.
+
+    Args:
+        size: features without the place.
+        roles: number of roles R.
+        hidden: widths.
+        activation: class.
+    """
+
+    def __init__(self, size: int, roles: int, hidden: tuple[int, ...], activation: Any) -> None:
+        super().__init__()
+        self.size, self.count, self.act = size, roles, activation()
+        self.latent_dim_pi = self.latent_dim_vf = roles * hidden[-1] + roles
+        self.register_buffer("roles", torch.tensor(roles))
+        widths = (size, *hidden)
+        for who in ("policy", "value"):
+            pairs = list(pairwise(widths))
+            weights = [nn.Parameter(_orthogonal(roles, one, two)) for one, two in pairs]
+            setattr(self, f"{who}_weights", nn.ParameterList(weights))
+            setattr(
+                self, f"{who}_biases", nn.ParameterList([nn.Parameter(torch.zeros(roles, two)) for _, two in pairs])
+            )
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Latents of actor and critic."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Latent (N, R * width + R) of the actor."""
+        return self._through(features, self.policy_weights, self.policy_biases)
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """Latent of the critic."""
+        return self._through(features, self.value_weights, self.value_biases)
+
+    def _through(self, features: torch.Tensor, weights: Any, biases: Any) -> torch.Tensor:
+        place = features[:, self.size :]
+        x = features[:, : self.size].expand(self.count, -1, -1)
+        for weight, bias in zip(weights, biases, strict=True):
+            x = self.act(torch.baddbmm(bias[:, None], x, weight))
+        own = x * place.T[:, :, None]
+        return torch.cat([own.permute(1, 0, 2).reshape(len(features), -1), place], dim=1)
+
+
+def _orthogonal(roles: int, one: int, two: int) -> torch.Tensor:
+    parts = [nn.init.orthogonal_(torch.empty(two, one), 2.0**0.5).T for _ in range(roles)]
+    return torch.stack(parts).contiguous()
+
+
+class BoatPolicy(ActorCriticPolicy):
+    """SB3's actor and critic with a network per role.
+
+    Args:
+        roles: number of roles; 1 is SB3's own network.
+    """
+
+    def __init__(self, *args: Any, roles: int = 1, **kwargs: Any) -> None:
+        self._roles = roles
+        super().__init__(*args, **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        if self._roles == 1:
+            super()._build_mlp_extractor()
+            return
+        hidden = tuple(self.net_arch["pi"] if isinstance(self.net_arch, dict) else self.net_arch)
+        size = self.features_dim - self._roles
+        self.mlp_extractor = RoleExtractor(size, self._roles, hidden, self.activation_fn).to(self.device)
+
+
+def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
+    """The actor of a policy in numpy."""
+    tensors = {name: value.detach().cpu().numpy() for name, value in policy.state_dict().items()}
+    return network_of_tensors(tensors, activation, None, card)
+
+
+def load_actor(policy: Any, network: Network) -> None:
+    """Put a shared network's weights into a policy's actor of the same shape.
+
+    Raises:
+        ValueError: of another shape.
+    """
+    names = [name for name in policy.state_dict() if name.startswith("mlp_extractor.policy_net")]
+    keys = sorted({name.rsplit(".", 1)[0] for name in names}, key=lambda name: int(name.rsplit(".", 1)[1]))
+    values = policy.state_dict()
+    layers = [*keys, "action_net"]
+    if len(layers) != len(network.weights) or network.roles != 1:
+        raise ValueError(f"{len(network.weights)} layers of {network.roles} roles, wanted {len(layers)} of 1")
+    for key, weight, bias in zip(layers, network.weights, network.biases, strict=True):
+        if values[f"{key}.weight"].shape != weight[0].T.shape:
+            raise ValueError(f"a layer of shape {weight[0].T.shape}, wanted {tuple(values[f'{key}.weight'].shape)}")
+        values[f"{key}.weight"].copy_(torch.as_tensor(weight[0].T))
+        values[f"{key}.bias"].copy_(torch.as_tensor(bias[0]))

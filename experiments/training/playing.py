@@ -1,0 +1,76 @@
+"""Games of a learned network against an opponent, many at once, counted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.policies.entrants.learned import LearnedBatch
+from steerclear.policies.entrants.learned.network import Network
+from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
+
+from ..statistics import mean_interval
+from .games import core_of, shield_of
+from .pool import opponent_of
+from .settings import TrainingSettings
+
+FIGURES = ("net", *EVENTS)
+
+
+def play_games(
+    settings: TrainingSettings, own: Any, opponent: str, games: int, seed: int, shielded: bool, side: str = "blue"
+) -> list[dict[str, float]]:
+    """One row per game: captures for less against (``net``) and the counts of `EVENTS`, hits over the whole team.
+
+    Args:
+        settings: whose rules are played.
+        own: network, batch policy or name of one.
+        opponent: name of the opponent.
+        games: how many.
+        seed: of starts and policies.
+        shielded: the team has the settings' shield.
+        side: colour of the team.
+    """
+    core = core_of(settings, games, seed)
+    team = 0 if side == "blue" else 1
+    core.reset(seed=seed)
+    ours = LearnedBatch(own) if isinstance(own, Network) else opponent_of(own) if isinstance(own, str) else own
+    foe = opponent_of(opponent)
+    ours.reset(core, team, seed)
+    foe.reset(core, 1 - team, seed + 1)
+    shield = shield_of(settings, core, side) if shielded else None
+    return _played(core, ours, foe, team, shield)
+
+
+def _played(core: Any, ours: Any, foe: Any, team: int, shield: Any) -> list[dict[str, float]]:
+    boats, others = np.flatnonzero(core.team == team), np.flatnonzero(core.team != team)
+    tallies = Tallies(core, team, boats)
+    command_filter = None if shield is None else shield.filter_for(team)
+    going = np.ones(core.n_games, np.bool_)
+    commands = np.zeros((core.n_games, core.n_boats, 2))
+    shape = (core.n_games, len(boats))
+    while going.any():
+        commands[:, boats] = ours.act(core, team)
+        commands[:, others] = foe.act(core, 1 - team)
+        core.step(commands, command_filter)
+        tallies.count(going, changed_by(shield, boats, shape))
+        going &= ~(core.terminated | core.truncated)
+    return _rows(tallies.step)
+
+
+def _rows(counts: Any) -> list[dict[str, float]]:
+    team = counts.mean(axis=2)
+    team[6:] = counts[6:].sum(axis=2)
+    rows = [dict(zip(EVENTS, column.tolist(), strict=True)) for column in team.T]
+    return [{"net": row["captures"] - row["captures_against"], **row} for row in rows]
+
+
+def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Means per game, and the 95 % interval of the net captures."""
+    if not rows:
+        return {"games": 0}
+    found: dict[str, Any] = {name: float(np.mean([row[name] for row in rows])) for name in FIGURES}
+    interval = mean_interval([row["net"] for row in rows]) if len(rows) > 1 else None
+    found["net_low"], found["net_high"] = (interval.low, interval.high) if interval else (found["net"], found["net"])
+    return {"games": len(rows), **found}

@@ -1,0 +1,114 @@
+"""Opponents from a pool: each game of a batch has one of them, drawn by the league's matching rule."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+from steerclear import policies
+from steerclear.policies.entrants.learned import LearnedBatch, batch_builder
+from steerclear.policies.entrants.learned.network import Network
+from steerclear.policies.registry import ENTRIES
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.jit import Array, BoolArray
+
+from .each_game import EachGame
+from .settings import League
+
+SELF = "self"
+LAST = 50
+"""Games that a mean score is over."""
+
+
+def opponent_of(name: str) -> Any:
+    """The batch policy of a name: scripted and learned ones at once, others one game after another.
+
+    Raises:
+        PolicyError: there is none.
+    """
+    if name in ENTRIES or batch_builder(name) is not None:
+        return policies.make_batch(name)
+    policies.check(name)
+    return EachGame(name)
+
+
+class Pool:
+    """A `BatchPolicy` made of several.
+
+    Args:
+        names: of the members; "self" stands for the snapshots added by `add_snapshot`.
+        league: the matching rule and how many snapshots are kept.
+        seed: of the draw.
+    """
+
+    def __init__(self, names: tuple[str, ...], league: League, seed: int) -> None:
+        self.name = ",".join(names)
+        self.league = league
+        self.members = {name: opponent_of(name) for name in names if name != SELF}
+        self.learns = SELF in names
+        if not self.members and not self.learns:
+            raise PolicyError("the pool of opponents is empty; name one at least")
+        self.scores: dict[str, deque[float]] = {name: deque(maxlen=LAST) for name in self.members}
+        self._rng = np.random.default_rng([seed, 77])
+        self._core: Any = None
+
+    def add_snapshot(self, network: Network, number: int) -> None:
+        """Add the learner as it is; the oldest snapshot goes where there are too many."""
+        name = f"{SELF}_{number}"
+        ours = [one for one in self.members if one.startswith(f"{SELF}_")]
+        if len(ours) >= self.league.keep:
+            self._drop(ours[0])
+        self.members[name] = LearnedBatch(network, name, sample=network.kind == "discrete")
+        self.scores[name] = deque(maxlen=LAST)
+        if self._core is not None:
+            self.members[name].reset(self._core, self._team, self._seed)
+
+    def _drop(self, name: str) -> None:
+        del self.members[name], self.scores[name]
+        if self._core is not None:
+            for game in np.flatnonzero(self.playing == name):
+                self.playing[game] = self._draw()
+
+    def reset(self, core: Any, team: int, seed: int) -> None:
+        """Begin all games."""
+        self._core, self._team, self._seed = core, team, seed
+        for member in self.members.values():
+            member.reset(core, team, seed)
+        self.playing = np.array([self._draw() for _ in range(core.n_games)], dtype=object)
+        self._out = np.zeros((core.n_games, int(np.sum(core.team == team)), 2))
+
+    def restart(self, chosen: BoolArray, seed: int) -> None:
+        """Begin the chosen games (B,) anew, each with an opponent drawn anew."""
+        for member in self.members.values():
+            member.restart(chosen, seed)
+        for game in np.flatnonzero(chosen):
+            self.playing[game] = self._draw()
+
+    def act(self, core: Any, team: int) -> Array:
+        """Commands (B, n_team, 2); the array is reused by the next call."""
+        for name, member in self.members.items():
+            mine = self.playing == name
+            if mine.any():
+                if isinstance(member, EachGame):
+                    member.plays(mine)
+                self._out[mine] = member.act(core, team)[mine]
+        return self._out
+
+    def ended(self, core: Any, games: BoolArray) -> None:
+        """Note how the learner did in games (B,) that have ended."""
+        for game in np.flatnonzero(games):
+            own, foe = core.captures[game, 1 - self._team], core.captures[game, self._team]
+            score = 0.5 + 0.5 * float(np.sign(own - foe))
+            if self.playing[game] in self.scores:
+                self.scores[self.playing[game]].append(score)
+
+    def weights(self) -> dict[str, float]:
+        """Each member's weight in the draw."""
+        means = {name: float(np.mean(scores)) if scores else 0.5 for name, scores in self.scores.items()}
+        return {name: (1.0 - mean) ** self.league.power + self.league.floor for name, mean in means.items()}
+
+    def _draw(self) -> str:
+        weights = self.weights()
+        share = np.array(list(weights.values()))
+        return str(self._rng.choice(list(weights), p=share / share.sum()))

@@ -1,0 +1,256 @@
+"""What a training is to be: frozen settings, checked when they are built; a config file's keys are their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from steerclear.shield.exceptions import ConfigError
+
+from ..spec import near
+from .checks import choice, count, number, texts
+
+SHIELDS = ("none", "deployment", "training", "training+intervention")
+ALGORITHMS = ("ppo", "qmix", "cloning")
+DEVICES = ("auto", "cpu", "cuda")
+INTERVENTION_WEIGHT = 0.02
+"""Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a curriculum, against a pool of opponents, which ends by its promotion rule.
+
+    Promotion: once ``games`` games that began in the stage have ended with a mean of at least ``net`` captures for less
+    against over the last ``games`` of them, or after ``most`` decisions of all boats together (0: never for that). The
+    last stage goes on until the training ends.
+
+    Attributes:
+        opponents: names as `steerclear.policies.make_batch` takes them, single-game policies (entrants, submissions;
+            slower), or "self": the league's snapshots of the learner.
+        net: captures for less against, a game.
+        games: games that the mean is over.
+        most: decisions.
+    """
+
+    opponents: tuple[str, ...] = ("medium",)
+    net: float = 2.0
+    games: int = 30
+    most: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "opponents", texts("opponents", self.opponents))
+        number("net", self.net, -100.0, 100.0)
+        count("games", self.games, 1, 100_000)
+        count("most", self.most, 0, 10**12)
+
+
+@dataclass(frozen=True)
+class Ppo:
+    """Settings of PPO, ours by default: large batches and few epochs keep the network's share of the time small.
+
+    Attributes are as in Stable-Baselines3; ``batch`` is the size of its minibatches, and a rollout is ``steps``
+    decisions of every boat in every game.
+    """
+
+    steps: int = 128
+    batch: int = 8192
+    epochs: int = 4
+    learning_rate: float = 1e-3
+    discount: float = 0.99
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    entropy: float = 0.01
+    value: float = 0.5
+    max_grad_norm: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name, most in (("steps", 100_000), ("batch", 10**7), ("epochs", 1000)):
+            count(name, getattr(self, name), 1, most)
+        for name in ("learning_rate", "clip", "max_grad_norm"):
+            number(name, getattr(self, name), 1e-9, 1e3)
+        for name in ("discount", "gae_lambda"):
+            number(name, getattr(self, name), 0.0, 1.0)
+        for name in ("entropy", "value"):
+            number(name, getattr(self, name), 0.0, 100.0)
+
+
+@dataclass(frozen=True)
+class Net:
+    """The network: widths of its hidden layers, activation, one for all boats or one per role, features or raw."""
+
+    hidden: tuple[int, ...] = (128, 128)
+    activation: str = "tanh"
+    roles: str = "shared"
+    features: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.hidden, (list, tuple)) or not 1 <= len(self.hidden) <= 8:
+            raise ConfigError(f"hidden is {self.hidden!r}; give a list of widths, such as [128, 128]")
+        object.__setattr__(self, "hidden", tuple(count("hidden", width, 1, 4096) for width in self.hidden))
+        choice("activation", self.activation, ("tanh", "relu"))
+        choice("roles", self.roles, ("shared", "each"))
+        if not isinstance(self.features, bool):
+            raise ConfigError(f"features is {self.features!r}; give true or false")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Games against held-out opponents during a training: every so many rollouts, games each, length in s."""
+
+    every: int = 20
+    opponents: tuple[str, ...] = ("medium",)
+    games: int = 16
+    seed: int = 900_000
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "opponents", texts("opponents", self.opponents))
+        count("every", self.every, 1, 10**6)
+        count("games", self.games, 1, 10_000)
+        count("seed", self.seed, 0, 2**40)
+
+
+@dataclass(frozen=True)
+class League:
+    """Snapshots of the learner as opponents.
+
+    Matching rule: each game that begins draws its opponent from the stage's pool with weight (1 - s)^power + floor,
+    where s is the learner's mean score (1 won, 0.5 drawn, 0 lost by captures) in its last 50 games against it; so those
+    who beat it come more often, and none is forgotten.
+
+    Attributes:
+        every: rollouts between snapshots, while "self" is in the pool.
+        keep: snapshots at most; the oldest goes.
+        power: how much more those that beat it come.
+        floor: least weight.
+    """
+
+    every: int = 20
+    keep: int = 4
+    power: float = 2.0
+    floor: float = 0.1
+
+    def __post_init__(self) -> None:
+        count("every", self.every, 1, 10**6)
+        count("keep", self.keep, 1, 100)
+        number("power", self.power, 0.0, 10.0)
+        number("floor", self.floor, 1e-6, 10.0)
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """All of a training.
+
+    Attributes:
+        algorithm: one of `ALGORITHMS`.
+        preset: rules of the game.
+        platform: of all boats; empty: the preset's.
+        rules: settings of the game that replace the preset's.
+        games: games at once.
+        decisions: decisions of all boats together after which the training ends.
+        interval: game steps for which a decision is held.
+        actions: "discrete" or "normalised".
+        stages: the curriculum.
+        rewards: weights of reward terms by name, see `rewards.TERMS`.
+        shield: one of `SHIELDS`.
+        shield_settings: of its `ShieldConfig`.
+        seed: of everything.
+        device: where the network learns; "auto" takes a GPU where there is one.
+        checkpoint_every: rollouts between checkpoints.
+        start: exported weights to begin with; empty: none.
+    """
+
+    algorithm: str = "ppo"
+    preset: str = "aamas2024"
+    platform: str = ""
+    rules: Mapping[str, Any] = field(default_factory=dict)
+    games: int = 64
+    decisions: int = 3_000_000
+    interval: int = 10
+    actions: str = "discrete"
+    stages: tuple[Stage, ...] = (Stage(),)
+    rewards: Mapping[str, float] = field(default_factory=lambda: {"sparse": 1.0, "progress": 1.0})
+    shield: str = "none"
+    shield_settings: Mapping[str, Any] = field(default_factory=dict)
+    ppo: Ppo = field(default_factory=Ppo)
+    net: Net = field(default_factory=Net)
+    evaluation: Evaluation = field(default_factory=Evaluation)
+    league: League = field(default_factory=League)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    device: str = "auto"
+    checkpoint_every: int = 10
+    start: str = ""
+
+    def __post_init__(self) -> None:
+        for name, known in (("algorithm", ALGORITHMS), ("shield", SHIELDS), ("device", DEVICES)):
+            choice(name, getattr(self, name), known)
+        choice("actions", self.actions, ("discrete", "normalised"))
+        count("games", self.games, 1, 100_000)
+        count("decisions", self.decisions, 1, 10**12)
+        count("interval", self.interval, 1, 1000)
+        count("seed", self.seed, 0, 2**40)
+        count("checkpoint_every", self.checkpoint_every, 1, 10**6)
+        if not self.stages:
+            raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")
+        for name, weight in self.rewards.items():
+            number(f"rewards.{name}", weight, -1000.0, 1000.0)
+
+    def reward_weights(self) -> dict[str, float]:
+        """Weights of the reward terms, the shield mode's own among them."""
+        weights = dict(self.rewards)
+        if self.shield == "training+intervention":
+            weights.setdefault("intervention", INTERVENTION_WEIGHT)
+        return weights
+
+    @property
+    def shielded_training(self) -> bool:
+        """Whether the shield stands in the games learned in."""
+        return self.shield.startswith("training")
+
+
+_PARTS: dict[str, Any] = {"ppo": Ppo, "net": Net, "evaluation": Evaluation, "league": League}
+
+
+def settings_of(content: Any, where: str = "the config") -> TrainingSettings:
+    """Settings from a config's content.
+
+    Raises:
+        ConfigError: an unknown key (the message names near ones), or a value that cannot be.
+    """
+    given = dict(_mapping(content, where))
+    _known(given, TrainingSettings, where)
+    for name, kind in _PARTS.items():
+        if name in given:
+            given[name] = _built(kind, given[name], f"{name} in {where}")
+    if "stages" in given:
+        if not isinstance(given["stages"], list):
+            raise ConfigError(f"stages in {where} is no list; give one stage a line: - opponents: [medium]")
+        given["stages"] = tuple(_built(Stage, one, f"a stage in {where}") for one in given["stages"])
+    for name in ("rules", "rewards", "shield_settings", "options"):
+        if name in given:
+            given[name] = dict(_mapping(given[name], f"{name} in {where}"))
+    return _built(TrainingSettings, given, where)
+
+
+def _built(kind: Any, given: Any, where: str) -> Any:
+    values = dict(_mapping(given, where))
+    _known(values, kind, where)
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {error}") from None
+
+
+def _known(given: Mapping[str, Any], kind: Any, where: str) -> None:
+    names = [entry.name for entry in fields(kind)]
+    for name in given:
+        if name not in names:
+            raise ConfigError(f"unknown key {name!r} in {where}; {near(str(name), names)}")
+
+
+def _mapping(content: Any, where: str) -> Mapping[str, Any]:
+    if not isinstance(content, Mapping):
+        raise ConfigError(f"{where} is {type(content).__name__}; give keys and values (docs/train.md)")
+    return content

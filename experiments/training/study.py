@@ -1,0 +1,100 @@
+"""The experiment: {none, deployment, training, training + intervention} x {collision term or not} x seeds.
+
+Trainings with the same games are made once: without a shield and with one at deployment only, the network is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.shield.exceptions import ConfigError
+
+from ..provenance import machine, versions
+from ..store import write_json
+from .algorithms import training_of
+from .playing import play_games, summary_of
+from .settings import SHIELDS, TrainingSettings
+
+COMMAND, RESULTS = "train-study", "results.json"
+COLLISION = {"off": 0.0, "on": 0.25}
+"""Weights of the collision term; that of the paper's Table 3."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One training, and how it is deployed."""
+
+    shield: str
+    collision: str
+    seed: int
+
+    @property
+    def training(self) -> str:
+        """Name of the training's folder: deployment changes nothing in it."""
+        shield = "none" if self.shield == "deployment" else self.shield
+        return f"{shield.replace('+', '_')}-collision_{self.collision}-seed_{self.seed}"
+
+
+def cells(seeds: int, first: int = 0) -> Iterator[Cell]:
+    """All cells of so many seeds."""
+    for seed in range(first, first + seeds):
+        for collision in COLLISION:
+            for shield in SHIELDS:
+                yield Cell(shield, collision, seed)
+
+
+def settings_of_cell(base: TrainingSettings, cell: Cell) -> TrainingSettings:
+    """The base's settings for a cell's training."""
+    rewards = {name: weight for name, weight in base.rewards.items() if name not in ("collision", "intervention")}
+    if COLLISION[cell.collision]:
+        rewards["collision"] = COLLISION[cell.collision]
+    shield = "none" if cell.shield == "deployment" else cell.shield
+    return replace(base, shield=shield, rewards=rewards, seed=base.seed + cell.seed)
+
+
+def run_study(
+    base: TrainingSettings, folder: Path, seeds: int, games: int, notice: Callable[[int, str], None]
+) -> dict[str, Any]:
+    """Train and play every cell; what a folder holds already is taken from there.
+
+    Args:
+        base: settings that all trainings share.
+        folder: where trainings and results go.
+        seeds: per cell.
+        games: played per cell and held-out opponent, not seen in training.
+        notice: told cells done, and the one under way.
+
+    Raises:
+        ConfigError: QMIX or cloning; a study is of PPO.
+    """
+    if base.algorithm != "ppo":
+        raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
+    rows: list[dict[str, Any]] = []
+    for done, cell in enumerate(cells(seeds)):
+        notice(done, cell.training)
+        rows += _cell_rows(base, cell, folder, games)
+        write_json(folder / RESULTS, _results(base, seeds, games, rows))
+    return _results(base, seeds, games, rows)
+
+
+def _cell_rows(base: TrainingSettings, cell: Cell, folder: Path, games: int) -> list[dict[str, Any]]:
+    settings, place = settings_of_cell(base, cell), folder / cell.training
+    if not (place / "final.npz").exists():
+        training_of(settings, place, resume=True).run()
+    network = read_weights(place / "final.npz")
+    rows = []
+    for opponent in base.evaluation.opponents:
+        played = play_games(settings, network, opponent, games, base.evaluation.seed, cell.shield != "none")
+        rows.append(
+            {**asdict(cell), "opponent": opponent, **summary_of(played), "nets": [one["net"] for one in played]}
+        )
+    return rows
+
+
+def _results(base: TrainingSettings, seeds: int, games: int, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    about = {"seeds": seeds, "games": games, "training": asdict(base)}
+    return {"command": COMMAND, "settings": about, "rows": rows, "versions": versions(), "machine": machine()}

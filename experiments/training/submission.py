@@ -1,0 +1,32 @@
+"""A network as a competition entry: a zip with ``solution.py`` and its weights, which needs numpy only."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from steerclear.env.whole_file import whole_file
+from steerclear.policies.entrants.learned.network import Network
+from steerclear.policies.entrants.learned.weights_file import arrays_of
+from steerclear.shield.exceptions import ConfigError, PolicyError
+
+TEMPLATE = Path(__file__).parent.parent / "templates" / "learned_solution.py.txt"
+
+
+def write_submission(network: Network, path: Path) -> Path:
+    """Write the zip, whole or not at all.
+
+    Raises:
+        ConfigError: entries send numbers of actions; this network sends speeds and headings.
+        PolicyError: it cannot be written.
+    """
+    if network.kind != "discrete":
+        raise ConfigError("an entry for the competition sends action numbers; train with actions: discrete")
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays_of(network))
+    with whole_file(path, PolicyError) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("solution.py", TEMPLATE.read_text(encoding="utf-8"))
+        archive.writestr("weights.npz", content.getvalue())
+    return path

@@ -1,0 +1,256 @@
+"""`Training`: rollouts, learning, curriculum, league, evaluation and checkpoints, until its decisions are made."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
+from steerclear.shield.exceptions import ConfigError
+
+from ..provenance import versions
+from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
+from .curve import write_curve
+from .games import learners_of, stagger
+from .learner import Learner
+from .playing import play_games, summary_of
+from .pool import SELF, Pool
+from .settings import TrainingSettings
+from .state import live_arrays, pool_facts, put_arrays, put_pool, put_rng, rng_facts
+
+BEST, FINAL, MODEL, SNAPSHOTS = "best.npz", "final.npz", "model.zip", "snapshots"
+Notice = Callable[[int, str], None]
+
+
+class Training:
+    """A training in a folder.
+
+    Args:
+        settings: what it is to be.
+        folder: where everything goes.
+        resume: go on from the folder's last checkpoint.
+
+    Attributes:
+        curve: one row per rollout.
+        decisions: of all boats together so far.
+
+    Raises:
+        ConfigError: an unusable setting or checkpoint.
+    """
+
+    def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
+        self.settings, self.folder = settings, folder
+        self.curve: list[dict[str, Any]] = []
+        self.decisions = self.rollouts = self.stage = self.stage_began = 0
+        self._best, self._wall_s = -np.inf, 0.0
+        self._recent: deque[float] = deque(maxlen=settings.stages[0].games)
+        self._checked_opponents()
+        self.batch = learners_of(settings, self._pool())
+        self.learner = Learner(settings, self.batch, self._card())
+        self._begin_games()
+        if resume:
+            self._resume()
+        self._last = self._packed()
+
+    def run(self, notice: Notice = lambda done, words: None) -> None:
+        """Train to the end; what is interrupted keeps all up to the last whole rollout."""
+        try:
+            while self.decisions < self.settings.decisions:
+                self._iterate()
+                notice(self.decisions, self._words())
+        finally:
+            write_checkpoint(self.folder, self._last[0]["rollouts"], *self._last)
+            write_curve(self.folder, self._last[0]["curve"], self.settings)
+        write_weights(self.learner.network(), self.folder / FINAL)
+        if not (self.folder / BEST).exists():
+            write_weights(self.learner.network(), self.folder / BEST)
+        self.learner.model.save(self.folder / MODEL)
+
+    def _iterate(self) -> None:
+        began = time.perf_counter()
+        ended = self.learner.rollout()
+        played = time.perf_counter()
+        told = self.learner.learn()
+        learned = time.perf_counter()
+        self.rollouts += 1
+        self.decisions += self.settings.ppo.steps * self.batch.learners
+        games = ended[:: len(self.batch.boats)]
+        row = {"decisions": self.decisions, "stage": self.stage, **_means(games), **told}
+        self._promote(games)
+        self._league()
+        row |= self._evaluate()
+        self._wall_s += time.perf_counter() - began
+        row["wall"] = {"total_s": self._wall_s, "games_s": played - began, "learning_s": learned - played}
+        self.curve.append(row)
+        self._last = self._packed()
+        if self.rollouts % self.settings.checkpoint_every == 0:
+            write_checkpoint(self.folder, self.rollouts, *self._last)
+            write_curve(self.folder, self.curve, self.settings)
+
+    def _promote(self, games: list[dict[str, float]]) -> None:
+        """Go to the next stage where this one's rule is met."""
+        self._recent.extend(one["captures"] - one["captures_against"] for one in games)
+        stage = self.settings.stages[self.stage]
+        if self.stage + 1 >= len(self.settings.stages):
+            return
+        full = len(self._recent) == stage.games and float(np.mean(self._recent)) >= stage.net
+        if full or 0 < stage.most <= self.decisions - self.stage_began:
+            self.stage, self.stage_began = self.stage + 1, self.decisions
+            self._recent = deque(maxlen=self.settings.stages[self.stage].games)
+            self.batch.opponent = self._pool()
+            if self.batch.opponent.learns:
+                self._add_snapshot()
+            self._begin_games(self.decisions)
+
+    def _league(self) -> None:
+        if self.batch.opponent.learns and self.rollouts % self.settings.league.every == 0:
+            self._add_snapshot()
+
+    def _add_snapshot(self) -> None:
+        network = self.learner.network()
+        write_weights(network, self.folder / SNAPSHOTS / f"{SELF}_{self.rollouts}.npz")
+        self.batch.opponent.add_snapshot(network, self.rollouts)
+
+    def _evaluate(self) -> dict[str, Any]:
+        """Games against held-out opponents, and the best kept."""
+        wanted = self.settings.evaluation
+        last = self.decisions >= self.settings.decisions
+        if self.rollouts % wanted.every and not last:
+            return {}
+        shielded = self.settings.shield != "none"
+        network = self.learner.network()
+        found = {
+            name: summary_of(play_games(self.settings, network, name, wanted.games, wanted.seed, shielded))
+            for name in wanted.opponents
+        }
+        mean = float(np.mean([one["net"] for one in found.values()]))
+        if mean > self._best:
+            self._best = mean
+            write_weights(network, self.folder / BEST)
+        return {"evaluation": found}
+
+    def _begin_games(self, more: int = 0) -> None:
+        if self.batch.opponent.learns and not self.batch.opponent.members:
+            self._add_snapshot()
+        self.batch._seed = self.settings.seed + more
+        self.learner.begin()
+        stagger(self.batch, self.settings.seed + more)
+
+    def _pool(self) -> Pool:
+        return Pool(self.settings.stages[self.stage].opponents, self.settings.league, self.settings.seed)
+
+    def _checked_opponents(self) -> None:
+        """Build every pool once, so that a missing opponent is found before long work."""
+        for stage in self.settings.stages:
+            Pool(stage.opponents, self.settings.league, 0)
+        for name in self.settings.evaluation.opponents:
+            Pool((name,), self.settings.league, 0)
+
+    def _packed(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        """Facts and copies of arrays of this moment."""
+        facts = {
+            "settings": asdict(self.settings),
+            "rollouts": self.rollouts,
+            "decisions": self.decisions,
+            "stage": self.stage,
+            "stage_began": self.stage_began,
+            "best": self._best if np.isfinite(self._best) else None,
+            "wall_s": self._wall_s,
+            "recent": list(self._recent),
+            "seed": self.batch._seed,
+            "pool": pool_facts(self.batch.opponent),
+            "rng": rng_facts(),
+            "curve": list(self.curve),
+        }
+        return facts, {**_copies(live_arrays(self.batch)), **self.learner.arrays()}
+
+    def _resume(self) -> None:
+        """Go on from the last whole checkpoint.
+
+        Raises:
+            ConfigError: there is none, or it is of another training.
+        """
+        found = checkpoints_in(self.folder)
+        if not found:
+            return
+        facts, arrays = _newest(found)
+        self._check_same(facts["settings"])
+        self.rollouts, self.decisions, self.curve = facts["rollouts"], facts["decisions"], facts["curve"]
+        self.stage, self.stage_began = facts["stage"], facts["stage_began"]
+        self._best = -np.inf if facts["best"] is None else facts["best"]
+        self._wall_s = facts["wall_s"]
+        self._recent = deque(facts["recent"], maxlen=self.settings.stages[self.stage].games)
+        pool = self._pool()
+        pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
+        for name in facts["pool"]["members"]:
+            if name not in pool.members:
+                number = int(name.removeprefix(f"{SELF}_"))
+                pool.add_snapshot(read_weights(self.folder / SNAPSHOTS / f"{name}.npz"), number)
+        self.batch.opponent = pool
+        pool.reset(self.batch.core, 1 - self.batch.team, facts["seed"])
+        self.batch._seed = facts["seed"]
+        put_pool(pool, facts["pool"])
+        self.learner.put(arrays)
+        put_arrays(self.batch, arrays)
+        put_rng(facts["rng"])
+
+    def _check_same(self, before: dict[str, Any]) -> None:
+        now = _plain(asdict(self.settings))
+        for name in now:
+            if name not in ("decisions", "checkpoint_every", "device") and now[name] != before.get(name):
+                raise ConfigError(
+                    f"{self.folder} was begun with another {name}; resume with its own config.yaml, or "
+                    "name another --out"
+                )
+
+    def _card(self) -> dict[str, Any]:
+        return {
+            "trained_with": "steerclear train",
+            "preset": self.settings.preset,
+            "platform": self.settings.platform,
+            "shield": self.settings.shield,
+            "seed": self.settings.seed,
+            "versions": {name: versions()[name] for name in ("steerclear", "python") if name in versions()},
+        }
+
+    def _words(self) -> str:
+        """What the progress bar says."""
+        row = self.curve[-1]
+        rate = (
+            self.settings.ppo.steps
+            * self.batch.learners
+            / max(row["wall"]["games_s"] + row["wall"]["learning_s"], 1e-9)
+        )
+        net = row["captures"] - row["captures_against"] if row["games"] else float("nan")
+        return f"stage {self.stage + 1}/{len(self.settings.stages)}, net {net:+.1f} a game, {rate:,.0f} decisions/s"
+
+
+def _newest(found: list[Path]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    return read_checkpoint(found[-1])
+
+
+def _plain(value: Any) -> Any:
+    """As it is after a way through JSON."""
+    import json
+
+    return json.loads(json.dumps(value))
+
+
+def _copies(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: np.array(value) for name, value in arrays.items()}
+
+
+def _means(games: list[dict[str, float]]) -> dict[str, Any]:
+    """Means of ended games, under the names of their totals."""
+    names = ("r", "l", "captures", "captures_against", "grabs", "grabs_against", "tags", "tags_against", "hits")
+    means = {name: float(np.mean([one[name] for one in games])) if games else None for name in names}
+    return {"games": len(games), **means, "interventions": _mean_of(games, "interventions")}
+
+
+def _mean_of(games: list[dict[str, float]], name: str) -> float | None:
+    return float(np.mean([one[name] for one in games])) if games else None

@@ -1,0 +1,68 @@
+"""Learned teams: networks of numpy weights, played without torch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .play import LearnedBatch, LearnedTeam
+from .weights_file import read_weights
+
+WEIGHTS, SB3 = "weights:", "sb3:"
+TEAMS = Path(__file__).parent / "teams"
+"""Where the weights of our learned entrants lie, with config and curve beside them."""
+
+
+class Builder(NamedTuple):
+    """What builds a batch policy, and its first arguments."""
+
+    build: Callable[..., Any]
+    first: tuple[Any, ...]
+
+
+def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam:
+    """An exported network as a team policy.
+
+    Args:
+        path: the ``.npz`` that ``steerclear export`` wrote.
+        sample: draw actions with the network's probabilities instead of taking the likeliest.
+
+    Raises:
+        PolicyError: no such file, or none of ours.
+    """
+    return LearnedTeam(read_weights(path), Path(path).stem, sample)
+
+
+def load_weights_batch(path: str | Path, sample: bool = False) -> LearnedBatch:
+    """The same for a batch of games."""
+    return LearnedBatch(read_weights(path), Path(path).stem, sample)
+
+
+def load_sb3_batch(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedBatch:
+    """A saved Stable-Baselines3 model for a batch of games. Its tensors alone are read: none of its pickles runs.
+
+    Args:
+        path: the zip ``model.save`` wrote.
+        sample: draw actions with the network's probabilities.
+        interval: game steps for which a decision is held; None: as it learned, 1 where the file does not say.
+
+    Raises:
+        PolicyError: torch is missing, or the file is no model this can play.
+    """
+    from .sb3_file import read_sb3
+
+    return LearnedBatch(read_sb3(path, interval), Path(path).stem, sample)
+
+
+def batch_builder(name: str) -> Builder | None:
+    """What builds the batch policy of that name; None where it is no learned one."""
+    from .entered import FILES
+
+    if name.startswith(WEIGHTS):
+        return Builder(load_weights_batch, (name.removeprefix(WEIGHTS),))
+    if name.startswith(SB3):
+        return Builder(load_sb3_batch, (name.removeprefix(SB3),))
+    if name in FILES:
+        return Builder(load_weights_batch, (FILES[name],))
+    return None

@@ -1,0 +1,123 @@
+"""`Chooser`: a small network over options, in numpy, from what a demonstration's row tells of a boat's sight."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.whole_file import whole_file
+from steerclear.shield.exceptions import PolicyError
+
+from ..options import OPTIONS
+
+Floats = NDArray[np.float64]
+OPTION_NAMES = tuple(OPTIONS)
+FORMAT = "steerclear-chooser"
+SKIPPED = frozenset({"option", "since_s", "chosen", "time_s", "boat"})
+ABOUT = frozenset({"preset", "opponent", "side", "seed", "captures", "captures_against"})
+MAX_BYTES = 16 * 2**20
+
+
+@dataclass
+class Chooser:
+    """One hidden layer of tanh, and a value per option.
+
+    Attributes:
+        names: of the numbers it looks at, columns of a demonstration.
+        middle, scale: (n,) what is taken off and multiplied with first.
+        w1, b1, w2, b2: layers, (n, hidden), (hidden,), (hidden, options), (options,).
+        card: where it comes from.
+    """
+
+    names: list[str]
+    middle: Floats
+    scale: Floats
+    w1: Floats
+    b1: Floats
+    w2: Floats
+    b2: Floats
+    card: dict[str, Any]
+
+    @staticmethod
+    def columns(row: Mapping[str, Any]) -> list[str]:
+        """Numbers of a row that a choice may depend on."""
+        return [name for name in row if name not in SKIPPED | ABOUT]
+
+    @classmethod
+    def fresh(cls, names: list[str], hidden: int, rng: np.random.Generator, card: dict[str, Any]) -> Chooser:
+        """One that has learned nothing."""
+        n, k = len(names), len(OPTION_NAMES)
+        w1, w2 = rng.normal(size=(n, hidden)) / np.sqrt(n), rng.normal(size=(hidden, k)) / np.sqrt(hidden)
+        return cls(names, np.zeros(n), np.ones(n), w1, np.zeros(hidden), w2, np.zeros(k), card)
+
+    def scale_to(self, seen: Floats) -> None:
+        """Bring what is looked at to mean 0 and deviation 1."""
+        spread = seen.std(axis=0)
+        self.middle, self.scale = seen.mean(axis=0), 1.0 / np.where(spread > 1e-9, spread, 1.0)
+
+    def values(self, seen: Floats) -> Floats:
+        """Values (N, options) of sights (N, n)."""
+        values: Floats = np.tanh((seen - self.middle) * self.scale @ self.w1 + self.b1) @ self.w2 + self.b2
+        return values
+
+    def choices(self, seen: Floats) -> NDArray[np.int64]:
+        """Numbers (N,) of the options it would choose."""
+        return np.argmax(self.values(seen), axis=1)
+
+    def parameters(self) -> list[Floats]:
+        """Arrays that learning changes."""
+        return [self.w1, self.b1, self.w2, self.b2]
+
+    def gradients(self, seen: Floats, chosen: NDArray[np.int64]) -> list[Floats]:
+        """Of the mean cross-entropy, in the order of `parameters`."""
+        x = (seen - self.middle) * self.scale
+        hidden = np.tanh(x @ self.w1 + self.b1)
+        values = hidden @ self.w2 + self.b2
+        share = np.exp(values - values.max(axis=1, keepdims=True))
+        share /= share.sum(axis=1, keepdims=True)
+        share[np.arange(len(chosen)), chosen] -= 1.0
+        share /= len(chosen)
+        back = (share @ self.w2.T) * (1.0 - hidden**2)
+        return [x.T @ back, back.sum(axis=0), hidden.T @ share, share.sum(axis=0)]
+
+
+def write_chooser(chooser: Chooser, path: Path) -> Path:
+    """Write one, whole or not at all.
+
+    Raises:
+        PolicyError: the file cannot be written.
+    """
+    about = {"format": FORMAT, "names": chooser.names, "options": OPTION_NAMES, "card": chooser.card}
+    arrays = {name: getattr(chooser, name) for name in ("middle", "scale", "w1", "b1", "w2", "b2")}
+    with whole_file(path, PolicyError) as part, part.open("wb") as file:
+        np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
+    return path
+
+
+def read_chooser(path: Path) -> Chooser:
+    """Read one; nothing in it is run.
+
+    Raises:
+        PolicyError: there is none, or it is cut short.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > MAX_BYTES:
+                raise ValueError("it is too large")
+        with np.load(path, allow_pickle=False) as found:
+            about = json.loads(str(found["about"]))
+            arrays = {name: found[name] for name in ("middle", "scale", "w1", "b1", "w2", "b2")}
+        if about["format"] != FORMAT or tuple(about["options"]) != OPTION_NAMES:
+            raise ValueError("it chooses among other options")
+        if not all(np.isfinite(array).all() for array in arrays.values()):
+            raise ValueError("a number is not finite")
+        return Chooser(names=list(about["names"]), card=about["card"], **arrays)
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError, EOFError, zlib.error) as error:
+        raise PolicyError(f"{path} holds no chooser ({error}); train one with algorithm: cloning") from error

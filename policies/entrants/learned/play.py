@@ -1,0 +1,152 @@
+"""A network as a team: in every game of a batch, and in one game."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from steerclear.env.angles import wrap_bearing
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.platforms import layout as L
+
+from ...scripted.team import boat_numbers, game_core
+from .network import Network
+
+_SEED_MASK = (1 << 64) - 1
+
+
+class LearnedBatch:
+    """A `BatchPolicy` that plays a network. Each decision is held for the network's interval, as a course steered.
+
+    Args:
+        network: the network.
+        name: name for records and reports.
+        sample: draw actions with the network's probabilities instead of taking the likeliest (discrete ones only).
+
+    Raises:
+        PolicyError: sampling is asked of a network without probabilities.
+    """
+
+    def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
+        if sample and network.kind != "discrete":
+            raise PolicyError(f"policy {name!r} has no probabilities to draw actions with; leave out sample")
+        self.network, self.name, self.sample = network, name, sample
+        self._team = -1
+
+    def reset(self, core: Any, team: int, seed: int, boats: Any = None) -> None:
+        """Begin all games, as `ScriptedBatch.reset`.
+
+        Raises:
+            PolicyError: the network was made for other observations, or for teams of another size.
+        """
+        own = np.flatnonzero(core.team == team)
+        self._team, self._boats = team, own if boats is None else np.asarray(boats, np.int64)
+        self._roles = np.searchsorted(own, self._boats)
+        self._check(core.n_obs, own.size)
+        shape = (core.n_games, self._boats.size)
+        self._top_mps = core.max_speed_mps[self._boats]
+        self._left = np.zeros(core.n_games, np.int64)
+        self._speed_mps, self._heading_deg = np.zeros(shape), np.zeros(shape)
+        self._out = np.zeros((*shape, 2))
+        self._streams = np.zeros(core.n_games, np.uint64)
+        self._drawn = np.zeros(core.n_games, np.int64)
+        self.restart(np.ones(core.n_games, np.bool_), seed)
+
+    def _check(self, n_obs: int, team_size: int) -> None:
+        net = self.network
+        if n_obs != net.n_obs:
+            raise PolicyError(
+                f"policy {self.name!r} takes observations of {net.n_obs} numbers, this game makes {n_obs}; "
+                "play it in the game it learned in (team_size, obstacles, preset)"
+            )
+        if net.roles not in (1, team_size):
+            raise PolicyError(f"policy {self.name!r} has {net.roles} roles, the team has {team_size} boats")
+
+    def restart(self, chosen: BoolArray, seed: int) -> None:
+        """Begin the chosen games (B,) anew."""
+        self._left[chosen] = 0
+        self._drawn[chosen] = 0
+        for game in np.flatnonzero(chosen):
+            self._streams[game] = (int(seed) + int(game)) & _SEED_MASK
+
+    def act(self, core: Any, team: int) -> Array:
+        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call.
+
+        Raises:
+            PolicyError: `reset` was not called for this team and number of games.
+        """
+        if team != self._team or core.n_games != self._out.shape[0]:
+            raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
+        return self.answer(core.observations[:, self._boats], core.state[:, self._boats, L.HEADING])
+
+    def answer(self, observations: Any, heading_deg: Array) -> Array:
+        """Commands from observations (B, n_team, n_obs) and headings (B, n_team) deg."""
+        due = np.flatnonzero(self._left == 0)
+        if due.size:
+            self._decide(due, observations[due], heading_deg[due])
+        self._left -= 1
+        self._out[..., 0] = self._speed_mps
+        self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
+        return self._out
+
+    def _decide(self, due: Any, observations: Any, heading_deg: Array) -> None:
+        games, boats = heading_deg.shape
+        outputs = self.network.outputs(observations.reshape(games * boats, -1), np.tile(self._roles, games))
+        if self.sample:
+            outputs = outputs + self._gumbel(due, boats, outputs.shape[1])
+        commands = self.network.commands(outputs, np.tile(self._top_mps, games)).reshape(games, boats, 2)
+        self._speed_mps[due] = commands[..., 0]
+        self._heading_deg[due] = heading_deg + commands[..., 1]
+        self._left[due] = self.network.interval
+
+    def _gumbel(self, due: Any, boats: int, actions: int) -> Any:
+        """Noise whose argmax with logits is a draw by their probabilities; each game has numbers of its own."""
+        rows = []
+        for game in due:
+            rng = np.random.default_rng([int(self._streams[game]), int(self._drawn[game])])
+            rows.append(rng.gumbel(size=(boats, actions)).astype(np.float32))
+            self._drawn[game] += 1
+        return np.concatenate(rows)
+
+
+class LearnedTeam:
+    """The same in one game: a thin front over `LearnedBatch`.
+
+    Args:
+        network: the network.
+        name: name for records and reports.
+        sample: see `LearnedBatch`.
+    """
+
+    def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
+        self.name = name
+        self._batch = LearnedBatch(network, name, sample)
+        self._ids: list[str] = []
+
+    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
+        """Begin a game.
+
+        Raises:
+            PolicyError: not an `MctfEnv`, unknown boats, or a game the network was not made for.
+        """
+        self._core = game_core(env)
+        boats = boat_numbers(self._core, agent_ids)
+        self._boats, self._ids = boats, list(agent_ids)
+        self._batch.reset(self._core, int(self._core.team[boats[0]]), seed, boats)
+
+    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+        """Actions (speed m/s, relative heading deg) of the boats.
+
+        Raises:
+            PolicyError: `reset` was not called.
+        """
+        if not self._ids:
+            raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        seen = np.stack([observations[agent_id] for agent_id in self._ids])[None]
+        rows = self._batch.answer(seen, self._core.state[:, self._boats, L.HEADING])[0]
+        return {
+            agent_id: (float(speed), wrap_bearing(float(turn)))
+            for agent_id, (speed, turn) in zip(self._ids, rows, strict=True)
+        }

@@ -1,0 +1,62 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from steerclear.experiments.cli import app
+from steerclear.experiments.training.settings import settings_of
+from typer.testing import CliRunner
+
+ROOT = Path(__file__).parents[3]
+
+
+def call(*words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
+    folder = tmp_path / "first"
+    assert call("train", tiny(decisions=36), "--out", folder).exit_code == 0
+    again = call("train", tiny(decisions=36), "--out", folder)
+    assert again.exit_code == 2
+    assert "add --resume" in again.output
+    files = "--out", tmp_path / "team.npz", "--submission", tmp_path / "solution.zip"
+    assert call("export", folder / "model.zip", *files).exit_code == 0
+    for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
+        played = call("evaluate", policy, "--opponent", "hold", "--games", 1, "--max-time", 3, "--shield", "off",
+                      "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
+        assert played.exit_code == 0, played.output
+
+
+def test_bad_input_is_one_line(tiny, tmp_path):
+    (tmp_path / "bad.yaml").write_text("gamess: 3")
+    result = call("train", tmp_path / "bad.yaml", "--out", tmp_path / "x")
+    assert result.exit_code == 2
+    assert "unknown key 'gamess'" in result.output
+    (tmp_path / "no.zip").write_bytes(b"PK")
+    result = call("export", tmp_path / "no.zip", "--out", tmp_path / "w.npz")
+    assert result.exit_code == 2
+    assert "is not a Stable-Baselines3 model" in result.output
+
+
+def test_every_team_has_a_config_that_can_be_read():
+    found = sorted((ROOT / "policies/entrants/learned/teams").glob("*.yaml"))
+    assert {path.stem for path in found} == {"crowley", "jin", "leprell", "ours", "richley"}
+    for path in found:
+        settings_of(yaml.safe_load(path.read_text()))
+        weights = path.with_suffix(".npz")
+        assert not weights.exists() or weights.stat().st_size <= 1_000_000
+
+
+def test_playing_exported_weights_needs_no_torch():
+    words = (
+        "import sys; from steerclear.policies.entrants import learned; "
+        "assert not any(name.split('.')[0] in ('torch', 'stable_baselines3') for name in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", words], timeout=120, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["train", "export", "train-study"])
+def test_the_commands_are_there(command):
+    assert call(command, "--help").exit_code == 0

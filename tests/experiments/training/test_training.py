@@ -1,0 +1,131 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import yaml
+from steerclear import policies
+from steerclear.experiments.training.checkpoints import checkpoints_in, read_checkpoint
+from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.learner import DivergedError
+from steerclear.experiments.training.training import Training
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.shield.exceptions import ConfigError
+
+
+def without_time(curve):
+    return [{name: value for name, value in row.items() if name != "wall"} for row in curve]
+
+
+def trained(config, folder, resume=False):
+    training = Training(read_config(config), folder, resume)
+    training.run()
+    return training
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, tiny_content):
+    folder = tmp_path_factory.mktemp("whole")
+    config = folder / "c.yaml"
+    config.write_text(yaml.safe_dump(tiny_content))
+    return trained(config, folder / "run"), folder / "run"
+
+
+def test_a_training_leaves_weights_curve_model_and_checkpoints(whole):
+    training, folder = whole
+    content = json.loads((folder / "curve.json").read_text())
+    assert [row["decisions"] for row in content["rows"]] == [36, 72, 108, 144]
+    assert training.stage == 1  # the first stage's rule is met at once
+    assert {"net", "net_low", "net_high", "games"} <= content["rows"][-1]["evaluation"]["medium"].keys()
+    assert len(checkpoints_in(folder)) == 2
+    for name in ("best.npz", "final.npz", "model.zip"):
+        assert (folder / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize("roles", ["shared", "each"])
+def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, roles, whole):
+    changes = {"net": {"hidden": [16], "roles": roles}}
+    reference = whole[0] if roles == "shared" else trained(tiny(**changes), tmp_path / "whole")
+    trained(tiny(decisions=72, **changes), tmp_path / "half")
+    again = trained(tiny(**changes), tmp_path / "half", resume=True)
+    assert without_time(again.curve) == without_time(reference.curve)
+    for one, two in zip(reference.learner.network().weights, again.learner.network().weights, strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_what_is_interrupted_is_kept_up_to_the_last_rollout(tiny, tmp_path):
+    training = Training(read_config(tiny(checkpoint_every=100)), tmp_path / "run")
+
+    def stop(done, words):
+        if done >= 72:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        training.run(stop)
+    facts, _ = read_checkpoint(checkpoints_in(tmp_path / "run")[-1])
+    assert facts["decisions"] == 72
+    assert len(json.loads((tmp_path / "run" / "curve.json").read_text())["rows"]) == 2
+
+
+def test_a_loss_that_is_not_finite_ends_in_one_line_and_keeps_what_was(tiny, tmp_path, monkeypatch):
+    training = Training(read_config(tiny()), tmp_path / "run")
+    learn = training.learner.learn
+
+    def poisoned():
+        if training.rollouts == 1:
+            for parameter in training.learner.model.policy.parameters():
+                parameter.data.fill_(float("nan"))
+        return learn()
+
+    monkeypatch.setattr(training.learner, "learn", poisoned)
+    with pytest.raises(DivergedError, match=r"no longer finite; lower ppo\.learning_rate"):
+        training.run()
+    facts, arrays = read_checkpoint(checkpoints_in(tmp_path / "run")[-1])
+    assert facts["rollouts"] == 1
+    assert all(np.isfinite(value).all() for name, value in arrays.items() if name.startswith("policy/"))
+
+
+def test_a_damaged_or_foreign_checkpoint_is_refused_in_one_line(tiny, tmp_path, whole):
+    folder = tmp_path / "run"
+    Training(read_config(tiny(decisions=36)), folder).run()
+    with pytest.raises(ConfigError, match="another net; resume with its own config"):
+        Training(read_config(tiny(net={"hidden": [8]})), folder, resume=True)
+    newest = checkpoints_in(folder)[-1]
+    newest.write_bytes(newest.read_bytes()[:500])
+    with pytest.raises(ConfigError, match=r"no whole checkpoint.*delete it"):
+        Training(read_config(tiny(decisions=36)), folder, resume=True)
+
+
+def test_the_exported_model_plays_as_the_trained_one(whole, tmp_path):
+    training, folder = whole
+    import torch
+
+    network, batch = read_weights(folder / "final.npz"), policies.make_batch(f"sb3:{folder / 'model.zip'}")
+    seen = np.random.default_rng(0).uniform(-1, 1, (10_000, network.n_obs)).astype(np.float32)
+    roles = np.zeros(len(seen), np.int64)
+    policy = training.learner.model.policy
+    with torch.no_grad():
+        logits = policy.get_distribution(torch.as_tensor(seen)).distribution.logits.numpy()
+    ours = network.outputs(seen, roles)
+    assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
+    assert (np.argmax(ours, 1) == np.argmax(logits, 1)).all()
+    assert batch.network.interval == network.interval == 10
+
+
+@pytest.mark.study
+def test_kill_9_costs_nothing_but_the_rollouts_since_the_checkpoint(tiny, tmp_path):
+    config, folder = tiny(), tmp_path / "run"
+    words = [sys.executable, "-m", "steerclear.experiments.cli", "train", str(config), "--out", str(folder)]
+    process = subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    until = time.monotonic() + 240
+    while not checkpoints_in(folder) and time.monotonic() < until:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    again = trained(config, folder, resume=True)
+    reference = trained(config, tmp_path / "whole")
+    assert without_time(again.curve) == without_time(reference.curve)

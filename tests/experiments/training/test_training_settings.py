@@ -1,0 +1,55 @@
+import pytest
+from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.games import learners_of
+from steerclear.experiments.training.pool import Pool
+from steerclear.experiments.training.settings import League, settings_of
+from steerclear.shield.exceptions import ConfigError, PolicyError
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"presett": "aamas2024"}, "unknown key 'presett' in the config; did you mean preset"),
+        ({"ppo": {"batchsize": 4}}, "unknown key 'batchsize' in ppo in the config"),
+        ({"stages": {}}, "stages in the config is no list"),
+        ({"stages": []}, "stages is empty; give one stage at least"),
+        ({"stages": [{"opponents": "medium"}]}, r"opponents is 'medium'; give a list of names"),
+        ({"shield": "always"}, "shield is 'always'; choose one of none, deployment"),
+        ({"games": True}, "games is True; give a whole number from 1"),
+        ({"ppo": {"learning_rate": float("nan")}}, "learning_rate is nan; give a number"),
+        ({"net": {"hidden": []}}, r"hidden is \[\]; give a list of widths"),
+        ([], "the config is list; give keys and values"),
+    ],
+)
+def test_what_a_config_may_not_say(content, words):
+    with pytest.raises(ConfigError, match=words):
+        settings_of(content)
+
+
+def test_a_file_that_is_none_or_no_yaml(tmp_path):
+    with pytest.raises(ConfigError, match="cannot read"):
+        read_config(tmp_path / "none.yaml")
+    (tmp_path / "bad.yaml").write_text("a: [")
+    with pytest.raises(ConfigError, match="is no YAML"):
+        read_config(tmp_path / "bad.yaml")
+
+
+def test_a_missing_opponent_and_an_unknown_reward_are_found_at_once():
+    with pytest.raises(PolicyError, match="unknown policy 'mediun'; did you mean medium"):
+        Pool(("mediun",), League(), 0)
+    with pytest.raises(ConfigError, match="unknown reward term 'captures'; choose one of sparse"):
+        learners_of(settings_of({"games": 1, "rewards": {"captures": 1.0}}), None)
+
+
+def test_the_intervention_term_comes_with_its_shield_mode():
+    assert "intervention" in settings_of({"shield": "training+intervention"}).reward_weights()
+    assert "intervention" not in settings_of({"shield": "training"}).reward_weights()
+
+
+def test_those_who_beat_the_learner_come_more_often():
+    pool = Pool(("hold", "easy"), League(power=2.0, floor=0.1), 0)
+    pool.scores["hold"].extend([1.0] * 10)
+    pool.scores["easy"].extend([0.0] * 10)
+    assert pool.weights() == pytest.approx({"hold": 0.1, "easy": 1.1})
+    draws = [pool._draw() for _ in range(600)]
+    assert 0.85 < draws.count("easy") / 600 < 0.97

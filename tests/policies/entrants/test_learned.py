@@ -1,0 +1,73 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
+from steerclear.env.mctf import MctfEnv
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned.network import Features, Network
+from steerclear.policies.entrants.learned.weights_file import write_weights
+from steerclear.shield.exceptions import PolicyError
+
+
+def network(roles=1, interval=5, kind="discrete", n_obs=61, seed=0):
+    rng = np.random.default_rng(seed)
+    features = Features(np.array([0, 2, 4]), np.array([1, 3]), 4.0)
+    sizes = (features.size(n_obs), 16, 17 if kind == "discrete" else 2)
+    weights = [rng.normal(size=(roles, a, b)).astype(np.float32) for a, b in pairwise(sizes)]
+    biases = [rng.normal(size=(roles, b)).astype(np.float32) for b in sizes[1:]]
+    return Network(weights, biases, features, "tanh", kind, interval, n_obs, {"note": "test"})
+
+
+def test_weights_come_back_as_they_were(tmp_path):
+    for kind in ("discrete", "normalised"):
+        one = network(3, kind=kind)
+        two = read_weights(write_weights(one, tmp_path / "w.npz"))
+        seen = np.random.default_rng(1).uniform(-1, 1, (50, 61)).astype(np.float32)
+        roles = np.arange(50) % 3
+        np.testing.assert_array_equal(one.outputs(seen, roles), two.outputs(seen, roles))
+        assert two.card == {"note": "test"}
+
+
+def test_files_that_are_no_weights_are_refused_in_one_line(tmp_path):
+    whole = write_weights(network(), tmp_path / "w.npz").read_bytes()
+    bad = {"cut": whole[: len(whole) // 2], "text": b"hello", "empty": b""}
+    for name, content in bad.items():
+        (tmp_path / f"{name}.npz").write_bytes(content)
+        with pytest.raises(PolicyError, match="no usable weights") as caught:
+            policies.make(f"weights:{tmp_path / name}.npz")
+        assert "\n" not in str(caught.value)
+    np.savez(tmp_path / "objects.npz", about=np.array([{}], dtype=object))
+    with pytest.raises(PolicyError, match="no usable weights"):
+        policies.make_batch(f"weights:{tmp_path / 'objects.npz'}")
+    np.savez(tmp_path / "other.npz", about=np.array('{"format": "x"}'))
+    with pytest.raises(PolicyError, match="another kind of file"):
+        read_weights(tmp_path / "other.npz")
+    with pytest.raises(PolicyError, match="there are no weights"):
+        policies.make("weights:none.npz")
+
+
+def test_one_game_plays_as_one_of_a_batch(tmp_path):
+    path = write_weights(network(3), tmp_path / "w.npz")
+    config = GameConfig.preset("aamas2024", max_time_s=3.0, default_start=False)
+    env, core = MctfEnv(config, action_kind="continuous"), BatchedMctf(config, n_games=1)
+    observations, infos = env.reset(seed=3)
+    core.reset(seed=3)
+    single, batch = policies.make(f"weights:{path}"), policies.make_batch(f"weights:{path}")
+    single.reset(env, list(config.agent_ids[:3]), 0)
+    batch.reset(core, 0, 0)
+    commands = np.zeros((1, 6, 2))
+    for _ in range(20):
+        actions = single.act(observations, infos)
+        commands[:, :3] = batch.act(core, 0)
+        np.testing.assert_allclose(list(actions.values()), commands[0, :3], atol=1e-9)
+        observations, _, _, _, infos = env.step(actions)
+        core.step(commands)
+
+
+def test_a_network_for_other_games_is_refused(tmp_path):
+    path = write_weights(network(n_obs=30), tmp_path / "w.npz")
+    with pytest.raises(PolicyError, match="takes observations of 30 numbers, this game makes 61"):
+        policies.make_batch(f"weights:{path}").reset(BatchedMctf("aamas2024", 1), 0, 0)

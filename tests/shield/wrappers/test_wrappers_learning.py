@@ -1,0 +1,89 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch
+
+
+def batch(seconds=1.0, games=2, **settings):
+    core = BatchedMctf(GameConfig.preset("aamas2024", max_time_s=seconds, default_start=False), n_games=games)
+    return TeamBatch(core, policies.make_batch("medium"), "blue", **settings)
+
+
+def test_normalised_actions_are_the_same_commands():
+    one, two = batch(actions="normalised"), batch(actions="continuous")
+    one.reset(3), two.reset(3)
+    for _ in range(5):
+        left = one.step(np.tile([[0.0, 0.5]], (6, 1)))
+        right = two.step(np.tile([[0.5 * two.top_speed_mps, 90.0]], (6, 1)))
+        np.testing.assert_array_equal(left.observations, right.observations)
+
+
+def test_a_held_decision_steers_a_course():
+    from steerclear.shield.platforms import layout as L
+
+    games = batch(60.0, interval=100, actions="continuous")
+    games.reset(1)
+    begun = games.core.state[:, :3, L.HEADING].copy()
+    games.step(np.tile([[2.0, 90.0]], (6, 1)))
+    turned = (games.core.state[:, :3, L.HEADING] - begun + 180.0) % 360.0 - 180.0
+    assert games.core.time_s[0] == pytest.approx(10.0)
+    free = ~games.core.driven[:, :3]
+    assert free.any()
+    np.testing.assert_allclose(turned[free], 90.0, atol=10.0)
+
+
+def test_a_game_that_ends_in_a_held_decision_ends_there():
+    games = batch(1.0, interval=7)
+    games.reset(1)
+    assert not games.step(np.zeros(6, int)).truncated.any()
+    out = games.step(np.zeros(6, int))
+    assert out.truncated.all()
+    np.testing.assert_array_equal(out.episodes["l"], 2)
+    assert (out.observations != out.final_observations).any()
+    np.testing.assert_array_equal(games.core.time_s, 0.0)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_the_three_ways_to_begin_anew(mode):
+    envs = MctfVectorEnv(batch(0.2), mode)
+    assert envs.metadata["autoreset_mode"] is mode
+    envs.reset(seed=1)
+    stop = np.full(6, 16)
+    envs.step(stop)
+    last, _, terminated, truncated, infos = envs.step(stop)
+    assert (terminated | truncated).all()
+    assert infos["_episode"].all()
+    np.testing.assert_array_equal(infos["episode"]["l"], 2)
+    if mode is AutoresetMode.DISABLED:
+        with pytest.raises(ConfigError, match="games have ended; reset them"):
+            envs.step(stop)
+        envs.reset(options={"reset_mask": truncated})
+    if mode is AutoresetMode.NEXT_STEP:
+        fresh, rewards, _, over, _ = envs.step(stop)
+        assert not over.any()
+        np.testing.assert_array_equal(rewards, 0.0)
+        assert (fresh != last).any()
+    assert not envs.step(stop)[3].any()
+    assert envs.step(stop)[3].all()
+
+
+def test_gymnasium_makes_them_by_id():
+    envs = gymnasium.make_vec("steerclear.experiments.training.ids:steerclear/Mctf-v0", num_envs=6, max_time_s=1.0)
+    observations, _ = envs.reset(seed=0)
+    assert observations.shape == (6, 61)
+    infos = envs.step(envs.action_space.sample())[4]
+    assert {"captures", "grabs", "tags", "hits", "interventions"} <= infos.keys()
+    with pytest.raises(ConfigError, match="give a multiple of 3"):
+        gymnasium.make_vec("steerclear/Mctf-v0", num_envs=4)
+
+
+def test_unknown_ways_are_refused():
+    with pytest.raises(ConfigError, match="unknown autoreset_mode 'never'"):
+        MctfVectorEnv(batch(), "never")
+    with pytest.raises(ConfigError, match="interval is 0"):
+        batch(interval=0)
