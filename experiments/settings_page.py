@@ -37,7 +37,8 @@ COSTS = {
     ),
     "solver": Cost("name", "time of a decision", "[bench](bench.md)"),
     "adversary_s": Cost("s", "the dial between safety and play", "[price](price.md)"),
-    "profile": Cost("name", "names an `adversary_s`", "[price](price.md)"),
+    "visitor_s": Cost("s", "less: tags are kept, and visitors that ram get nearer", "[studies](studies/method.md)"),
+    "profile": Cost("name", "names an `adversary_s` and a `visitor_s`", "[price](price.md)"),
     "response_per_s": Cost("1/s", "lower: earlier, gentler, more commands changed; inf: as late as possible", _STUDY),
     "table_response_per_s": Cost("1/s", "as above", _STUDY),
     "fixed_response_per_s": Cost(
@@ -86,8 +87,8 @@ def settings_page() -> str:
         "| setting | unit | default | what it is | what it costs | evidence |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    profiles = ", ".join(f"`{name}` {value:g} s" for name, value in PROFILES.items())
-    return HEAD + "\n".join(table + rows) + f"\n\n`adversary_s` of the profiles: {profiles}.\n"
+    profiles = ", ".join(f"`{name}` {away:g} and {home:g} s" for name, (away, home) in PROFILES.items())
+    return HEAD + "\n".join(table + rows) + f"\n\n`adversary_s` and `visitor_s` of the profiles: {profiles}.\n"
 
 
 def meanings() -> dict[str, str]:
