@@ -46,8 +46,8 @@ class ShieldConfig:
         response_per_s: class-K rate alpha: a margin may shrink by exp(-alpha dt) per step; inf lets it fall to 0.
         table_response_per_s: the same for boats whose opponents are looked up in value tables.
         fixed_response_per_s: the same of margins from the edge, obstacles and circles.
-        give_way_after_s: time a boat alongside may keep one from turning where it wants before one of the two gives
-            way, s; opponents that hold their course are given way to; inf never.
+        give_way_after_s: time a team-mate alongside may keep one from turning where it wants before one of the two
+            gives way, s; inf never.
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
             near, m, at most 50.

@@ -1,4 +1,4 @@
-"""One decision, in compiled stages: screen, build rows, check an answer, ladder, commit.
+"""One decision, in compiled stages: screen, build rows, check an answer, back up, commit.
 
 The single decision (`shield.Shield`) calls the stages from Python with a QP backend between them; `decide_compiled`
 chains the same stages with the compiled projection for thousands of games. Nothing else differs between the two.
@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
+from .backup import back_up, mark_answer, opposed
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
-from .choosing import choose, forget_candidates, mark_answer, note_candidate, opposed
 from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .memory import Memory
@@ -26,14 +26,13 @@ from .screening import screen
 from .work import Work
 
 ROUNDS = 2
-"""Times the program is linearised and solved anew before the ladder takes over."""
+"""Times the program is linearised and solved anew before the backups take over."""
 
 PASSES, TO_SOLVE, TO_BACK_UP = range(3)
 """What is left to do once the wanted commands are screened: nothing, the program, or the backups at once."""
 
 NO_ANSWER, UNSAFE, SAFE = range(3)
-"""What an answer of the program comes to: none that can be sent, or none but what failed already, one that fails the
-exact check, one that passes."""
+"""What an answer of the program comes to: none that can be sent, one that fails the exact check, one that passes."""
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
@@ -68,7 +67,7 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
         else:
             memory.threat_m[i, :] = work.threat_m[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
-        note_pressing(i, state, ours, boats, tuning, memory, work, plan)
+        note_pressing(i, state, ours, tuning, memory, work, plan)
 
 
 @lean_kernel
@@ -88,13 +87,13 @@ def _tell_of_fixed_things(ours: BoolArray, work: Work, plan: Plan) -> None:
 
 @lean_kernel
 def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) -> None:
-    """Name the reasons of a checked answer, or go down the ladder without one; then remember the escapes."""
+    """Name the reasons of a checked answer, or send the backups without one; then remember the escapes."""
     boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
     if safe:
         mark_answer(count, QP, plan)
     else:
         count = pick_movers(ours, work, plan)
-        choose(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
+        back_up(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
     _tell_of_fixed_things(ours, work, plan)
     commit(state, ours, boats, tuning, memory, work, plan)
 
@@ -108,8 +107,6 @@ def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: Bool
         finish(scene, True, 0, state, ours)
         return PASSES
     _note_causes(ours, work, plan)
-    forget_candidates(plan)
-    note_candidate(ours, work, plan)
     return TO_BACK_UP if opposed(ours, plan) else TO_SOLVE
 
 
@@ -126,33 +123,13 @@ def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
 
 
 @lean_kernel
-def _as_before(count: int, boats: Boats, plan: Plan) -> bool:
-    """Whether some mover looks opponents up, and all movers' commands are those in ``plan.escape``, bit for bit."""
-    looking = False
-    for m in range(count):
-        i = plan.movers[m]
-        looking = looking or boats.look[i] > 0
-        if plan.commands[i, 0] != plan.escape[i, 0] or plan.commands[i, 1] != plan.escape[i, 1]:
-            return False
-    return looking
-
-
-@lean_kernel
 def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) -> int:
-    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`.
-
-    Of boats that look opponents up the rows do not know everything that the check does (runs of several opponents):
-    where the program leaves all as it was there is nothing to check, and nothing to linearise anew. Of others the check
-    may find another manoeuvre, and that other rows.
-    """
+    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`."""
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    for m in range(count):
-        copy_row(plan.escape[plan.movers[m]], plan.commands[plan.movers[m]])
-    if not take_answer(z, count, state, boats, tuning, plan) or _as_before(count, boats, plan):
+    if not take_answer(z, count, state, boats, tuning, plan):
         return NO_ANSWER
     if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
         return SAFE
-    note_candidate(ours, work, plan)
     return UNSAFE
 
 

@@ -21,6 +21,7 @@ from .work import Work
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
 
+
 @lean_kernel
 def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
     """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""

@@ -23,10 +23,9 @@ class Memory(NamedTuple):
         joint_m: of boats that look opponents up, the least on runs of several, 0 where there were none.
         fixed_m: the margin from fixed things, 0 where it was not looked at.
         escaping: whether the boat was carrying it out at the last decision.
-        pressed_s: how long a boat alongside has kept the boat from turning where it wants, or how long it has
+        pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
             given way to it, see `right_of_way`.
         pressed_deg: heading it had when that began.
-        blocked_deg: heading the boat alongside had then.
         free_s: time since it was last kept from it, s.
         blocked_by: that boat, -1 for none.
         gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
@@ -43,7 +42,6 @@ class Memory(NamedTuple):
     escaping: BoolArray
     pressed_s: Array
     pressed_deg: Array
-    blocked_deg: Array
     free_s: Array
     blocked_by: IntArray
     gives_way: Array
@@ -64,7 +62,6 @@ def new_memory(*shape: int) -> Memory:
             escaping=np.zeros(shape, np.bool_),
             pressed_s=np.zeros(shape),
             pressed_deg=np.zeros(shape),
-            blocked_deg=np.zeros(shape),
             free_s=np.zeros(shape),
             blocked_by=np.full(shape, -1, np.int64),
             gives_way=np.zeros(shape),
@@ -86,7 +83,6 @@ def take_memory(games: Memory, game: int, own: Memory) -> None:
     own.escaping[:] = games.escaping[game]
     own.pressed_s[:] = games.pressed_s[game]
     own.pressed_deg[:] = games.pressed_deg[game]
-    own.blocked_deg[:] = games.blocked_deg[game]
     own.free_s[:] = games.free_s[game]
     own.blocked_by[:] = games.blocked_by[game]
     own.gives_way[:] = games.gives_way[game]
@@ -106,7 +102,6 @@ def put_memory(own: Memory, game: int, games: Memory) -> None:
     games.escaping[game] = own.escaping
     games.pressed_s[game] = own.pressed_s
     games.pressed_deg[game] = own.pressed_deg
-    games.blocked_deg[game] = own.blocked_deg
     games.free_s[game] = own.free_s
     games.blocked_by[game] = own.blocked_by
     games.gives_way[game] = own.gives_way

@@ -19,19 +19,13 @@ class Plan(NamedTuple):
     """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows).
 
     ``cause`` is what a boat's wanted command is short of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each
-    escape the turn, deg, the speed, m/s, and the merit, see `easing`. One of ``answer`` and ``escape`` is put aside
-    while the other is tried; ``keeps`` says of whom the escape keeps everything. ``merit`` is what every boat had
-    before a trial.
+    backup the turn, deg, the speed, m/s, and the rank, see `easing`.
     """
 
     commands: Array
     kept_commands: Array
     wanted_turn: Array
     held: Array
-    answer: Array
-    answer_held: Array
-    escape: Array
-    merit: Array
     cause: IntArray
     eased: Array
     movers: IntArray
@@ -57,10 +51,6 @@ def new_plan(boats: int, rows: int) -> Plan:
             kept_commands=np.zeros((boats, 2)),
             wanted_turn=np.zeros(boats),
             held=np.zeros((boats, 3)),
-            answer=np.zeros((boats, 2)),
-            answer_held=np.zeros((boats, 3)),
-            escape=np.zeros((boats, 2)),
-            merit=np.zeros(boats),
             cause=np.full(boats, -1, np.int64),
             eased=np.zeros((boats, 3)),
             movers=np.zeros(boats, np.int64),

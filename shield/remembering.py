@@ -23,7 +23,6 @@ _OWN = (
     "escaping",
     "pressed_s",
     "pressed_deg",
-    "blocked_deg",
     "free_s",
     "gives_way",
 )

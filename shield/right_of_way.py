@@ -5,8 +5,7 @@ both press: every decision is safe, and neither ever gets anywhere. Symmetry is 
 what each can see of the other: who is behind, or has the other on its starboard side, gives way and turns away; the
 other stands on, holding its course. The shield checks these commands as any others.
 
-An opponent knows nothing of this. To one that holds its course, and beside which a boat would sail on for good, the
-boat gives way itself; from one that steers at the boat turning away is no use.
+An opponent knows nothing of this, and is answered by backups in full, which clear it.
 
 That robots behind barriers block each other, and that consistent sides resolve it: Wang, Ames, Egerstedt, "Safety
 barrier certificates for collisions-free multirobot systems", IEEE T-RO 33(3), 2017.
@@ -16,23 +15,16 @@ from __future__ import annotations
 
 import math
 
-from .certificates.rating import FIXED_THING
 from .jit import Array, BoolArray, lean_kernel
 from .memory import Memory
 from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan, unchanged
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
-from .scene import Boats, Tuning
+from .scene import Tuning
 from .work import Work
 
 NEAR_M = 2.0
 """Distance beyond what is to be kept within which a boat is alongside, m."""
-LOOKED_UP_M = 6.0
-"""How much more it is of an opponent that is looked up: tables let none come nearer than about so much."""
-STEADY_DEG = 10.0
-"""An opponent whose heading has changed by no more since a boat began to press holds its course."""
-PACE_SHARE = 0.25
-"""An opponent slower or faster by more, as a share of top speed, is passed or passes: that ends by itself."""
 ALIKE_DEG = 45.0
 """Courses that differ by no more are all but the same."""
 PRESSING_DEG = 15.0
@@ -56,39 +48,23 @@ PATIENCE = 3.0
 
 
 @lean_kernel
-def _kept_m(i: int, j: int, ours: BoolArray, boats: Boats, work: Work) -> float:
-    """Distance that boats alongside each other keep, m."""
-    looked_up = not ours[j] and boats.table[i, j] >= 0
-    return work.radius[i, j] + (LOOKED_UP_M if looked_up else 0.0)
-
-
-@lean_kernel
-def _steady(i: int, j: int, state: Array, ours: BoolArray, memory: Memory) -> bool:
-    """Whether boat j is ours, or has held its course since boat i began to press."""
-    return ours[j] or abs(wrap_degrees(state[j, L.HEADING] - memory.blocked_deg[i])) <= STEADY_DEG
-
-
-@lean_kernel
-def _keeps_pace(i: int, j: int, state: Array, ours: BoolArray, boats: Boats) -> bool:
-    """Whether boat j is ours, or about as fast as boat i."""
-    return ours[j] or abs(state[j, L.SPEED] - state[i, L.SPEED]) <= PACE_SHARE * boats.params[i, L.MAX_SPEED]
-
-
-@lean_kernel
-def _alongside(
-    i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, boats: Boats, work: Work
-) -> int:
-    """Nearest boat alongside boat i on the side it wants to turn to; -1 for none."""
+def _alongside(i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, work: Work) -> int:
+    """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
     found, least = -1, math.inf
     if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
         return found
     east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
     for j in range(state.shape[0]):
-        if j == i or not work.near[i, j] or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG:
+        if (
+            j == i
+            or not ours[j]
+            or not work.near[i, j]
+            or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG
+        ):
             continue
         dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
         gap, starboard = math.sqrt(dx * dx + dy * dy), dx * north - dy * east
-        if starboard * turn_deg > 0.0 and gap < _kept_m(i, j, ours, boats, work) + NEAR_M and gap < least:
+        if starboard * turn_deg > 0.0 and gap < work.radius[i, j] + NEAR_M and gap < least:
             found, least = j, gap
     return found
 
@@ -115,7 +91,6 @@ def _who_blocks(
     speed_mps: float,
     state: Array,
     ours: BoolArray,
-    boats: Boats,
     memory: Memory,
     work: Work,
 ) -> int:
@@ -125,9 +100,7 @@ def _who_blocks(
     turned_deg = wrap_degrees(state[i, L.HEADING] - memory.pressed_deg[i])
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
-    j = _alongside(i, turn_deg, speed_mps, state, ours, boats, work)
-    stays = j >= 0 and _steady(i, j, state, ours, memory) and _keeps_pace(i, j, state, ours, boats)
-    return j if stays else -1
+    return _alongside(i, turn_deg, speed_mps, state, ours, work)
 
 
 @lean_kernel
@@ -137,18 +110,17 @@ def _goes_on(
     speed_mps: float,
     state: Array,
     ours: BoolArray,
-    boats: Boats,
     memory: Memory,
     work: Work,
 ) -> bool:
     """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
     j = memory.blocked_by[i]
-    if j < 0 or not work.near[i, j] or not memory.kept[i] or not _steady(i, j, state, ours, memory):
+    if j < 0 or not ours[j] or not work.near[i, j] or not memory.kept[i]:
         return False
     if speed_mps <= STILL_MPS or memory.pressed_s[i] >= LONGEST_S:
         return False
     gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
-    return turn_deg * memory.gives_way[i] < 0.0 and gap < _kept_m(i, j, ours, boats, work) + CLEAR_M
+    return turn_deg * memory.gives_way[i] < 0.0 and gap < work.radius[i, j] + CLEAR_M
 
 
 @lean_kernel
@@ -158,40 +130,39 @@ def _press(
     speed_mps: float,
     state: Array,
     ours: BoolArray,
-    boats: Boats,
     tuning: Tuning,
     memory: Memory,
     work: Work,
 ) -> None:
     """Go on counting how long boat i has been kept from turning, and decide whether it gives way."""
-    j = _who_blocks(i, turn_deg, speed_mps, state, ours, boats, memory, work)
+    j = _who_blocks(i, turn_deg, speed_mps, state, ours, memory, work)
     if j < 0:
         memory.pressed_s[i] = 0.0
     elif j != memory.blocked_by[i]:
-        memory.pressed_s[i], memory.blocked_deg[i] = tuning.dt_s, state[j, L.HEADING]
+        memory.pressed_s[i] = tuning.dt_s
     memory.blocked_by[i] = j
     if j < 0:
         return
-    if ours[j] and memory.gives_way[j] != 0.0 and memory.blocked_by[j] == i:
+    if memory.gives_way[j] != 0.0 and memory.blocked_by[j] == i:
         return
     memory.pressed_s[i] += tuning.dt_s
-    patience = PATIENCE if ours[j] and _stands_on(i, j, state) else 1.0
+    patience = PATIENCE if _stands_on(i, j, state) else 1.0
     if memory.pressed_s[i] >= patience * tuning.give_way_after_s:
         memory.gives_way[i], memory.pressed_s[i] = -math.copysign(1.0, turn_deg), tuning.dt_s
 
 
 @lean_kernel
 def apply_right_of_way(
-    i: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
 ) -> None:
     """Replace the wanted command of boat i where it has been kept from turning for long enough."""
     speed_mps, turn_deg = plan.commands[i, 0], wrap_degrees(plan.commands[i, 1])
-    if memory.gives_way[i] != 0.0 and not _goes_on(i, turn_deg, speed_mps, state, ours, boats, memory, work):
+    if memory.gives_way[i] != 0.0 and not _goes_on(i, turn_deg, speed_mps, state, ours, memory, work):
         memory.gives_way[i], memory.pressed_s[i] = 0.0, 0.0
     if memory.gives_way[i] != 0.0:
         memory.pressed_s[i] += tuning.dt_s
     else:
-        _press(i, turn_deg, speed_mps, state, ours, boats, tuning, memory, work)
+        _press(i, turn_deg, speed_mps, state, ours, tuning, memory, work)
         if memory.gives_way[i] == 0.0 and memory.pressed_s[i] < tuning.give_way_after_s:
             return
     plan.commands[i, 1] = AWAY_DEG * memory.gives_way[i]
@@ -206,14 +177,9 @@ def forget_pressing(i: int, memory: Memory) -> None:
 
 @lean_kernel
 def note_pressing(
-    i: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
 ) -> None:
-    """Note since when, on what headings, boat i is kept from turning: its turn towards another was changed.
-
-    No boat gives way to an opponent into an edge or an obstacle: turned back from there it only loses its speed.
-    """
-    if plan.cause[i] == FIXED_THING and memory.gives_way[i] != 0.0 and not ours[memory.blocked_by[i]]:
-        forget_pressing(i, memory)
+    """Note since when, on what heading, boat i is kept from turning: its turn towards another was changed."""
     if plan.reason[i] == RIGHT_OF_WAY:
         work.bound[i], memory.free_s[i] = memory.blocked_by[i], 0.0
         return
@@ -222,9 +188,9 @@ def note_pressing(
     if plan.reason[i] < QP or plan.reason[i] > BEST_EFFORT or j < 0 or unchanged(i, plan):
         return
     turn_deg, speed_mps = wrap_degrees(plan.kept_commands[i, 1]), plan.kept_commands[i, 0]
-    if _alongside(i, turn_deg, speed_mps, state, ours, boats, work) != j:
+    if _alongside(i, turn_deg, speed_mps, state, ours, work) != j:
         return
     memory.free_s[i] = 0.0
     if memory.pressed_s[i] == 0.0:
         memory.pressed_s[i] = tuning.dt_s
-        memory.pressed_deg[i], memory.blocked_deg[i] = state[i, L.HEADING], state[j, L.HEADING]
+        memory.pressed_deg[i] = state[i, L.HEADING]

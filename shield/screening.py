@@ -90,7 +90,7 @@ def screen(
         if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
-        apply_right_of_way(i, state, ours, boats, tuning, memory, work, plan)
+        apply_right_of_way(i, state, ours, tuning, memory, work, plan)
         predict(i, plan.commands, state, boats, tuning, work)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):

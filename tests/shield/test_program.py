@@ -8,7 +8,7 @@ import pytest
 import qpsolvers
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
+from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import SolverError
 from steerclear.shield.program import ROW_TOLERANCE, Program, check_solver, holds, solve
 
@@ -167,40 +167,3 @@ def test_a_missing_backend_is_told_with_those_there_are(name):
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_every_backend_that_is_installed_can_be_chosen(solver):
     assert ShieldConfig(solver=solver).solver == solver
-
-
-class Noting(Shield):
-    """A shield that notes the programs of every decision."""
-
-    def __init__(self):
-        super().__init__()
-        self.programs = []
-
-    def decide(self, *question):
-        self.programs.append([])
-        return super().decide(*question)
-
-    def _solve(self, count, rows, plan):
-        n = 2 * count
-        self.programs[-1].append((plan.C[:rows, :n].tobytes(), plan.d[:rows].tobytes(), plan.z0[:n].tobytes()))
-        return super()._solve(count, rows, plan)
-
-
-def test_a_program_that_changes_nothing_is_not_solved_again():
-    """Of what several opponents may do together the rows know nothing: there the same answer would come again."""
-    random, shield = np.random.default_rng(3), Noting()
-    for _ in range(300):
-        angle, far = random.uniform(-np.pi, np.pi, 3), random.uniform(15.0, 35.0, 3)
-        fleet = Fleet.of(
-            position_m=np.vstack([[0.0, 0.0], np.column_stack([far * np.sin(angle), far * np.cos(angle)])]),
-            heading_rad=np.concatenate([[0.0], angle + np.pi + random.uniform(-0.5, 0.5, 3)]),
-            speed_mps=[3.0, 2.5, 2.5, 2.5],
-            team=[0, 1, 1, 1],
-            platforms="surveyor",
-        )
-        shield.reset()
-        for _ in range(2):
-            shield.decide(fleet, Commands.absolute_rad(np.tile([3.0, 0.0], (4, 1))))
-    solved = [programs for programs in shield.programs if programs]
-    assert len(solved) > 40
-    assert all(len(set(programs)) == len(programs) for programs in solved)

@@ -26,9 +26,10 @@ NOT_ZERO = [
     "speed_weight",
     "horizon_s",
 ]
-MAY_BE_NONE = ["adversary_s", "move_s", "horizon_s", "edge_m"]
+MAY_BE_NONE = ["adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m"]
 MAY_BE_INFINITE = [
     "adversary_s",
+    "visitor_s",
     "response_per_s",
     "table_response_per_s",
     "fixed_response_per_s",
@@ -79,7 +80,8 @@ def test_none_means_off_only_where_it_says_so(name):
 
 
 def test_profiles_are_names_of_the_time_opponents_are_feared_for():
-    assert {name: ShieldConfig(profile=name).feared_s for name in PROFILES} == PROFILES
+    told = {name: ShieldConfig(profile=name) for name in PROFILES}
+    assert {name: (config.feared_s, config.visitor_feared_s) for name, config in told.items()} == PROFILES
     assert ShieldConfig(profile="rammers", adversary_s=5.0).feared_s == 5.0
     with pytest.raises(ConfigError, match="unknown profile 'players!'; choose one of players, rammers, hold-course"):
         ShieldConfig(profile="players!")

@@ -38,24 +38,15 @@ def arrives(run, platform):
 
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
 def test_a_boat_turned_aside_by_one_that_holds_its_course_gets_past_it(platform):
-    stuck, run = (
-        sail(
-            Shield(ShieldConfig(give_way_after_s=after_s)),
-            crossing(platform),
-            towards_goal(platform, lambda _: 0.0),
-            STEPS[platform],
-        )
-        for after_s in (np.inf, ShieldConfig().give_way_after_s)
-    )
-    assert not arrives(stuck, platform), "or there is nothing to get out of"
+    """Turned aside as little as may be in each step it sailed on ahead of the other's bow for good."""
+    run = sail(Shield(), crossing(platform), towards_goal(platform, lambda _: 0.0), STEPS[platform])
     assert arrives(run, platform)
-    assert (run.reason == Reason.RIGHT_OF_WAY).any()
     assert run.closest(np.array([True, False])) >= 2.5
-    assert (run.reason[:, 0] != Reason.PASSED).sum() < 0.6 * (stuck.reason[:, 0] != Reason.PASSED).sum()
+    assert 0.0 < (run.reason[:, 0] != Reason.PASSED).mean() < 0.35
 
 
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
-def test_no_boat_gives_way_to_one_that_steers_at_it(platform):
+def test_no_boat_gives_way_to_an_opponent(platform):
     """Turning away from a hunter alongside would only cost speed."""
 
     def hunt(state):
@@ -64,9 +55,8 @@ def test_no_boat_gives_way_to_one_that_steers_at_it(platform):
         return (error + 180.0) % 360.0 - 180.0
 
     run = sail(Shield(), crossing(platform), towards_goal(platform, hunt), STEPS[platform])
-    ruled = run.reason[:, 0] == Reason.RIGHT_OF_WAY
-    assert (run.reason[:, 0] == Reason.QP).any()
-    assert ruled.mean() < 0.02
+    assert (run.reason[:, 0] == Reason.ESCAPE).any()
+    assert not (run.reason[:, 0] == Reason.RIGHT_OF_WAY).any()
     assert run.closest(np.array([True, False])) >= 2.5
 
 
@@ -149,8 +139,8 @@ def test_a_boat_that_is_handed_over_while_it_gives_way_holds_nobody_up():
     assert state[1, L.X] < state[0, L.X] - 2.5, "it got to the side where it wanted"
 
 
-def test_an_opponent_that_is_overtaken_is_not_given_way_to():
-    """The boat passes a slower one alongside, and its goal is ahead of that: this ends by itself."""
+def test_an_opponent_that_is_overtaken_is_passed():
+    """The boat passes a slower one alongside, and its goal is ahead of that."""
     fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 15.0, 0.0, 0.8)], [0, 1], "heron")
 
     def wanted(step, state):
@@ -158,8 +148,8 @@ def test_an_opponent_that_is_overtaken_is_not_given_way_to():
         return np.array([(2.0, (error + 180.0) % 360.0 - 180.0), (0.8, 0.0)])
 
     run = sail(Shield(), fleet, wanted, 350)
-    assert (run.reason[:, 0] == Reason.QP).any()
-    assert not (run.reason[:, 0] == Reason.RIGHT_OF_WAY).any()
+    assert (run.reason[:, 0] == Reason.ESCAPE).any()
+    assert run.closest(np.array([True, False])) >= 2.5
     assert run.position[:, 0, 1].max() > 57.0
 
 

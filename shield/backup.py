@@ -1,12 +1,11 @@
-"""The choice: of all commands that could be sent, the one that keeps the most, and of those the least change.
+"""What is sent when the wanted commands do not keep everything, and no answer of the program does: the backups.
 
-Candidates are the wanted commands, the program's answers, the backup manoeuvres, and what lies between these and the
-wanted commands. Each is checked by the full model, and each boat of ours then has a rank (`certificates.rating`). One
-candidate is better than another when its worst-off boat is, when those are alike its second worst, and so on; of alike
-ones that with less change is taken, in the order in which they are named here.
+A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
+everything from the state one step after it. When neither the wanted commands nor a least change of them have one, the
+plan of the last decision is gone on with, or a better one. So a verified plan, once there, is there at every step,
+unless an opponent does what none was asked to keep clear of.
 
-Boats are ranked together since a manoeuvre of one may cost another its own. What is kept by all is kept whatever else
-could be had: above `PAIR_SAFE` all ranks are alike.
+That is the switching of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import math
 
 import numpy as np
 
-from .certificates.assign import assign_plans, hold
+from .certificates.assign import assign_plans
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
 from .certificates.fixed_things import clear_of_near_obstacles
@@ -23,61 +22,14 @@ from .certificates.manoeuvre import told_margin
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, worst_merit
 from .certificates.values import run_opponents
 from .easing import ease
-from .jit import Array, BoolArray, copy_row, lean_kernel
+from .jit import Array, BoolArray, lean_kernel
 from .linearised import check, list_movers
 from .memory import Memory
-from .plan import BEST_EFFORT, ESCAPE, PASSED, QP_RELAXED, RIGHT_OF_WAY, Plan, unchanged
+from .plan import BEST_EFFORT, ESCAPE, Plan, unchanged
 from .platforms import layout as L
 from .platforms.actuator import command_for_turn, full_turn
 from .scene import Boats, Fixed, Tuning
 from .work import Work
-
-WORTHLESS = -1e12
-"""Rank of no candidate at all."""
-
-ALIKE = 1e-6
-"""Ranks that differ by no more are alike: rounding decides nothing."""
-
-
-@lean_kernel
-def note_candidate(ours: BoolArray, work: Work, plan: Plan) -> None:
-    """Keep the candidate that was checked last if it is better than the one kept."""
-    if not _better(ours, work, plan):
-        return
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            plan.merit[i] = work.merit[i]
-            copy_row(plan.answer[i], plan.commands[i])
-            hold(i, plan.answer_held, work)
-
-
-@lean_kernel
-def forget_candidates(plan: Plan) -> None:
-    """Keep none: any is better."""
-    plan.merit[:] = WORTHLESS
-
-
-@lean_kernel
-def _better(ours: BoolArray, work: Work, plan: Plan) -> bool:
-    """Whether what the boats have now is better than what they have by the candidate kept, ``plan.merit``."""
-    n, level = ours.shape[0], -math.inf
-    while True:
-        now, kept = _least_above(level, work.merit, ours, n), _least_above(level, plan.merit, ours, n)
-        if now >= PAIR_SAFE and kept >= PAIR_SAFE:
-            return False
-        if abs(now - kept) > ALIKE:
-            return now > kept
-        level = max(now, kept)
-
-
-@lean_kernel
-def _least_above(level: float, merit: Array, ours: BoolArray, n: int) -> float:
-    """Least rank of a boat of ours beyond a level; infinite where there is none."""
-    least = math.inf
-    for i in range(n):
-        if ours[i] and merit[i] < least and merit[i] > level:
-            least = merit[i]
-    return least
 
 
 @lean_kernel
@@ -87,10 +39,19 @@ def opposed(ours: BoolArray, plan: Plan) -> bool:
     Least changes are for those who stand still or decide with us. An opponent that is only just kept off is so again in
     the next step, and a boat that gives way as little as it may in each gives way for longer.
     """
+    found = False
     for i in range(ours.shape[0]):
-        if plan.cause[i] >= 0 and not ours[plan.cause[i]]:
-            return True
-    return False
+        found = found or (plan.cause[i] >= 0 and not ours[plan.cause[i]])
+    return found
+
+
+@lean_kernel
+def _alone(ours: BoolArray, plan: Plan) -> bool:
+    """Whether fixed things are all that any boat's wanted command is short of."""
+    found = True
+    for i in range(ours.shape[0]):
+        found = found and plan.cause[i] < 0
+    return found
 
 
 @lean_kernel
@@ -110,16 +71,6 @@ def _given_up(i: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> f
         clear_of_near_obstacles(i, i, state, boats, fixed, work, work.spare2)
         least = min(least, work.spare2[MARGIN])
     return max(0.0, -least)
-
-
-@lean_kernel
-def mark_relaxed(count: int, state: Array, boats: Boats, fixed: Fixed, work: Work, plan: Plan) -> None:
-    """Say of all movers that not everything could be kept, also of those whose wanted command is the best there is."""
-    for m in range(count):
-        i = plan.movers[m]
-        if plan.reason[i] == PASSED or plan.reason[i] == RIGHT_OF_WAY or not unchanged(i, plan):
-            plan.reason[i] = QP_RELAXED
-        plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
 
 
 @lean_kernel
@@ -143,11 +94,11 @@ def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan
 
 @lean_kernel
 def _join(ours: BoolArray, work: Work, plan: Plan) -> int:
-    """Make movers of the boats that passed and whose backups come too near to those of movers; the movers there are."""
+    """Make movers of the boats of ours near movers; returns how many movers there are."""
     for i in range(ours.shape[0]):
-        j = work.bound[i]
-        if ours[i] and work.merit[i] < 0.0 and j >= 0 and ours[j]:
-            plan.moving[i] = plan.moving[j] = plan.moving[i] or plan.moving[j]
+        for m in range(ours.shape[0]):
+            if ours[i] and plan.place[m] >= 0 and work.near[i, m]:
+                plan.moving[i] = True
     return list_movers(plan)
 
 
@@ -183,7 +134,7 @@ def _assign_backups(
 
 
 @lean_kernel
-def _back_up(
+def _find_backups(
     count: int,
     state: Array,
     ours: BoolArray,
@@ -197,8 +148,8 @@ def _back_up(
 ) -> int:
     """Make the candidate of all movers' backups and check it; returns how many movers there are.
 
-    All boats of ours had backups that fit at the last decision, and these are tried first. Where the new ones do not
-    fit those of boats whose wanted commands passed, these boats take part, too.
+    All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
+    fit what boats have whose wanted commands passed: where they do not, these boats take part, too.
     """
     for _ in range(ours.shape[0]):
         good = _assign_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
@@ -214,7 +165,7 @@ def _back_up(
 
 
 @lean_kernel
-def choose(
+def back_up(
     count: int,
     state: Array,
     ours: BoolArray,
@@ -226,22 +177,15 @@ def choose(
     work: Work,
     plan: Plan,
 ) -> None:
-    """Send the best candidate where neither the wanted commands nor an answer of the program keep everything.
+    """Send the backups where neither the wanted commands nor an answer of the program keeps everything.
 
-    The backups, if they are better than these, and as little of them as keeps what they keep (reason ESCAPE,
-    BEST_EFFORT where something is short all the same); else the best of these (QP_RELAXED).
+    Where fixed things are all that is in the way, as little of them as keeps off these. The reason is ESCAPE, of boats
+    that are short of something all the same BEST_EFFORT: avoidance does not switch itself off.
     """
-    count = _back_up(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-    if not _better(ours, work, plan):
-        for m in range(count):
-            copy_row(plan.commands[plan.movers[m]], plan.answer[plan.movers[m]])
-            copy_row(plan.held[plan.movers[m]], plan.answer_held[plan.movers[m]])
-        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        mark_relaxed(count, state, boats, fixed, work, plan)
-        return
+    count = _find_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
         plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
-    if not opposed(ours, plan) and worst_merit(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
+    if _alone(ours, plan) and worst_merit(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
         ease(count, state, ours, boats, fixed, tuning, memory, work, plan)
