@@ -13,6 +13,8 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
 from steerclear.shield.exceptions import SteerclearError
+from steerclear.shield.fleet import Fleet
+from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.files import PlatformFile, parse_platform, to_text
@@ -92,26 +94,31 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         ConfigError: nobody reads the environment, or no shield can be built for it.
     """
     plain, filtered = make_env(), make_env()
-    readers = [reader_of(env) for env in (plain, filtered)]
-    facts, seen = readers[0].facts(), []
+    plain_reader, reader = reader_of(plain), reader_of(filtered)
+    facts, seen, agents = reader.facts(), list[Array](), reader.agent_ids
     for env in (plain, filtered):
         env.reset(seed=5)
-    n = len(readers[0].agent_ids)
+    n = len(agents)
     _hold(len(facts.team) == n == len(facts.radius_m), f"facts are of {len(facts.team)} boats, agent_ids of {n}")
-    moments = {readers[0].moment()}
+    moments = {reader.moment()}
+
+    def passing(commands: Array) -> Array:
+        seen.append(np.array(commands))
+        return commands
+
     for step in range(STEPS):
-        actions = {agent: (step + i) % 16 for i, agent in enumerate(readers[0].agent_ids)}
-        plain.step(readers[0].playable(actions))
-        with readers[1].filtering(lambda commands: seen.append(np.array(commands)) or commands):
-            filtered.step(readers[1].playable(actions))
-        _same_game(*(reader.fleet(0, True) for reader in readers), n)
-        moments.add(readers[0].moment())
+        actions = {agent: (step + i) % 16 for i, agent in enumerate(agents)}
+        plain.step(plain_reader.playable(actions))
+        with reader.filtering(passing):
+            filtered.step(reader.playable(actions))
+        _hold_same(plain_reader.fleet(0, True), reader.fleet(0, True), n)
+        moments.add(reader.moment())
     _hold(len(moments) == STEPS + 1, "moment() is the same after a step; give the game's time")
     _hold(bool(seen) and all(c.shape == (n, 2) for c in seen), f"filtering hands over no commands of shape ({n}, 2)")
     for team in (0, 1):
-        readers[0].surroundings(team, True)
+        reader.surroundings(team, True)
 
 
-def _same_game(plain: Any, filtered: Any, n: int) -> None:
+def _hold_same(plain: Fleet, filtered: Fleet, n: int) -> None:
     _hold(len(plain.names) == n and bool(np.isfinite(plain.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
     _hold(np.array_equal(plain.state, filtered.state), "the game is another one under a filter that changes nothing")

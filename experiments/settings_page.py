@@ -70,8 +70,8 @@ HEAD = f"""# Settings
 
 {MADE}
 
-What can be set: `Shield(name=value)`, `--set name=value` of the commands, `shield:` in a `FLEET.yaml`. A name that is
-misspelt, a value of another type or out of range is refused when the shield is built.
+What can be set: `Shield(name=value)`, `--shield-set name=value` of the commands that play games, `shield:` in a
+`FLEET.yaml`. A name that is misspelt, a value of another type or out of range is refused when the shield is built.
 
 """
 

@@ -19,6 +19,8 @@ def pytest_configure(config):
     workers = getattr(config.option, "numprocesses", None) or 0
     if workers < 2 or hasattr(config, "workerinput") or config.option.collectonly:
         return
+    if config.option.dist == "load":  # neighbours share fixtures: each worker takes a stretch, and helps when done
+        config.option.dist = "worksteal"
     shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, workers)]) for k in range(workers)]
     for share in shares:  # what goes wrong is for the tests to tell
         share.wait()

@@ -16,7 +16,7 @@ def launch():
 
 check_platform("launch")
 fleet = Fleet.of(
-    position_m=[[0, 0], [0, 6]], heading_rad=[0, math.pi], speed_mps=[1.5, 1.5], team=[0, 1], platforms="launch"
+    position_m=[[0, 0], [0, 5.5]], heading_rad=[0, math.pi], speed_mps=[1.5, 1.5], team=[0, 1], platforms="launch"
 )
 decision = Shield().decide(fleet, Commands.absolute_rad([[1.5, 0.0], [1.5, math.pi]]))[0]
-print(decision.reason.name, f"{math.degrees(decision.sent_heading_rad):.0f} deg")
+print(f"launch turns to {math.degrees(decision.sent_heading_rad):.0f} deg ({decision.reason.name})")

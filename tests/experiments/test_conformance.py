@@ -85,7 +85,7 @@ def test_a_platform_is_registered_by_decorator_object_and_file(apart, tmp_path):
     assert get_platform("launch").max_speed_mps == 1.5
     register_platform(launch())  # the same again
     path = tmp_path / "gig.yaml"
-    path.write_text((registry.SHIPPED / "otter.yaml").read_text().replace("name: otter", "name: gig"))
+    path.write_text((registry.SHIPPED / "otter.yaml").read_text().replace('name: "otter"', "name: gig"))
     register_platform(path)
     assert {"launch", "gig"} <= set(known_platforms())
     check_platform("gig")

@@ -32,7 +32,7 @@ def test_a_row_for_each_time_the_least_first(tmp_path):
         ablation({"adversary_s": 9.0, "separation_m": 4.0}, 12.5, 0.0, "4.0"),
     ]
     pages = write_pages(results, tmp_path)
-    assert [page.name for page in pages] == ["json_keys.md", "price.md", "price.png", "settings.md"]
+    assert [page.name for page in pages] == ["json_keys.md", "settings.md", "price.md", "price.png"]
     text = (tmp_path / "price.md").read_text()
     near, far = text.split("## mctf2025, 4 m: medium vs easy")
     rows = [row.split("|")[1:4] for row in near.splitlines() if row.startswith("| ") and "[" in row]
