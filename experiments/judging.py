@@ -35,20 +35,22 @@ def check_judge(choice: str) -> str:
 
 
 class StateLog:
-    """Full states of a game (index 0 the start) and which boats the game itself drove, step by step."""
+    """Full states of a game (index 0 the start), and which boats it drove itself or had disabled, step by step."""
 
     def __init__(self) -> None:
         self._states: list[np.ndarray] = []
         self._driven: list[np.ndarray] = []
+        self._disabled: list[np.ndarray] = []
 
     def start(self, core: BatchedMctf) -> None:
         """Begin with a game's start."""
-        self._states, self._driven = [core.state[0].copy()], []
+        self._states, self._driven, self._disabled = [core.state[0].copy()], [], []
 
     def step(self, core: BatchedMctf) -> None:
         """Add the state after a step."""
         self._states.append(core.state[0].copy())
         self._driven.append(core.driven[0].copy())
+        self._disabled.append(core.is_disabled[0].copy())
 
     @property
     def states(self) -> np.ndarray:
@@ -59,6 +61,25 @@ class StateLog:
     def driven(self) -> np.ndarray:
         """(T, n) bool."""
         return np.array(self._driven, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
+
+    @property
+    def disabled(self) -> np.ndarray:
+        """(T, n) bool."""
+        return np.array(self._disabled, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
+
+
+def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
+    """Whether a boat was disabled from the last moment on at which it could have prevented a breach.
+
+    The oracle steers boats as if each obeyed; and before it was disabled nobody could know that it would be.
+
+    Args:
+        verdict: on the boat.
+        disabled: (T, n) boats that the game had disabled in each step; None: nobody knows.
+    """
+    if verdict.last_step is None or disabled is None or verdict.last_step >= verdict.step:
+        return False
+    return bool(disabled[verdict.last_step : verdict.step, verdict.own].all())
 
 
 def judge_game(
@@ -84,11 +105,17 @@ def judge_game(
     radius_m, dt_s = float(meta["separation_m"]), float(meta["dt_s"])
     verdicts = oracle.judge_breaches(log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion)
     padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
-    return [_entry(row, verdict, meta, team, side) for row, verdict in zip(found, padded, strict=True)]
+    disabled = getattr(log, "disabled", None)
+    return [_entry(row, verdict, meta, team, side, disabled) for row, verdict in zip(found, padded, strict=True)]
 
 
 def _entry(
-    row: np.ndarray, verdict: BreachVerdict | None, meta: Mapping[str, Any], team: np.ndarray, side: int
+    row: np.ndarray,
+    verdict: BreachVerdict | None,
+    meta: Mapping[str, Any],
+    team: np.ndarray,
+    side: int,
+    disabled: np.ndarray | None,
 ) -> dict[str, Any]:
     step, pair = int(row[0]), (int(row[1]), int(row[2]))
     own = [boat for boat in pair if team[boat] == side]
@@ -102,7 +129,11 @@ def _entry(
     }
     if verdict is None:
         return {**entry, **_unjudged()}
-    return {**entry, **_judged(verdict, own, meta["agent_ids"])}
+    judged = _judged(verdict, own, meta["agent_ids"])
+    could = [verdict.of(boat) for boat in own if verdict.of(boat).outcome is Outcome.AVOIDABLE]
+    if could and all(helpless(one, disabled) for one in could):
+        judged |= {"verdict": Outcome.UNAVOIDABLE.value, "last_preventable_s": None}
+    return {**entry, **judged}
 
 
 def _unjudged() -> dict[str, Any]:

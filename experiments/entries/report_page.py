@@ -60,8 +60,9 @@ def write_entry_page(
     name = Path(settings.own).name
     groups = by_pairing(rows)
     radius = f"{settings.separation_m:g} m"
+    count = f"{settings.games} game{'s' if settings.games != 1 else ''}"
     subtitle = (
-        f"{settings.preset}: {settings.games} games against each opponent from the same seeds, without the shield and "
+        f"{settings.preset}: {count} against each opponent from the same seeds, without the shield and "
         f"with it; the shield keeps {radius}."
     )
     parts = {

@@ -6,9 +6,10 @@ import pytest
 from steerclear.experiments.ablation import AblationSettings, ablation_bars
 from steerclear.experiments.campaign import Campaign, Played
 from steerclear.experiments.docs_pages import write_pages
-from steerclear.experiments.judging import NOT_JUDGED, StateLog, judge_game
+from steerclear.experiments.judging import NOT_JUDGED, StateLog, helpless, judge_game
 from steerclear.experiments.keys import GAME_COLUMNS, RESULTS, undocumented
 from steerclear.experiments.match import Match, play_match
+from steerclear.experiments.oracle import Outcome, Verdict
 from steerclear.experiments.report_verdicts import breaches_table, verdict_tables
 from steerclear.experiments.results import results_of, write_results
 from steerclear.experiments.spec import MatchSpec
@@ -87,7 +88,7 @@ class FakeCore:
     """One moment of a game."""
 
     def __init__(self, state, driven):
-        self.state, self.driven = state[None], driven[None]
+        self.state, self.driven, self.is_disabled = state[None], driven[None], np.zeros_like(driven)[None]
 
 
 def head_on(game_meta, driven=False):
@@ -237,3 +238,17 @@ def test_games_of_one_kind_only_have_one_kind_of_line(stored):
     assert [line[0] for line in verdict_rows(verdicts, str)] == ["team-mate, on", "opponent, on"]
     assert math.isclose(verdicts["on"]["opponent"]["avoidable_per_game"]["value"], 1.0)
     assert verdicts["off"]["games"] == 0
+
+
+@pytest.mark.parametrize(
+    ("begins", "expected"), [(0, True), (5, True), (6, False), (None, False)], ids=["all", "in time", "late", "untold"]
+)
+def test_a_boat_that_was_disabled_when_it_had_to_act_could_not(begins, expected):
+    facts = {"own": 1, "other": 0, "step": 9, "radius_m": 4.0, "looked_back_s": 0.9, "end_step": 9}
+    facts |= {"plan": None, "exhausted": True, "searches": 1, "last_preventable_s": 0.4}
+    verdict = Verdict(**facts, outcome=Outcome.AVOIDABLE, last_step=5)
+    disabled = None
+    if begins is not None:
+        disabled = np.zeros((12, 2), np.bool_)
+        disabled[begins:, 1] = True
+    assert helpless(verdict, disabled) is expected
