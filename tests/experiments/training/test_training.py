@@ -61,7 +61,8 @@ def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, roles, whole
     with pytest.raises(KeyboardInterrupt):
         Training(read_config(tiny(**changes)), tmp_path / "half").run(stop_at(72))
     again = trained(tiny(**changes), tmp_path / "half", resume=True)
-    assert without_time(again.curve) == without_time(reference.curve)
+    for one, two in zip(without_time(again.curve), without_time(reference.curve), strict=True):
+        assert {name: (one.get(name), two[name]) for name in two if one.get(name) != two[name]} == {}
     for one, two in zip(reference.learner.network().weights, again.learner.network().weights, strict=True):
         np.testing.assert_array_equal(one, two)
 
