@@ -44,7 +44,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         ConfigError: it is cut short or none.
     """
     try:
-        with np.load(path, allow_pickle=False) as found:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             facts = json.loads(str(found["facts"]))
             return facts, {name: found[f"a{k}"] for k, name in enumerate(facts.pop("names"))}
     except _DAMAGED as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -56,6 +58,30 @@ def stagger(batch: TeamBatch, seed: int) -> None:
     decision_s = core.config.decision_s * batch.interval
     steps = np.random.default_rng([seed, 5]).integers(0, max(1, int(0.9 * longest_s / decision_s)), core.n_games)
     core.time_s[:] = steps * decision_s
+
+
+class Timed:
+    """A function that counts the time spent in it.
+
+    Attributes:
+        spent_s: since `taken` was last called, s.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function, self.spent_s = function, 0.0
+
+    def __call__(self, *args: Any) -> Any:
+        """Call it."""
+        began = time.perf_counter()
+        try:
+            return self._function(*args)
+        finally:
+            self.spent_s += time.perf_counter() - began
+
+    def taken(self) -> float:
+        """Time spent, s; counts anew."""
+        spent_s, self.spent_s = self.spent_s, 0.0
+        return spent_s
 
 
 class PlacedVecEnv(MctfVecEnv):

@@ -22,7 +22,7 @@ def make_learners(
     actions: str = "discrete",
     interval: int = 1,
     seed: int = 0,
-    autoreset_mode: Any = "same_step",
+    autoreset_mode: Any = "SameStep",
     **rules: Any,
 ) -> Any:
     """A `MctfVectorEnv`.
@@ -36,7 +36,7 @@ def make_learners(
         actions: "discrete", "continuous" or "normalised".
         interval: game steps for which a decision is held.
         seed: of games and opponent.
-        autoreset_mode: "same_step", "next_step" or "disabled".
+        autoreset_mode: "SameStep", "NextStep" or "Disabled", or Gymnasium's `AutoresetMode`.
         **rules: settings of the game that replace the preset's.
 
     Raises:

@@ -135,6 +135,7 @@ class Learner:
         for k, state in self.model.policy.optimizer.state_dict()["state"].items():
             found |= {f"adam/{k}/{name}": torch.as_tensor(value).cpu().numpy() for name, value in state.items()}
         found["torch"] = torch.get_rng_state().numpy()
+        found["counts"] = np.array([self.model._n_updates, self.model.num_timesteps])
         found["last_obs"], found["starts"] = self.model._last_obs, self.model._last_episode_starts
         return {name: np.array(value) for name, value in found.items()}
 
@@ -161,6 +162,7 @@ class Learner:
                 state.setdefault(int(k), {})[key] = torch.as_tensor(value)
         optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
         torch.set_rng_state(torch.as_tensor(arrays["torch"]))
+        self.model._n_updates, self.model.num_timesteps = (int(count) for count in arrays["counts"])
         self.model._last_obs, self.model._last_episode_starts = arrays["last_obs"], arrays["starts"]
 
     def _values(self) -> dict[str, Any]:

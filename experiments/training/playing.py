@@ -71,6 +71,7 @@ def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     if not rows:
         return {"games": 0}
     found: dict[str, Any] = {name: float(np.mean([row[name] for row in rows])) for name in FIGURES}
-    interval = mean_interval([row["net"] for row in rows]) if len(rows) > 1 else None
-    found["net_low"], found["net_high"] = (interval.low, interval.high) if interval else (found["net"], found["net"])
+    interval = mean_interval([row["net"] for row in rows])
+    for name, limit in (("net_low", interval.low), ("net_high", interval.high)):
+        found[name] = limit if np.isfinite(limit) else None  # none where all games ended alike
     return {"games": len(rows), **found}

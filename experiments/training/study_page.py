@@ -55,8 +55,8 @@ def _rows(rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 
 def _figures(cell: Sequence[Mapping[str, Any]]) -> list[str]:
     nets = [net for row in cell for net in row["nets"]]
-    interval = mean_interval(nets) if len(nets) > 1 else None
-    limits = f" ({interval.low:+.2f} to {interval.high:+.2f})" if interval else ""
+    interval = mean_interval(nets)
+    limits = f" ({interval.low:+.2f} to {interval.high:+.2f})" if np.isfinite(interval.low) else ""
 
     def mean(name: str) -> str:
         return f"{np.mean([row[name] for row in cell]):.2f}"

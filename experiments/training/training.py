@@ -16,7 +16,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
-from .games import learners_of, stagger
+from .games import Timed, learners_of, stagger
 from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
@@ -52,6 +52,7 @@ class Training:
         self._checked_opponents()
         self.batch = learners_of(settings, self._pool())
         self.learner = Learner(settings, self.batch, self._card())
+        self._time_parts()
         self._begin_games()
         if resume:
             self._resume()
@@ -75,6 +76,7 @@ class Training:
         began = time.perf_counter()
         ended = self.learner.rollout()
         played = time.perf_counter()
+        parts = self._parts(played - began)
         told = self.learner.learn()
         learned = time.perf_counter()
         self.rollouts += 1
@@ -85,12 +87,25 @@ class Training:
         self._league()
         row |= self._evaluate()
         self._wall_s += time.perf_counter() - began
-        row["wall"] = {"total_s": self._wall_s, "games_s": played - began, "learning_s": learned - played}
+        row["wall"] = {"total_s": self._wall_s, **parts, "learning_s": learned - played}
         self.curve.append(row)
         self._last = self._packed()
         if self.rollouts % self.settings.checkpoint_every == 0:
             write_checkpoint(self.folder, self.rollouts, *self._last)
             write_curve(self.folder, self.curve, self.settings)
+
+    def _time_parts(self) -> None:
+        """Count the time in games and shield apart."""
+        self._in_games = Timed(self.batch.step)
+        self._in_shield = Timed(self.batch._filter) if self.batch._filter is not None else None
+        self.batch.step = self._in_games
+        self.batch._filter = self._in_shield
+
+    def _parts(self, rollout_s: float) -> dict[str, float]:
+        """Where the time of a rollout went: simulator with opponents and rewards, shield, acting network."""
+        games_s = self._in_games.taken()
+        shield_s = self._in_shield.taken() if self._in_shield is not None else 0.0
+        return {"simulator_s": games_s - shield_s, "shield_s": shield_s, "acting_s": rollout_s - games_s}
 
     def _promote(self, games: list[dict[str, float]]) -> None:
         """Go to the next stage where this one's rule is met."""
@@ -224,7 +239,7 @@ class Training:
         rate = (
             self.settings.ppo.steps
             * self.batch.learners
-            / max(row["wall"]["games_s"] + row["wall"]["learning_s"], 1e-9)
+            / max(sum(s for name, s in row["wall"].items() if name != "total_s"), 1e-9)
         )
         net = row["captures"] - row["captures_against"] if row["games"] else float("nan")
         return f"stage {self.stage + 1}/{len(self.settings.stages)}, net {net:+.1f} a game, {rate:,.0f} decisions/s"

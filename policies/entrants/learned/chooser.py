@@ -111,7 +111,7 @@ def read_chooser(path: Path) -> Chooser:
         with zipfile.ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > MAX_BYTES:
                 raise ValueError("it is too large")
-        with np.load(path, allow_pickle=False) as found:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             about = json.loads(str(found["about"]))
             arrays = {name: found[name] for name in ("middle", "scale", "w1", "b1", "w2", "b2")}
         if about["format"] != FORMAT or tuple(about["options"]) != OPTION_NAMES:

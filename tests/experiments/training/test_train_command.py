@@ -24,7 +24,7 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     files = "--out", tmp_path / "team.npz", "--submission", tmp_path / "solution.zip"
     assert call("export", folder / "model.zip", *files).exit_code == 0
     for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
-        played = call("evaluate", policy, "--opponent", "hold", "--games", 1, "--max-time", 3, "--shield", "off",
+        played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
         assert played.exit_code == 0, played.output
 
