@@ -15,7 +15,7 @@ from .encounters.summary import upper_bound
 CONDITIONS = ("radius_m", "delay_s", "noise_m", "current_mps")
 COUNTS = ("encounters", "breached", "avoidable", "unavoidable", "not_judged", "deadlocked")
 MEANS = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
-LATER_MEANS = ("never_arrived_percent",)
+LATER_MEANS = ("never_arrived_percent", "inactive_percent")
 """Means that results of earlier versions lack: theirs stay unknown."""
 NAMED = ("family", "guard", "own", "other")
 NEEDED = (*NAMED, *COUNTS, *MEANS)

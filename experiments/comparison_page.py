@@ -12,17 +12,27 @@ from .comparison import Cell, Contest, cells_of, contests_of, pool
 from .comparison_plot import plot_contests
 from .encounters.summary import upper_bound
 from .markdown import MADE, line, table
+from .rollouts import NAMES
 from .tables import number_text
 
 STEM = "comparison"
+LIBRARY_STEM = "library_filters"
+"""Page of results with a filter that rolls manoeuvres out: they are measured on fewer encounters."""
 
 
-def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, list[Path]]:
+def has_library(content: Mapping[str, Any]) -> bool:
+    """Whether results of ``encounters`` hold a filter that rolls manoeuvres out."""
+    cells = content.get("cells") or []
+    return any(str(cell.get("guard")).partition(":")[0] in NAMES for cell in cells if isinstance(cell, Mapping))
+
+
+def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path, stem: str = STEM) -> tuple[str, list[Path]]:
     """Make the page of results of ``encounters``, and draw its plot into the folder.
 
     Args:
         results: contents of their JSON files; guards may be spread over several.
         folder: which exists.
+        stem: of the picture's name.
 
     Returns:
         The text, and the pictures written.
@@ -34,7 +44,7 @@ def write_comparison(results: Sequence[Mapping[str, Any]], folder: Path) -> tupl
                 if contest.families]  # fmt: skip
     if not contests:
         raise ConfigError("the encounter results have no family that all guards met; run them with the same --families")
-    picture = plot_contests(contests, folder / f"{STEM}.png")
+    picture = plot_contests(contests, folder / f"{stem}.png")
     versions = sorted({str((content.get("versions") or {}).get("steerclear")) for content in results})
     return comparison_page(contests, picture, versions), [picture]
 
@@ -65,9 +75,11 @@ def _intro(versions: Sequence[str]) -> str:
         "of the probability. *Started outside* are encounters at whose first decision every own boat had an "
         "escape by the default shield's certificate. *Time to goal* is that without a guard times the number; own "
         "boats that *never arrived* had not reached their goal by the end of an encounter, though without a guard "
-        "they do (empty: results of an earlier version). The filters of the literature are those of "
-        "`steerclear.experiments.textbook`, with gains chosen by their own sweep on these platforms; `reach` is "
-        "`steerclear.experiments.reach_guard`, the value tables alone."
+        "they do. *Left alone*: of states sampled along the encounters without a guard that are safe by the value "
+        "tables, how many wanted commands pass (both empty: results of an earlier version). The textbook filters are "
+        "those of `steerclear.experiments.textbook`, with gains chosen by their own sweep on these platforms; `reach` "
+        "is `steerclear.experiments.reach_guard`, the value tables alone; `gatekeeper` and `pl-cbf` are "
+        "`steerclear.experiments.rollouts`, whose modules say what the papers leave open and what was filled in."
     )
 
 
@@ -83,15 +95,16 @@ def _winner_line(contest: Contest) -> str:
 
 def _totals_table(contest: Contest) -> list[str]:
     heads = ["guard", "encounters", "avoidable", "unavoidable", "not judged", "breached", "commands changed",
-             "time to goal", "never arrived", "deadlocked", "reversals / min", "µs per decision"]  # fmt: skip
+             "left alone", "time to goal", "never arrived", "deadlocked", "reversals / min",
+             "µs per decision"]  # fmt: skip
     rows = []
     for guard, one in contest.totals.items():
         name = f"**{guard}**" if guard == contest.winner and len(contest.cells) > 1 else guard
         rows.append([
             name, f"{one['encounters']:,}", _bounded(one, "avoidable"), one["unavoidable"], one["not_judged"],
-            _bounded(one, "breached"), f"{one['changed_percent']:.1f} %", _number(one["goal_time_ratio"], 2),
-            _percent(one["never_arrived_percent"]), one["deadlocked"], _number(one["reversals_per_min"], 1),
-            _number(one["decision_us"], 1),
+            _bounded(one, "breached"), f"{one['changed_percent']:.1f} %", _percent(one["inactive_percent"]),
+            _number(one["goal_time_ratio"], 2), _percent(one["never_arrived_percent"]), one["deadlocked"],
+            _number(one["reversals_per_min"], 1), _number(one["decision_us"], 1),
         ])  # fmt: skip
     return table(heads, rows)
 

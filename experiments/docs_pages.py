@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.visible import visible
 
 from .bench.report import bench_tables
-from .comparison_page import STEM, write_comparison
+from .comparison_page import LIBRARY_STEM, STEM, has_library, write_comparison
 from .conditions import words_of
 from .docs_plots import plot_off_on
 from .keys import KEYS
@@ -79,8 +79,12 @@ def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[
     """Text of each page by file name, and the pictures written."""
     pages: dict[str, str] = {"json_keys.md": keys_page(), "settings.md": settings_page()}
     pictures: list[Path] = []
+    library = [content for content in results if content.get("command") == "encounters" and has_library(content)]
+    if library:
+        pages[f"{LIBRARY_STEM}.md"], picture = write_comparison(library, folder, LIBRARY_STEM)
+        pictures += picture
     for command, write in POOLED.items():
-        found = [content for content in results if content.get("command") == command]
+        found = [content for content in results if content.get("command") == command and content not in library]
         if found:
             name, text, picture = write(found, folder)
             pages[name] = text

@@ -32,7 +32,9 @@ Family = Annotated[str, typer.Option(metavar="A,B", help="Families of encounters
 Number = Annotated[int, typer.Option("--n", metavar="N", help="Encounters per family, platforms and guard.")]
 GuardNames = Annotated[
     list[str] | None,
-    typer.Option("--guard", metavar="A,B", help="none, shield, reach (both :KEY=VALUE,...), or one of the literature."),
+    typer.Option(
+        "--guard", metavar="A,B", help="none, shield, reach, gatekeeper, pl-cbf (:KEY=VALUE,...), or a textbook."
+    ),
 ]
 Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.")]
 Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]

@@ -1,4 +1,4 @@
-"""Guards by name: ``none``, ``shield`` and ``reach`` (both with ``:KEY=VALUE,...``), and filters of the literature."""
+"""Guards by name: ``none``, ``shield``, ``reach``, filters by rollouts (with ``:KEY=VALUE,...``), textbook filters."""
 
 from __future__ import annotations
 
@@ -86,15 +86,28 @@ def check_guard(name: str) -> None:
         from ..reach_guard import check_settings
 
         check_settings(settings)
-    elif settings:
-        raise ConfigError(f"{base!r} takes no settings; only shield:KEY=VALUE,... and reach:KEY=VALUE,... do")
+    elif base in rollout_names():
+        from ..rollouts import check_settings as check_rollout
+
+        check_rollout(base, settings)
     elif base != NONE and base not in textbook_names():
-        raise ConfigError(f"unknown guard {base!r}; choose from none, shield, reach, {', '.join(textbook_names())}")
+        names = ", ".join((NONE, SHIELD, REACH, *rollout_names(), *textbook_names()))
+        raise ConfigError(f"unknown guard {base!r}; choose from {names}")
+    elif settings:
+        names = ", ".join((SHIELD, REACH, *rollout_names()))
+        raise ConfigError(f"{base!r} takes no settings; only {names} do, as in shield:KEY=VALUE,...")
 
 
 def textbook_names() -> tuple[str, ...]:
     """Names of the filters of the literature."""
     from ..textbook import NAMES
+
+    return tuple(NAMES)
+
+
+def rollout_names() -> tuple[str, ...]:
+    """Names of the filters that roll manoeuvres out."""
+    from ..rollouts import NAMES
 
     return tuple(NAMES)
 
@@ -140,7 +153,7 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
         delay_s=conditions.delay_s,
         current_mps=conditions.current_mps,
         dt_s=DT_S,
-        **settings,
+        **({} if base in rollout_names() else settings),
     )
     fleet = (config, scenes.games, scenes.platforms, tuple(scenes.team.tolist()))
     around = OPEN_WATER if scenes.field is None else Surroundings(field=scenes.field)
@@ -153,6 +166,10 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
 
         check_settings(settings)
         return ReachGuard(*fleet)
+    if base in rollout_names():
+        from ..rollouts import make_guard as make_rollout
+
+        return make_rollout(base, *fleet, settings)
     if base not in textbook_names():
         check_guard(base)
     from ..textbook import make_guard

@@ -26,6 +26,7 @@ CELL_KEYS = {
     "closest_quantiles_m[]": "quantiles 0, 0.01, ..., 1 of the closest distance of an encounter, m",
     "unshielded_closest_quantiles_m[]": "the same without a guard, m",
     "changed_percent": "share of the own boats' steps whose command was changed, %",
+    "inactive_percent": "of sampled states that are safe by the value tables, how many commands pass, %",
     "heading_change_deg": "mean change of the commanded heading over changed steps, deg",
     "speed_change_mps": "mean change of the commanded speed over changed steps, m/s",
     "goal_time_ratio": "time to the first goal over that without a guard; never there counts as the whole length",

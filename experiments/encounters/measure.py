@@ -12,6 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from .arrival import never_arrived
 from .families import draw
 from .guards import NONE, GuardMaker
+from .inactive import inactive_columns
 from .play import Film, play
 from .scenes import DT_S, Conditions, Scenes
 from .start import start_certificate_m
@@ -102,8 +103,8 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
         ``start_certificate_m`` (see `start`), those of `tally.tally`, ``never_arrived`` (see `arrival`),
-        ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per
-        game and step), and the verdicts.
+        ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`, those of `inactive.inactive_columns`, ``decision_us`` and
+        ``decision_p999_us`` (of the chunk, per game and step), and the verdicts.
     """
     play(replace(scenes.take([0]), length_s=DT_S), guard, conditions)  # compiles, so that what is timed is deciding
     film = play(scenes, guard, conditions)
@@ -118,6 +119,7 @@ def measure_chunk(scenes: Scenes, guard: str | GuardMaker, conditions: Condition
     columns |= {f"unshielded_{name}": bare[name][worst] for name in BARE_SAME}
     worst_bare = worst_games(scenes, bare["closest_m"])
     columns |= {f"unshielded_{name}": bare[name][worst_bare] for name in BARE_WORST}
+    columns |= inactive_columns(bare_film, guard, conditions, worst_bare)
     columns["decision_us"] = np.full(len(worst), float(np.median(film.decision_us)))
     columns["decision_p999_us"] = np.full(len(worst), float(np.quantile(film.decision_us, 0.999)))
     return columns | verdicts

@@ -25,6 +25,7 @@ COLUMNS = (
     ("breaches_outside", "breached, started outside"),
     ("closest_m", "closest, m"),
     ("changed_percent", "changed, %"),
+    ("inactive_percent", "left alone when safe, %"),
     ("heading_change_deg", "changed by, deg"),
     ("speed_change_mps", "changed by, m/s"),
     ("goal_time_ratio", "time to goal, ×"),

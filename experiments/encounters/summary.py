@@ -77,6 +77,7 @@ def _distance_figures(columns: Columns) -> dict[str, Any]:
 def _change_figures(columns: Columns) -> dict[str, Any]:
     return {
         "changed_percent": 100.0 * float(columns["changed_share"].mean()),
+        "inactive_percent": _share_percent(columns["left_alone"], columns["sampled_safe"]),
         "heading_change_deg": _mean(columns["heading_change_deg"], columns["changed_share"]),
         "speed_change_mps": _mean(columns["speed_change_mps"], columns["changed_share"]),
     }
@@ -94,6 +95,11 @@ def _course_figures(columns: Columns) -> dict[str, Any]:
         "unshielded_reversals_per_min": float(columns["unshielded_reversals_per_min"].mean()),
         "outside_m": float(columns["outside_m"].max()),
     }
+
+
+def _share_percent(part: np.ndarray, whole: np.ndarray) -> float | None:
+    """Percentage over all encounters; None of nothing."""
+    return 100.0 * float(part.sum() / whole.sum()) if whole.sum() > 0.0 else None
 
 
 def _mean(values: np.ndarray, weights: np.ndarray) -> float | None:

@@ -61,6 +61,11 @@ class ReachGuard(BatchGuard):
         self._setup = _setup(config, self._platforms, team)
         self._side = np.zeros(self.reason.shape)
 
+    @property
+    def setup(self) -> Setup:
+        """Tables and settings, which `values` is asked with."""
+        return self._setup
+
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the escapes of the games in ``mask`` (B,), or of all."""
         super().reset(mask)

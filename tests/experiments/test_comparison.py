@@ -72,7 +72,7 @@ def test_the_page_is_made_of_older_results_beside_newer_ones(tmp_path):
     )
     (page,) = (path for path in write_pages([both(), newer], tmp_path) if path.name == "comparison.md")
     lines = page.read_text().splitlines()
-    heads, *rows = [[part.strip() for part in line.split("|")] for line in lines if line.count("|") == 13]
+    heads, *rows = [[part.strip() for part in line.split("|")] for line in lines if line.count("|") == 14]
     column = heads.index("never arrived")
     assert {row[1].strip("*"): row[column] for row in rows[1:]} == {
         "none": "",
@@ -211,3 +211,14 @@ def test_guards_are_told_apart_when_colours_run_out():
 )
 def test_a_legend_has_as_many_columns_as_fit(names, width_in, columns):
     assert legend_columns(names, width_in) == columns
+
+
+def test_filters_by_rollouts_have_a_page_of_their_own(tmp_path):
+    tried = content(*(cell(guard, "head_on", inactive_percent=80.0) for guard in ("none", "pl-cbf:alpha_per_s=2")))
+    pages = {path.name: path for path in write_pages([both(), tried], tmp_path)}
+    assert {"comparison.md", "comparison.png", "library_filters.md", "library_filters.png"} <= set(pages)
+    assert "pl-cbf:alpha" not in pages["comparison.md"].read_text()
+    text = pages["library_filters.md"].read_text()
+    assert "| **pl-cbf:alpha_per_s=2** | 100 |" in text
+    assert "| 5.0 % | 80.0 % | 1.10 |" in text
+    assert "library_filters.png" in text
