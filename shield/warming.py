@@ -8,12 +8,12 @@ from .commands import Commands
 from .fleet import Fleet
 from .surroundings import Surroundings
 
-PLACES_M = ((0.0, 0.0), (0.0, 4.5), (300.0, 3.0))
+PLACES_M = ((0.0, 0.0), (0.0, 4.2), (300.0, 3.0))
 """Two boats of ours that run at each other, and an opponent: beside them it would leave no room for the program."""
 
 
 def tight_spot() -> tuple[Fleet, Commands, Surroundings]:
-    """Boats whose wanted commands need the program, its check and the escapes, between fixed things of each kind."""
+    """Boats whose wanted commands need the program and its check, between fixed things of each kind."""
     fleet = Fleet.of(
         position_m=PLACES_M,
         heading_rad=[0.0, np.pi, -np.pi / 2],
