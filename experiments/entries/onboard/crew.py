@@ -169,7 +169,7 @@ class Deck:
         rows[:, L.X] = 10.0 + 20.0 * np.arange(len(rows))
         rows[:, L.Y] = 30.0
         nobody = np.zeros(len(rows), np.bool_)
-        fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody), self._team, self._disabled_s)
+        fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody, nobody), self._team, self._disabled_s)
         self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
         self._shield.reset()
 

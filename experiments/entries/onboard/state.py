@@ -51,12 +51,13 @@ class Facts(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """All boats in one moment: (n, N_STATE) rows without autopilot memory, and (n,) what the game does with them."""
+    """All boats in one moment: (n, N_STATE) rows, and (n,) what the game does with them and who is on the other side."""
 
     rows: Any
     tagged: Any
     oob: Any
     disabled: Any
+    visiting: Any
 
 
 def see(facts: Facts, state: Mapping[Any, Any]) -> Sight:
@@ -67,12 +68,13 @@ def see(facts: Facts, state: Mapping[Any, Any]) -> Sight:
     """
     rows = np.zeros((len(facts.agent_ids), L.N_STATE))
     rows[:, [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]] = math.nan
-    flags = np.zeros((3, len(facts.agent_ids)), np.bool_)
+    flags = np.zeros((4, len(facts.agent_ids)), np.bool_)
     for i, name in enumerate(facts.agent_ids):
         x, y = state[name, "pos"]
         rows[i, [L.X, L.Y]] = float(x), float(y)
         rows[i, L.HEADING], rows[i, L.SPEED] = float(state[name, "heading"]), float(state[name, "speed"])
-        flags[:, i] = state[name, "is_tagged"], state[name, "oob"], state.get((name, "is_disabled"), False)
+        flags[:3, i] = state[name, "is_tagged"], state[name, "oob"], state.get((name, "is_disabled"), False)
+        flags[3, i] = not state.get((name, "on_side"), True)
     if not np.isfinite(rows[:, : L.SPEED + 1]).all() or (np.abs(rows[:, [L.X, L.Y]]) <= NORMALISED_M).all():
         raise ValueError("the global state is normalised or not finite; the shield needs it in metres")
     return Sight(rows, *flags)
@@ -87,7 +89,7 @@ def fleet_of(facts: Facts, sight: Sight, team: int, disabled_for_s: Any) -> Flee
     if driven.any():
         rows = np.array([_drive(facts, sight, i, int(teams[i]), disabled_for_s[i]) for i in range(2 * half)])
     ours = (teams == team) & ~driven
-    return Fleet(sight.rows, teams, facts.platforms, ours, facts.agent_ids, driven=rows)
+    return Fleet(sight.rows, teams, facts.platforms, ours, facts.agent_ids, driven=rows, visiting=sight.visiting)
 
 
 def _drive(facts: Facts, sight: Sight, i: int, team: int, disabled_for_s: float) -> tuple[float, float, float, float]:
