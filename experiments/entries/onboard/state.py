@@ -51,7 +51,7 @@ class Facts(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """All boats in one moment: (n, N_STATE) rows, and (n,) what the game does with them and who is on the other side."""
+    """All boats now: (n, N_STATE) rows, and (n,) what the game does with them and who is on the other side."""
 
     rows: Any
     tagged: Any
