@@ -1,0 +1,71 @@
+import json
+
+import numpy as np
+import pytest
+from steerclear.experiments.training.algorithms import training_of
+from steerclear.experiments.training.cloning import fitted
+from steerclear.experiments.training.config_file import read_config
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, read_chooser
+from steerclear.shield.exceptions import ConfigError, PolicyError
+
+
+def test_a_clone_agrees_with_a_rule_it_was_shown():
+    rng = np.random.default_rng(0)
+    rows = []
+    for _ in range(600):
+        x, y = rng.uniform(0, 80), rng.uniform(0, 40)
+        rows.append({"time_s": 0.0, "option": "attack" if x + y > 60 else "guard", "own_x": x, "own_y": y})
+    _, curve = fitted(rows, 60, 1e-2, 16, 64, 0, {})
+    assert curve[-1]["agrees"] > 0.93
+
+
+def test_gradients_are_those_of_finite_differences():
+    rng = np.random.default_rng(1)
+    chooser = Chooser.fresh(["a", "b"], 4, rng, {})
+    seen, chosen = rng.normal(size=(7, 2)), rng.integers(0, len(OPTION_NAMES), 7)
+
+    def loss():
+        values = chooser.values(seen)
+        top = values.max(1, keepdims=True)
+        logs = values - top - np.log(np.exp(values - top).sum(1, keepdims=True))
+        return -logs[np.arange(7), chosen].mean()
+
+    for array, gradient in zip(chooser.parameters(), chooser.gradients(seen, chosen), strict=True):
+        at = tuple(0 for _ in array.shape)
+        array[at] += 1e-6
+        above = loss()
+        array[at] -= 2e-6
+        below = loss()
+        array[at] += 1e-6
+        assert gradient[at] == pytest.approx((above - below) / 2e-6, abs=1e-7)
+
+
+def test_cloning_ends_in_a_chooser_that_can_be_read(tiny, tmp_path):
+    config = tiny(
+        algorithm="cloning", stages=[{"opponents": ["hold"]}], options={"epochs": 20}, rules={"max_time_s": 12.0}
+    )
+    training_of(read_config(config), tmp_path / "run", False).run()
+    chooser = read_chooser(tmp_path / "run" / "best.npz")
+    assert chooser.card["demonstrations"] == "scripted demonstrator"
+    assert "own_x" in chooser.names
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "run" / "best.npz").read_bytes()[:200])
+    with pytest.raises(PolicyError, match="holds no chooser"):
+        read_chooser(tmp_path / "cut.npz")
+
+
+def test_qmix_learns_from_a_replay_and_its_network_plays(tiny, tmp_path):
+    changes = {"options": {"batch": 8, "updates": 1}, "stages": [{"opponents": ["hold"]}], "decisions": 240}
+    training = training_of(read_config(tiny(algorithm="qmix", **changes)), tmp_path / "run", False)
+    training.run()
+    assert training.learner.updates > 10
+    network = read_weights(tmp_path / "run" / "final.npz")
+    assert network.kind == "discrete"
+    assert json.loads((tmp_path / "run" / "curve.json").read_text())["rows"][-1]["evaluation"]["medium"]["games"] == 2
+
+
+def test_unknown_options_are_refused(tiny, tmp_path):
+    for algorithm in ("qmix", "cloning"):
+        config = read_config(tiny(algorithm=algorithm, options={"epoch": 3}))
+        with pytest.raises(ConfigError, match="unknown option 'epoch'"):
+            training_of(config, tmp_path, False)
