@@ -8,10 +8,10 @@ Callees are compiled within their caller's turn and never call back, so nobody w
 from __future__ import annotations
 
 import hashlib
+import os
 import time
 from collections.abc import Hashable
 from pathlib import Path
-from typing import IO
 
 try:
     import fcntl
@@ -31,33 +31,34 @@ class Turns:
 
     def __init__(self, path: str | None) -> None:
         self._path = path
-        self._held: dict[Hashable, IO[str]] = {}
+        self._held: dict[Hashable, tuple[int, str]] = {}
+        """Open files, by number: what a compilation that failed leaves open is closed with the process."""
 
     def take(self, key: Hashable) -> None:
         """Wait until nobody else compiles the function for ``key``, a signature; look again for its code then."""
         if self._path is None or fcntl is None or key in self._held:
             return
-        digest = hashlib.sha256(str(key).encode()).hexdigest()[:12]
+        path = f"{self._path}.{hashlib.sha256(str(key).encode()).hexdigest()[:12]}.lock"
         try:
-            file = open(f"{self._path}.{digest}.lock", "w")  # noqa: SIM115 (held until `give`)
+            file = os.open(path, os.O_CREAT | os.O_WRONLY, 0o600)
         except OSError:
             return
         if _locked(file):
-            self._held[key] = file
+            self._held[key] = file, path
         else:
-            file.close()
+            os.close(file)
 
     def give(self, key: Hashable) -> None:
         """Let the next one go on."""
-        file = self._held.pop(key, None)
-        if file is None:
+        if key not in self._held:
             return
-        Path(file.name).unlink(missing_ok=True)
+        file, path = self._held.pop(key)
+        Path(path).unlink(missing_ok=True)
         fcntl.flock(file, fcntl.LOCK_UN)  # a forked child has the file, too: closing ours alone would not do
-        file.close()
+        os.close(file)
 
 
-def _locked(file: IO[str]) -> bool:
+def _locked(file: int) -> bool:
     """Whether the lock was got in time."""
     until = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < until:
