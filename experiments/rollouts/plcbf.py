@@ -7,13 +7,14 @@ least invasive is taken, where there is none that of the greatest value, and the
 
     minimise |u - u_wanted|^2   subject to   dV_m/dt >= -alpha V_m,   limits of u.
 
-Where it has no answer the boat follows the policy itself, as the authors' code does.
+Where it has no answer, or one that does not keep the row, the boat follows the policy itself, as in the authors' code.
+The row is held against the boat's own model: of a boat whose rudder swings from side to side a line says too little.
 
 What the paper leaves to the user, and what stands here:
 
 | left open | here |
 | --- | --- |
-| library | the manoeuvres of `settings.library`, anchored at the present heading, and the wanted command held |
+| library | the wanted command held; the mode taken last, anchored as it was; `settings.library` from the heading now |
 | inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
 | dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
 | its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
@@ -36,11 +37,19 @@ from ..jit import kernel
 from ..textbook.inputs import command_of_inputs, inputs_of_command
 from ..textbook.program import TOLERANCE, holds
 from .area import share_left
-from .paths import Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
+from .paths import NO_PLAN, Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
 from .settings import AREA
 
 PASSED, CHANGED, POLICY = 0, 1, 2
+WANTED, LAST, BEFORE = 0, 1, 2
+"""The first modes, and how many come before the library's.
+
+The mode taken last stays among them, in columns 1 and 2 of a plan: the library turns with the boat, and what was safe
+would otherwise be lost in the next step.
+"""
 DIFFERENCE = 0.1
+SLACK_M = 1e-3
+"""How far an answer may miss its row by the boat's model, m in a step."""
 SAME = 1e-9
 """Inputs this near to the wanted ones are the wanted ones."""
 
@@ -101,11 +110,13 @@ def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
 
 
 @kernel
-def _command_of_mode(setup: Setup, i: int, m: int, state: Array, wanted: Array) -> tuple[float, float]:
-    """Speed and absolute heading of mode m; 0 is the wanted command held, the library follows."""
-    if m == 0:
+def _command_of_mode(setup: Setup, i: int, m: int, state: Array, wanted: Array, plan: Array) -> tuple[float, float]:
+    """Speed and absolute heading of mode m: the wanted command held, the mode taken last, then the library."""
+    if m == WANTED:
         return wanted[0], wrap_degrees(state[L.HEADING] + wanted[1])
-    return command_of(setup, i, m - 1, state)
+    if m == LAST:
+        return plan[1], plan[2]
+    return command_of(setup, i, m - BEFORE, state)
 
 
 @kernel
@@ -150,15 +161,15 @@ def _better(value: float, score: float, best_value: float, best_score: float) ->
 
 @kernel
 def take_mode(
-    setup: Setup, i: int, state: Array, wanted: Array, unit: float, box: Array, z0: Array, near: BoolArray,
-    path: Array, grow: Array, row: Array,
+    setup: Setup, i: int, state: Array, wanted: Array, plan: Array, unit: float, box: Array, z0: Array,
+    near: BoolArray, path: Array, grow: Array, row: Array,
 ) -> tuple[int, float, float]:  # fmt: skip
     """The mode taken, its row (written), right-hand side and value; safe ones first, by what pleases, then V."""
     later, trial, z = np.empty((3, L.N_STATE)), np.empty(2), np.empty(2)
     shift = _next_states(setup, i, state, z0, unit, box, later)
     best, best_need, best_value, best_score = -1, 0.0, -math.inf, -math.inf
-    for m in range(setup.library.shape[0] + 1):
-        speed, heading = _command_of_mode(setup, i, m, state, wanted)
+    for m in range(setup.library.shape[0] + BEFORE):
+        speed, heading = _command_of_mode(setup, i, m, state, wanted, plan)
         need, value = _row_of(setup, i, state, later, shift, z0, speed, heading, near, path, grow, trial)
         score = _pleases(setup, trial, need, box, z0, z) if value > 0.0 else -math.inf
         if best < 0 or _better(value, score, best_value, best_score):
@@ -171,24 +182,28 @@ def take_mode(
 
 @kernel
 def _decide_boat(
-    setup: Setup, i: int, state: Array, near: BoolArray, path: Array, grow: Array, sent: Array
+    setup: Setup, i: int, state: Array, near: BoolArray, path: Array, grow: Array, plan: Array, sent: Array
 ) -> tuple[int, float]:
-    """Take a mode and solve its program; returns why the command is what it is, and the mode's value, m."""
+    """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
     params, limits = setup.params[i], setup.limits[i]
     gain, turn, most = inputs_of_command(params, limits, state, sent[0], sent[1], setup.dt_s)
     unit = most if most > 0.0 else 1.0
     box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
     _input_box(setup, i, state, box)
     z0[0], z0[1] = clamp(gain / limits[2], box[0, 0], box[0, 1]), turn / unit
-    m, need, value = take_mode(setup, i, state, sent, unit, box, z0, near, path, grow, row)
-    if not answer_of(row, need, box, z0, z):
-        speed, heading = _command_of_mode(setup, i, m, state, sent)
-        sent[0], sent[1] = speed, wrap_degrees(heading - state[L.HEADING])
-        return POLICY, value
-    if abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME:
-        return PASSED, value
-    sent[0], sent[1] = command_of_inputs(params, limits, state, z[0] * limits[2], z[1] * unit, setup.dt_s)
-    return CHANGED, value
+    m, need, value = take_mode(setup, i, state, sent, plan, unit, box, z0, near, path, grow, row)
+    plan[1], plan[2] = _command_of_mode(setup, i, m, state, sent, plan)
+    if answer_of(row, need, box, z0, z):
+        same = abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME
+        if not same:
+            sent[0], sent[1] = command_of_inputs(params, limits, state, z[0] * limits[2], z[1] * unit, setup.dt_s)
+        after = state.copy()
+        step_boat(params, after, sent[0], sent[1], setup.dt_s)
+        then = value_of(setup, i, after, 1, plan[1], plan[2], near, path, grow)
+        if then >= (1.0 - setup.alpha_per_s * setup.dt_s) * value - SLACK_M:
+            return PASSED if same else CHANGED, value
+    sent[0], sent[1] = plan[1], wrap_degrees(plan[2] - state[L.HEADING])
+    return POLICY, value
 
 
 @kernel
@@ -202,8 +217,10 @@ def decide_game(
     for i in range(n):
         if not ours[i]:
             continue
+        if plan[i, 0] == NO_PLAN:
+            plan[i, 1], plan[i, 2] = state[i, L.SPEED], state[i, L.HEADING]
         if mark_near(setup, i, state, steps, near):
-            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], near, path, grow, sent[i])
+            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], near, path, grow, plan[i], sent[i])
         plan[i, 0], plan[i, 3] = 0.0, sent[i, 0]
         plan[i, 4] = wrap_degrees(state[i, L.HEADING] + sent[i, 1])
         roll_plan(setup, i, state[i], plan[i], path[i])
