@@ -18,7 +18,7 @@ from .certificates.assign import assign_plans
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
 from .certificates.fixed_things import clear_of_near_obstacles
-from .certificates.manoeuvre import told_margin
+from .certificates.manoeuvre import could_meet, told_margin
 from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, worst_merit
 from .certificates.values import run_opponents
 from .easing import ease
@@ -93,11 +93,11 @@ def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan
 
 
 @lean_kernel
-def _join(ours: BoolArray, work: Work, plan: Plan) -> int:
-    """Make movers of the boats of ours near movers; returns how many movers there are."""
+def _join(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, plan: Plan) -> int:
+    """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
     for i in range(ours.shape[0]):
         for m in range(ours.shape[0]):
-            if ours[i] and plan.place[m] >= 0 and work.near[i, m]:
+            if ours[i] and plan.place[m] >= 0 and could_meet(i, m, state, boats, tuning):
                 plan.moving[i] = True
     return list_movers(plan)
 
@@ -153,7 +153,7 @@ def _find_backups(
     """
     for _ in range(ours.shape[0]):
         good = _assign_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        movers = count if good else _join(ours, work, plan)
+        movers = count if good else _join(state, ours, boats, tuning, plan)
         if movers == count or all_spent(tuning, work):
             break
         count = movers

@@ -10,7 +10,6 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..folder_lock import lock_folder
 from ..training.config_file import read_config
-from ..training.study import RESULTS, cells, run_study
 from .console import Interrupted, command, out, progress
 from .train import Config
 
@@ -29,6 +28,8 @@ def train_study(
 
     ``steerclear docs DIR`` makes its page. Exit status: 0 done, 2 bad input, 130 interrupted (the same goes on).
     """
+    from ..training.study import RESULTS, cells, run_study  # needs the extra [train]
+
     settings = read_config(config)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -36,6 +36,16 @@ RECOVERY_S = 1.5
 
 
 @lean_kernel
+def could_meet(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> bool:
+    """Whether any two manoeuvres could bring team-mates i and j near each other, see `look_around`."""
+    top = max(boats.fastest_mps[i], state[i, L.SPEED]) + max(boats.fastest_mps[j], state[j, L.SPEED])
+    horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * boats.sample_s + tuning.tail_s
+    dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
+    reach = tuning.radius_m + top * horizon_s
+    return dx * dx + dy * dy <= reach * reach
+
+
+@lean_kernel
 def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 

@@ -104,7 +104,7 @@ class PyquaticusReader:
             ours,
             self.agent_ids,
             driven=driven_players(self.env, players),
-            visiting=np.array([not player.on_own_side for player in players], np.bool_),
+            visiting=np.array([not getattr(player, "on_own_side", True) for player in players], np.bool_),
         )
 
     def _teams(self) -> IntArray:

@@ -43,8 +43,8 @@ class MctfVectorEnv(VectorEnv[Any, Any, Any]):
     """Every boat of one team in every game is one sub-environment.
 
     Infos of a step hold what happened, by name of `tallies.EVENTS`, each (num_envs,), and where games ended
-    ``final_obs`` (in the same-step mode) and ``episode``: reward ``r``, decisions ``l``, seconds ``t`` and the game's
-    totals, each with its mask ``_episode``.
+    ``final_obs`` (in the same-step mode) and ``totals``: reward ``r``, decisions ``l``, seconds ``t`` and the game's
+    totals, each with its mask ``_totals``; ``episode`` is left to Gymnasium's own wrappers.
 
     Args:
         batch: the games, see `TeamBatch`.
@@ -103,7 +103,7 @@ class MctfVectorEnv(VectorEnv[Any, Any, Any]):
         self._ended = ended.reshape(self._ended.size, -1)[:, 0] & (not same)
         infos: dict[str, Any] = dict(out.events)
         if ended.any():
-            infos |= {"episode": dict(out.episodes), "_episode": ended}
+            infos |= {"totals": dict(out.episodes), "_totals": ended}
             if same:
                 infos |= {"final_obs": out.final_observations, "_final_obs": ended}
         return out.observations, out.rewards, out.terminated, out.truncated, infos

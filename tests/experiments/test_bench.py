@@ -134,7 +134,7 @@ def test_the_page_of_keys_holds_every_key(tmp_path):
 
 def test_no_page_is_made_of_other_results(tmp_path):
     with pytest.raises(
-        ConfigError, match="ablate, evaluate, tournament, bench, encounters, reach compare or reach play"
+        ConfigError, match="ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
     ):
         write_pages([{"command": "parity"}], tmp_path)
     (tmp_path / "file").write_text("")

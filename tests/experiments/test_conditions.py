@@ -90,7 +90,8 @@ def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):
     assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 0, calm.output
     pages = [path.name for path in write_pages([content], tmp_path / "docs")]
     assert "ablation_aamas2024_delay0.3_noise0.5_current0.3.md" in pages
-    assert f"under {ROUGH.words}," in (tmp_path / "docs" / pages[1]).read_text()
+    page = tmp_path / "docs" / "ablation_aamas2024_delay0.3_noise0.5_current0.3.md"
+    assert f"under {ROUGH.words}," in page.read_text()
 
 
 def test_evaluate_and_play_take_them_too(tmp_path, monkeypatch):

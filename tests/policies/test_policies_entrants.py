@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.presets import PRESETS
-from steerclear.policies.entrants import catalogue, plane
+from steerclear.policies.entrants import catalogue, listing, plane
 from steerclear.policies.entrants.chao import pddl
 from steerclear.policies.entrants.chao.grid import GridProblem
 from steerclear.policies.entrants.chao.search import bolt, search, way_home
@@ -211,17 +211,17 @@ def test_another_package_enters_a_team_by_an_entry_point(tmp_path, monkeypatch, 
     info = tmp_path / "their_team-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: their-team\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{catalogue.GROUP}]\nteam = their_team\nbroken = there_is_no_such\n")
+    (info / "entry_points.txt").write_text(f"[{listing.GROUP}]\nteam = their_team\nbroken = there_is_no_such\n")
     monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
     monkeypatch.syspath_prepend(str(tmp_path))
-    catalogue._load_others.cache_clear()
+    listing._load_others.cache_clear()
     try:
         assert "theirs" in policies.names()
         assert "entrants of there_is_no_such cannot be loaded: ModuleNotFoundError" in caplog.text
         sent, _ = play("theirs", steps=2)
         assert (sent[..., 0] == 0.0).all()
     finally:
-        catalogue._load_others.cache_clear()
+        listing._load_others.cache_clear()
 
 
 def test_a_boat_with_the_flag_and_no_way_home_bolts():

@@ -33,3 +33,17 @@ def get_platform(name: str | Platform) -> Platform:
     if name not in PLATFORMS:
         raise PlatformError(f"unknown platform {name!r}; packed are {', '.join(sorted(PLATFORMS))}")
     return PLATFORMS[name]
+
+
+def known_platforms() -> dict[str, Platform]:
+    """Those that are packed, by name."""
+    return dict(PLATFORMS)
+
+
+def register_platform(platform: Any) -> Any:
+    """Refuse it: what is packed is what the zip was made for.
+
+    Raises:
+        PlatformError: always.
+    """
+    raise PlatformError("a shielded zip knows the boats it was packed with; wrap the entry anew with other ones")

@@ -95,7 +95,7 @@ def test_a_boat_told_to_cross_its_own_flag_stays_out_of_the_circle_whether_the_f
         nearest[0] = min(nearest[0], float(np.hypot(*(at - CIRCLE[:2]))))
 
     world = world_of(FakeGame(told)).run(30.0, look)
-    assert CIRCLE[2] <= nearest[0] < CIRCLE[2] + 3.0
+    assert CIRCLE[2] - 0.02 <= nearest[0] < CIRCLE[2] + 3.0  # paths are looked at from sample to sample
     assert {tick.game["flags"][0]["taken"] for tick in world.sink.ticks} == {False, True}
     assert {tick.surroundings.stops for tick in world.sink.ticks} == {(CIRCLE,)}
     nearest[0] = math.inf
