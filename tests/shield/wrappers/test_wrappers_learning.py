@@ -57,7 +57,7 @@ def test_the_three_ways_to_begin_anew(mode):
     envs.step(stop)
     last, _, terminated, truncated, infos = envs.step(stop)
     assert (terminated | truncated).all()
-    assert infos["_episode"].all()
+    assert infos["_totals"].all()
     np.testing.assert_array_equal(infos["totals"]["l"], 2)
     if mode is AutoresetMode.DISABLED:
         with pytest.raises(ConfigError, match="games have ended; reset them"):
