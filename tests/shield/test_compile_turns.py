@@ -69,11 +69,14 @@ def test_a_turn_held_already_is_kept_and_places_without_files_are_none(tmp_path)
     turns = Turns(str(tmp_path / "f"))
     turns.take("sig")
     turns.take("sig")
+    assert len(list(tmp_path.iterdir())) == 1
     turns.give("sig")
     turns.give("sig")
+    assert not list(tmp_path.iterdir()), "nothing is left behind"
     for nowhere in (Turns(None), Turns(str(tmp_path / "missing" / "f"))):
         nowhere.take("sig")
         nowhere.give("sig")
+    assert not list(tmp_path.iterdir())
 
 
 def test_two_processes_compile_a_function_once(tmp_path):

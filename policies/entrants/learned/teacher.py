@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 from ..demonstrator import row_of
@@ -40,9 +41,9 @@ class OptionPlayer(EntrantTeam):
             if name != choice.option:
                 self._choices[number] = Choice(name, sight.time)
 
+    @abstractmethod
     def wish(self, sight: Sight, number: int) -> str:
         """The option a boat wishes for."""
-        raise NotImplementedError
 
 
 class Teacher(OptionPlayer):
