@@ -66,7 +66,7 @@ class Fleet:
             sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
             `certificates.foreseen`, unless they may be free before an escape ends, or are controlled.
         adversary_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s; NaN, or
-            None for all: as the settings say, of which `ShieldConfig.adversary_s` tells more.
+            None for all: as the settings say, see `ShieldConfig.adversary_s`; where that is 0 nobody is feared at all.
         visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
             `ShieldConfig.visitor_s`. None: of none it is known.
     """

@@ -263,8 +263,8 @@ class Shield:
         fear_s = np.where(visiting, self.config.visitor_feared_s, self.config.feared_s)
         if fleet.adversary_s is not None:
             fear_s = np.where(np.isnan(fleet.adversary_s), fear_s, fleet.adversary_s)
-        if not CERTIFICATES[self.config.certificate].hunters:
-            fear_s[:] = 0.0
+        if not CERTIFICATES[self.config.certificate].hunters or self.config.feared_s == 0.0:
+            fear_s[:] = 0.0  # nobody hunts in boat constants made so: what is told is what was acted on
         for seat in self._seats:
             seat.work.fear_s[:] = fear_s
             fear_s[seat.work.known] = 0.0
