@@ -15,11 +15,13 @@ import math
 import numpy as np
 
 from .certificates.assign import assign_plans
+from .certificates.candidates import candidate, remembered
 from .certificates.clearance import MARGIN
 from .certificates.effort import all_spent
 from .certificates.fixed_things import clear_of_near_obstacles
+from .certificates.laying import lay_path
 from .certificates.manoeuvre import could_meet, told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, worst_merit
+from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, rate_path, worst_merit
 from .certificates.values import run_opponents
 from .easing import ease
 from .jit import Array, BoolArray, lean_kernel
@@ -93,6 +95,63 @@ def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan
 
 
 @lean_kernel
+def _could_keep(
+    i: int,
+    slot: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    tuning: Tuning,
+    work: Work,
+    plan: Plan,
+) -> float:
+    """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
+    for j in range(ours.shape[0]):
+        if ours[j] and not plan.moving[j]:
+            work.near[i, j] = False
+    rank = rate_path(i, slot, -1e9, state, ours, boats, fixed, tuning, work)
+    for j in range(ours.shape[0]):
+        if ours[j] and not plan.moving[j]:
+            work.near[i, j] = work.near[j, i]
+    return rank
+
+
+@lean_kernel
+def _passed_are_in_the_way(
+    count: int,
+    state: Array,
+    ours: BoolArray,
+    boats: Boats,
+    fixed: Fixed,
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
+) -> bool:
+    """Whether some mover would keep more if team-mates whose wanted commands passed were not there.
+
+    A boat that opponents or fixed things leave no way out is helped by nobody who gives up what was wanted.
+    """
+    trial = state.shape[0]
+    for m in range(count):
+        i = plan.movers[m]
+        if work.merit[i] >= PAIR_SAFE:
+            continue
+        if _could_keep(i, i, state, ours, boats, fixed, tuning, work, plan) > work.merit[i]:
+            return True
+        heading = state[i, L.HEADING]
+        if not remembered(i, 0, heading, memory):
+            continue
+        side, togo, speed = candidate(i, 0, 0.0, heading, boats, plans, memory)
+        lay_path(i, trial, side, togo, speed, 0, state, boats, tuning, work)
+        if _could_keep(i, trial, state, ours, boats, fixed, tuning, work, plan) > work.merit[i]:
+            return True
+    return False
+
+
+@lean_kernel
 def _join(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, plan: Plan) -> int:
     """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
     for i in range(ours.shape[0]):
@@ -149,11 +208,13 @@ def _find_backups(
     """Make the candidate of all movers' backups and check it; returns how many movers there are.
 
     All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
-    fit what boats have whose wanted commands passed: where they do not, these boats take part, too.
+    fit what boats have whose wanted commands passed: where these are in the way, they take part, too.
     """
     for _ in range(ours.shape[0]):
         good = _assign_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
-        movers = count if good else _join(state, ours, boats, tuning, plan)
+        movers = count
+        if not good and _passed_are_in_the_way(count, state, ours, boats, fixed, plans, tuning, memory, work, plan):
+            movers = _join(state, ours, boats, tuning, plan)
         if movers == count or all_spent(tuning, work):
             break
         count = movers
