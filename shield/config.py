@@ -13,7 +13,7 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
-PROFILES = {"players": (12.0, 6.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
+PROFILES = {"players": (12.0, 8.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
 """`ShieldConfig.adversary_s` of each profile, s."""
 
 
