@@ -27,9 +27,8 @@ from .plan import Plan, new_plan
 from .platforms import layout as L
 from .program import Program, solve
 from .remembering import Known, Stayed, carry_over, meets_new
-from .scene import Boats, Fixed, Scene, Tuning, path_samples
+from .scene import Boats, Fixed, Scene, Tuning, new_scene, path_samples
 from .setup import boats_of, missing_tables, plans_of, tuning_of, without_hunters
-from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
@@ -51,7 +50,7 @@ class _Seat:
     def scene_of(self, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning) -> Scene:
         """The scene with these boats and fixed things; manoeuvres and settings are always the shield's."""
         if self.scene is None or self.scene.boats is not boats or self.scene.fixed is not fixed:
-            self.scene = share(Scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan))
+            self.scene = new_scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan)
         return self.scene
 
 
@@ -351,14 +350,14 @@ class Shield:
             return
         found, count = UNSAFE, 0
         for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-            count, rows = linearise(scene, state, ours)
+            count, rows = linearise(scene)
             z = self._solve(count, rows, seat.plan) if rows >= 0 else None
             if z is None:
                 break
-            found = accept(scene, z, count, state, ours)
+            found = accept(scene, z, count)
             if found != UNSAFE:
                 break
-        finish(scene, found == SAFE, count, state, ours)
+        finish(scene, found == SAFE, count)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
         """Answer of the program, if it has one."""

@@ -50,8 +50,8 @@ class Linearised:
             speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
             turn = z[2 * m] * at.plan.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
-            screening.predict(i, commands, at.state, at.boats, at.tuning, at.work)
-            lay_path(i, i, *self.manoeuvres[i], 1, at.state, at.boats, at.tuning, at.work)
+            screening.predict(i, commands, at.scene)
+            lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
 
     def margin(self, z):
         """Exact margin of the row's boat from what the row is about."""
@@ -59,11 +59,11 @@ class Linearised:
         self.move(z)
         i, j = at.plan.label[self.row]
         if j != rows.NOBODY:
-            clear_of_boat(i, j, at.work.path[i], at.state, at.ours, at.boats, at.tuning, at.work, -FAR, FAR)
+            clear_of_boat(i, j, at.work.path[i], at.scene, -FAR, FAR)
         elif at.plan.kind[self.row] == rows.PAIR_ROW:
-            clear_of_near_obstacles(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_near_obstacles(i, i, at.scene, at.work.out)
         else:
-            clear_of_fixed(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_fixed(i, i, at.scene, at.work.out)
         return at.work.out[MARGIN]
 
     def gradients(self):
@@ -121,7 +121,7 @@ def table_row_gradients(task, way):
 
     def margin(z):
         task.move(z)
-        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.state, at.boats, at.tuning, at.work)
+        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.scene)
         return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
 
     now = margin(task.z)
