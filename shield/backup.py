@@ -75,24 +75,16 @@ def _given_up(i: int, scene: Scene) -> float:
 
 
 @lean_kernel
-def first_move(i: int, scene: Scene) -> None:
-    """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
+def set_off(i: int, scene: Scene) -> None:
+    """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
     state, boats, tuning, work, plan = scene.state, scene.boats, scene.tuning, scene.work, scene.plan
     side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
+    plan.held[i, 0], plan.held[i, 1], plan.held[i, 2] = side, np.nan, speed
     if togo > 0.0:
+        plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side)
         togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
     plan.commands[i, 0] = speed
     plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
-
-
-@lean_kernel
-def set_off(i: int, scene: Scene) -> None:
-    """Make boat i's command and plan those of its backup manoeuvre."""
-    state, work, plan = scene.state, scene.work, scene.plan
-    first_move(i, scene)
-    side, togo = work.plan[i, 0], work.plan[i, 1]
-    plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
-    plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
 
 
 @lean_kernel

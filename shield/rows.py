@@ -40,11 +40,8 @@ FIXED_AIM_M = 1e-3
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 
-PAIR_ROW, FIXED_ROW, BOX_ROW = 0, 1, 2
-"""Classes of rows: boats and obstacles near in time give way last, other fixed things before them, limits never."""
-
-NOBODY = -1
-"""Neighbour of a row that is not about a boat."""
+NEAR_OBSTACLES, FIXED_THINGS, LIMITS = -1, -2, -3
+"""What a row is about, where that is no boat: obstacles near in time, all fixed things, or the inputs' own limits."""
 
 
 @lean_kernel
@@ -179,9 +176,9 @@ def _out_of_reach(r: int, count: int, lack: float, tuning: Tuning, plan: Plan) -
 
 
 @lean_kernel
-def _label(r: int, kind: int, i: int, j: int, plan: Plan) -> int:
-    """Say what row r is and whom it is about; returns the number of the next."""
-    plan.kind[r], plan.label[r, 0], plan.label[r, 1] = kind, i, j
+def _label(r: int, i: int, about: int, plan: Plan) -> int:
+    """Say whose row r is and what it is about; returns the number of the next."""
+    plan.label[r, 0], plan.label[r, 1] = i, about
     return r + 1
 
 
@@ -199,7 +196,7 @@ def _box_rows(r: int, count: int, tuning: Tuning, plan: Plan) -> int:
             C[r + 1, 2 * m + 1] = sign
             d[r + 1] = 0.0 if side == 0 else -root
             for _ in range(2):
-                r = _label(r, BOX_ROW, NOBODY, NOBODY, plan)
+                r = _label(r, plan.movers[m], LIMITS, plan)
     return r
 
 
@@ -216,9 +213,9 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
         if not ours[j] and looked_up(i, j, i, boats, work):
             for way in range(WAYS):
                 if _table_row(r, m, j, way, count, scene):
-                    r = _label(r, PAIR_ROW, i, j, plan)
+                    r = _label(r, i, j, plan)
         if _pair_row(r, m, j, count, scene):
-            r = _label(r, PAIR_ROW, i, j, plan)
+            r = _label(r, i, j, plan)
     return r
 
 
@@ -226,8 +223,7 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
 def build_rows(count: int, scene: Scene) -> int:
     """Stack all rows of the movers; returns their number, or -1 when there are more than ``plan.C`` can hold.
 
-    ``plan.kind[r]`` is the class of a row, ``plan.label[r]`` = (boat, neighbour), neighbour -1 for fixed things and
-    limits.
+    ``plan.label[r]`` says whose row it is, and about which other boat, or about what else, see `LIMITS`.
     """
     work, plan = scene.work, scene.plan
     if 6 * count > plan.C.shape[0]:  # two rows of fixed things and four of limits for each
@@ -240,8 +236,8 @@ def build_rows(count: int, scene: Scene) -> int:
             return -1
         clear_of_near_obstacles(i, i, scene, work.out)
         if _fixed_row(r, m, 0.0, count, scene):
-            r = _label(r, PAIR_ROW, i, NOBODY, plan)
+            r = _label(r, i, NEAR_OBSTACLES, plan)
         clear_of_fixed(i, i, scene, work.out)
         if _fixed_row(r, m, work.fixed_target_m[i], count, scene):
-            r = _label(r, FIXED_ROW, i, NOBODY, plan)
+            r = _label(r, i, FIXED_THINGS, plan)
     return _box_rows(r, count, scene.tuning, plan)

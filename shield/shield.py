@@ -12,6 +12,7 @@ import numpy as np
 from .answer import Answer, less_turn, to_send
 from .autopilots import Autopilots, all_told, unknown_memory
 from .certificates import CERTIFICATES
+from .certificates.foreseen import DRIVEN_S
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -35,7 +36,7 @@ from .warming import tight_spot
 from .work import Work, new_work
 
 MOST_ROWS = 3000
-"""Programs with more rows than this go to the ladder instead."""
+"""Where a program would have more rows than this, the backups are sent instead."""
 
 
 @dataclass
@@ -240,7 +241,7 @@ class Shield:
         known = np.zeros(len(fleet), np.bool_)
         if fleet.driven is not None:
             horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, 3] >= horizon_s)
+            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, DRIVEN_S] >= horizon_s)
         for seat in self._seats:
             seat.work.known[:] = known
             if fleet.driven is not None:

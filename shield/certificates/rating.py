@@ -131,26 +131,10 @@ def rate_path(i: int, slot: int, best: float, scene: Scene) -> float:
 
 
 @lean_kernel
-def worst_off(ours: BoolArray, work: Work) -> int:
-    """The boat of ours whose merit is least, the first of several; -1 when none is ours."""
-    worst = -1
-    for i in range(ours.shape[0]):
-        if ours[i] and (worst < 0 or work.merit[i] < work.merit[worst]):
-            worst = i
-    return worst
-
-
-@lean_kernel
 def worst_merit(ours: BoolArray, work: Work) -> float:
     """Least merit of any boat of ours."""
-    worst = worst_off(ours, work)
-    return work.merit[worst] if worst >= 0 else 2.0 * PAIR_SAFE
-
-
-@lean_kernel
-def only_fixed(ours: BoolArray, work: Work) -> bool:
-    """Whether all that some boat of ours is short of concerns fixed things."""
+    least = 2.0 * PAIR_SAFE
     for i in range(ours.shape[0]):
-        if ours[i] and work.merit[i] < PAIR_SAFE and work.bound[i] != FIXED_THING:
-            return False
-    return True
+        if ours[i]:
+            least = min(least, work.merit[i])
+    return least

@@ -43,15 +43,6 @@ def _inside(side: int, x: float, y: float, field: Array) -> float:
 
 
 @lean_kernel
-def beyond_field(x: float, y: float, field: Array) -> float:
-    """How far beyond the field a point is, m, by the side that it is furthest beyond; negative inside."""
-    least = FAR
-    for side in range(4):
-        least = min(least, _inside(side, x, y, field))
-    return -least
-
-
-@lean_kernel
 def _within(side: int, path: Array, samples: int, drift_m: float, field: Array, out: Array) -> None:
     """Distance inside a side along a path, less the drift until then."""
     nx, ny = _inwards(side)
