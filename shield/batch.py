@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
+from .filter.flow import decide_compiled
 from .fleet import LARGEST, LARGEST_SPEED_MPS
-from .flow import decide_compiled
 from .game_facts import facts_of_games, told_distances
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .memory import Memory, new_memory, put_memory, take_memory
@@ -21,59 +21,72 @@ from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
-from .scene import Scene, path_samples
+from .scene import Scene, new_scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
-from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
+from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
+
+
+class Asked(NamedTuple):
+    """What is to be decided about, of B games of n boats.
+
+    Attributes:
+        state: (B, n, N_STATE) boat states.
+        wanted: (B, n, 2) wanted commands.
+        ours: (B, n) boats to decide for.
+        fear_s: (B, n) time for which each opponent may do its worst, s.
+    """
+
+    state: Array
+    wanted: Array
+    ours: BoolArray
+    fear_s: Array
+
+
+class Told(NamedTuple):
+    """What is decided: see `BatchedShield.decide`."""
+
+    sent: Array
+    reason: IntArray
+    certificate_m: Array
+    cut_short: BoolArray
 
 
 @kernel
 def decide_games(
-    state: Array,
-    wanted: Array,
-    ours: BoolArray,
-    scene: Scene,
-    memory: Memory,
-    error_m: Array,
-    late_m: float,
-    fear_s: Array,
-    pending: Array,
-    sent: Array,
-    reason: IntArray,
-    clearance_m: Array,
-    cut_short: BoolArray,
+    asked: Asked, told: Told, scene: Scene, memory: Memory, pending: Array, error_m: Array, late_m: float
 ) -> None:
-    """Decide for every game in turn, for the moment its commands take effect; arrays carry a leading games axis.
+    """Decide for every game in turn, for the moment its commands take effect.
 
     ``scene`` serves one game after another, each with its own part of ``memory``.
     """
-    n = state.shape[1]
+    n = asked.state.shape[1]
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    ahead, asked, margin_m = np.empty_like(state[0]), np.empty_like(wanted[0]), np.empty(n)
-    for b in range(state.shape[0]):
-        ahead[:] = state[b]
-        turn_round(ahead, ours[b])
+    ahead, wanted, margin_m = np.empty_like(asked.state[0]), np.empty_like(asked.wanted[0]), np.empty(n)
+    for b in range(asked.state.shape[0]):
+        state, ours, sent = asked.state[b], asked.ours[b], told.sent[b]
+        ahead[:] = state
+        turn_round(ahead, ours)
         fill_memory(ahead, boats.params)
-        run_on_commands(ahead, ours[b], boats.params, pending[b], tuning.dt_s)
+        run_on_commands(ahead, ours, boats.params, pending[b], tuning.dt_s)
         for i in range(n):
-            asked[i] = wanted[b, i]
-            margin_m[i] = error_m[i] if ours[b, i] else error_m[i] + late_m
-            if ahead[i, L.HEADING] != state[b, i, L.HEADING]:
-                asked[i, 1] += state[b, i, L.HEADING] - ahead[i, L.HEADING]
-        copy_row(work.fear_s, fear_s[b])
+            wanted[i] = asked.wanted[b, i]
+            margin_m[i] = error_m[i] if ours[i] else error_m[i] + late_m
+            if ahead[i, L.HEADING] != state[i, L.HEADING]:
+                wanted[i, 1] += state[i, L.HEADING] - ahead[i, L.HEADING]
+        copy_row(work.fear_s, asked.fear_s[b])
         take_memory(memory, b, scene.memory)
-        decide_compiled(scene, ahead, asked, margin_m, ours[b])
+        decide_compiled(scene, ahead, wanted, margin_m, ours)
         put_memory(scene.memory, b, memory)
-        cut_short[b] = work.cut_short[0]
+        told.cut_short[b] = work.cut_short[0]
         for i in range(n):
-            sent[b, i] = wanted[b, i]
-            if plan.commands[i, 0] != asked[i, 0] or plan.commands[i, 1] != asked[i, 1]:
-                sent[b, i, 0] = plan.commands[i, 0]
-                sent[b, i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[b, i, L.HEADING]
-            reason[b, i] = plan.reason[i]
-            clearance_m[b, i] = told_margin(i, ahead, work) if ours[b, i] else np.inf
+            sent[i] = asked.wanted[b, i]
+            if plan.commands[i, 0] != wanted[i, 0] or plan.commands[i, 1] != wanted[i, 1]:
+                sent[i, 0] = plan.commands[i, 0]
+                sent[i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[i, L.HEADING]
+            told.reason[b, i] = plan.reason[i]
+            told.certificate_m[b, i] = told_margin(i, ahead, work) if ours[i] else np.inf
         if pending.shape[1] > 0:
             queue_commands(pending[b], ahead, plan.commands)
 
@@ -121,16 +134,14 @@ class BatchedShield:
         n = len(self.platforms)
         boats = boats_of(config, self.platforms, self.team)
         self._memory = new_memory(games, n)
-        self._scene = share(
-            Scene(
-                boats=boats,
-                fixed=surroundings.pack(config),
-                plans=plans_of(config),
-                tuning=tuning_of(config),
-                memory=new_memory(n),
-                work=new_work(n, path_samples(boats)),
-                plan=new_plan(n, n * ((WAYS + 1) * n + 6) + 2),
-            )
+        self._scene = new_scene(
+            boats=boats,
+            fixed=surroundings.pack(config),
+            plans=plans_of(config),
+            tuning=tuning_of(config),
+            memory=new_memory(n),
+            work=new_work(n, path_samples(boats)),
+            plan=new_plan(n, n * ((WAYS + 1) * n + 6) + 2),
         )
         self._margin = np.full(n, config.position_error_m)
         self._late_m = config.track_error_mps * config.delay_s
@@ -178,21 +189,10 @@ class BatchedShield:
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        decide_games(
-            state,
-            wanted,
-            ours,
-            self._scene,
-            self._memory,
-            self._margin,
-            self._late_m,
-            np.where(seen, self.config.visitor_feared_s, self.config.feared_s),
-            self._pending,
-            self.sent,
-            self.reason,
-            self.certificate_m,
-            self.cut_short,
-        )
+        fear_s = np.where(seen, self.config.visitor_feared_s, self.config.feared_s)
+        asked = Asked(state, wanted, ours, fear_s)
+        told = Told(self.sent, self.reason, self.certificate_m, self.cut_short)
+        decide_games(asked, told, self._scene, self._memory, self._pending, self._margin, self._late_m)
         return self.sent
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:

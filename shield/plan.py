@@ -37,7 +37,6 @@ class Plan(NamedTuple):
     z: Array
     C: Array
     d: Array
-    kind: IntArray
     label: IntArray
     slack_m: Array
     reason: IntArray
@@ -62,7 +61,6 @@ def new_plan(boats: int, rows: int) -> Plan:
             z=np.zeros(2 * boats),
             C=np.zeros((rows, 2 * boats)),
             d=np.zeros(rows),
-            kind=np.zeros(rows, np.int64),
             label=np.zeros((rows, 2), np.int64),
             slack_m=np.zeros(boats),
             reason=np.zeros(boats, np.int64),

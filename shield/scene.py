@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from .jit import Array, BoolArray, IntArray
 from .memory import Memory
 from .plan import Plan
+from .platforms import layout as L
+from .shared import share
 from .tables.lookup import Tables
 from .work import Work
 
@@ -143,8 +147,22 @@ class Tuning(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """All that one decider works with, as one `shared` tuple of such tuples; ``plans`` are the escape manoeuvres."""
+    """All that one decider works with, as one `shared` tuple of arrays and such tuples: functions are handed it whole.
 
+    Attributes:
+        state: (n, N_STATE) the boats' states that this decision is about.
+        ours: (n,) boats that it decides for.
+        boats: their constants.
+        fixed: things that do not move.
+        plans: the family of escape manoeuvres.
+        tuning: the settings.
+        memory: what is kept from one decision to the next.
+        work: scratch of one decision.
+        plan: its program, and what is sent.
+    """
+
+    state: Array
+    ours: BoolArray
     boats: Boats
     fixed: Fixed
     plans: Array
@@ -152,6 +170,16 @@ class Scene(NamedTuple):
     memory: Memory
     work: Work
     plan: Plan
+
+
+def new_scene(
+    boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+) -> Scene:
+    """A scene that nothing is to be decided about yet."""
+    n = len(boats.team)
+    return share(
+        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, fixed, plans, tuning, memory, work, plan)
+    )
 
 
 def path_samples(boats: Boats) -> int:

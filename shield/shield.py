@@ -9,34 +9,34 @@ from typing import Any
 
 import numpy as np
 
-from .answer import Answer, less_turn, to_send
-from .autopilots import Autopilots, all_told, unknown_memory
 from .certificates import CERTIFICATES
+from .certificates.foreseen import DRIVEN_S
 from .certificates.values import WAYS
 from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
+from .filter.answer import Answer, less_turn, to_send
+from .filter.flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
+from .filter.limiting import tell_of_limits, within_limits
+from .filter.program import Program, solve
 from .fleet import Fleet, usable_drives
-from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
-from .limiting import tell_of_limits, within_limits
 from .memory import Memory, new_memory
 from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
-from .program import Program, solve
-from .remembering import Known, Stayed, carry_over, meets_new
-from .scene import Boats, Fixed, Scene, Tuning, path_samples
+from .scene import Boats, Fixed, Scene, Tuning, new_scene, path_samples
 from .setup import boats_of, missing_tables, plans_of, tuning_of, without_hunters
-from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import prepare, queue_commands, steps_of_delay
+from .tracking.autopilots import Autopilots, all_told, unknown_memory
+from .tracking.remembering import Known, Stayed, carry_over, meets_new
+from .tracking.tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
 from .work import Work, new_work
 
 MOST_ROWS = 3000
-"""Programs with more rows than this go to the ladder instead."""
+"""Where a program would have more rows than this, the backups are sent instead."""
 
 
 @dataclass
@@ -51,7 +51,7 @@ class _Seat:
     def scene_of(self, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning) -> Scene:
         """The scene with these boats and fixed things; manoeuvres and settings are always the shield's."""
         if self.scene is None or self.scene.boats is not boats or self.scene.fixed is not fixed:
-            self.scene = share(Scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan))
+            self.scene = new_scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan)
         return self.scene
 
 
@@ -241,7 +241,7 @@ class Shield:
         known = np.zeros(len(fleet), np.bool_)
         if fleet.driven is not None:
             horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, 3] >= horizon_s)
+            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, DRIVEN_S] >= horizon_s)
         for seat in self._seats:
             seat.work.known[:] = known
             if fleet.driven is not None:
@@ -351,14 +351,14 @@ class Shield:
             return
         found, count = UNSAFE, 0
         for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-            count, rows = linearise(scene, state, ours)
+            count, rows = linearise(scene)
             z = self._solve(count, rows, seat.plan) if rows >= 0 else None
             if z is None:
                 break
-            found = accept(scene, z, count, state, ours)
+            found = accept(scene, z, count)
             if found != UNSAFE:
                 break
-        finish(scene, found == SAFE, count, state, ours)
+        finish(scene, found == SAFE, count)
 
     def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
         """Answer of the program, if it has one."""

@@ -59,7 +59,6 @@ class Work(NamedTuple):
         ready: (n + 1, 4) what is noted of a plan's path, see `certificates.paths`.
         decided: (n + 1,) sample at which the merit of a plan that fails was decided; infinite where it hangs on more.
         hunter: (5,) where a hunter is at the end of its run: x, y, m, heading as a unit vector, speed m/s.
-        nobody: (n,) False.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
         fear_s: (n,) time from now for which each opponent may do its worst before it holds its course, s.
         first_hunter: (n,) opponent that is looked at first, see `certificates.hunters`.
@@ -113,7 +112,6 @@ class Work(NamedTuple):
     ready: Array
     decided: Array
     hunter: Array
-    nobody: BoolArray
     searched: IntArray
     fear_s: Array
     first_hunter: IntArray
@@ -171,7 +169,6 @@ def new_work(boats: int, samples: int) -> Work:
             ready=np.full((boats + 1, 4), -1.0),
             decided=np.full(boats + 1, np.inf),
             hunter=np.zeros(5),
-            nobody=np.zeros(boats, np.bool_),
             searched=np.full(boats, -1, np.int64),
             fear_s=np.full(boats, np.inf),
             first_hunter=np.zeros(boats, np.int64),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .boat import Array
 from .errors import OracleError
 from .model import replay, turned
-from .search import commands_of, search
+from .search import Task, commands_of, search
 from .settings import Level, Settings
 from .verdict import Plan
 
@@ -72,10 +72,8 @@ class Question:
         lengths = _lengths(first_s, self.end - begin, self.dt_s)
         rudders, actions = np.array(sorted(level.rudders)), np.zeros(lengths.size, dtype=np.int64)
         sizes = np.array([level.position_m, level.position_m, level.heading_deg, level.speed_mps, level.thrust])
-        limit_m = self.radius_m + ROUNDING_M
-        found, whole = search(
-            self.numbers, start, others, limit_m, self.dt_s, lengths, rudders, sizes, level.width, actions
-        )
+        task = Task(self.numbers, others, self.radius_m + ROUNDING_M, self.dt_s, rudders, sizes)
+        found, whole = search(task, start, lengths, level.width, actions)
         if not found:
             return whole
         commands = np.empty((self.end - begin, 2))

@@ -10,6 +10,7 @@ the end: the first that stays clear ends the search.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,15 +23,43 @@ _TRIED = 3  # states of a layer from which simple courses are run to the end
 _LOOK = 5  # steps between looks along a straight course
 
 
+class Task(NamedTuple):
+    """What commands are searched for.
+
+    Attributes:
+        p: parameters of the own boat.
+        others: (K+1, m, 2) tracks, index 0 at the beginning.
+        limit_m: distance to be kept.
+        dt_s: length of a step.
+        rudders: choices of rudder, shares of full, rising, symmetric.
+        sizes: (5,) cells of x, y, heading, speed, thrust.
+    """
+
+    p: Array
+    others: Array
+    limit_m: float
+    dt_s: float
+    rudders: Array
+    sizes: Array
+
+
+class Layer(NamedTuple):
+    """Room for the states of a layer: rows, cells, rates, where each is from, and a hash table of the cells."""
+
+    made: Array
+    keys: Array
+    rates: Array
+    origin: Array
+    table: Array
+
+
 @compiled
-def clear_after(
-    p: Array, s: Array, choice: int, rudder: float, steps: int, others: Array, k: int, limit_m: float, dt_s: float
-) -> bool:
+def clear_after(task: Task, s: Array, choice: int, rudder: float, steps: int, k: int) -> bool:
     """Hold a choice for some steps from time index ``k``, in place; False as soon as a boat is within ``limit_m``."""
-    limit = limit_m * limit_m
+    others, limit = task.others, task.limit_m * task.limit_m
     for i in range(k + 1, k + steps + 1):
-        speed, error = command_of(p, s, choice, rudder, dt_s)
-        step(p, s, speed, error, dt_s)
+        speed, error = command_of(task.p, s, choice, rudder, task.dt_s)
+        step(task.p, s, speed, error, task.dt_s)
         for m in range(others.shape[1]):
             dx, dy = others[i, m, 0] - s[0], others[i, m, 1] - s[1]
             if not dx * dx + dy * dy > limit:
@@ -83,11 +112,10 @@ def _power_of_two(least: int) -> int:
 
 
 @compiled
-def _expand(
-    p: Array, layer: Array, others: Array, k: int, steps: int, limit_m: float, dt_s: float,
-    rudders: Array, sizes: Array, made: Array, keys: Array, rates: Array, origin: Array, table: Array
-) -> int:  # fmt: skip
+def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
     """Make the next layer from ``layer``; returns how many states it has."""
+    made, keys, rates, origin, table = room
+    rudders = task.rudders
     count = 0
     table[:] = -1
     s = np.empty(layer.shape[1])
@@ -95,10 +123,10 @@ def _expand(
         for action in range(N_SPEEDS * rudders.size):
             s[:] = layer[node]
             choice, rudder = action // rudders.size, rudders[action % rudders.size]
-            if not clear_after(p, s, choice, rudder, steps, others, k, limit_m, dt_s):
+            if not clear_after(task, s, choice, rudder, steps, k):
                 continue
-            key = _cell(s, sizes)
-            rate = promise(s, others, k + steps, limit_m, dt_s)
+            key = _cell(s, task.sizes)
+            rate = promise(s, task.others, k + steps, task.limit_m, task.dt_s)
             place = _slot(table, keys, key)
             row = table[place]
             if row < 0:
@@ -136,68 +164,59 @@ def _choose(rates: Array, width: int) -> Array:
 
 
 @compiled
-def _run_out(p: Array, start: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array) -> int:
+def _run_out(task: Task, start: Array, k: int) -> int:
     """Return an action that, held to the end, stays clear; -1 when none of the simple ones does."""
-    middle, last = rudders.size // 2, rudders.size - 1
+    rudders = task.rudders
+    middle, last, left = rudders.size // 2, rudders.size - 1, task.others.shape[0] - 1 - k
     for choice in (HOLD, UP, DOWN):
         for r in (middle, 0, last):
-            s = start.copy()
-            if clear_after(p, s, choice, rudders[r], others.shape[0] - 1 - k, others, k, limit_m, dt_s):
+            if clear_after(task, start.copy(), choice, rudders[r], left, k):
                 return choice * rudders.size + r
     return -1
 
 
 @compiled
-def _finish(p: Array, layer: Array, rates: Array, others: Array, k: int, limit_m: float, dt_s: float, rudders: Array
-            ) -> tuple[int, int]:  # fmt: skip
+def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
     """Try simple courses from the most promising states; (state, action) of one that stays clear, or (-1, -1)."""
     left = rates.copy()
     for _ in range(min(_TRIED, left.size)):
         node = int(np.argmax(left))
         left[node] = -np.inf
-        action = _run_out(p, layer[node], others, k, limit_m, dt_s, rudders)
+        action = _run_out(task, layer[node], k)
         if action >= 0:
             return node, action
     return -1, -1
 
 
 @compiled
-def search(
-    p: Array, start: Array, others: Array, limit_m: float, dt_s: float, lengths: Array, rudders: Array, sizes: Array,
-    width: int, actions: Array
-) -> tuple[bool, bool]:  # fmt: skip
-    """Look for actions that keep farther than ``limit_m`` from the others until their tracks end.
+def search(task: Task, start: Array, lengths: Array, width: int, actions: Array) -> tuple[bool, bool]:
+    """Look for actions that keep farther than the limit from the others until their tracks end.
 
     Args:
-        p: parameters of the own boat.
-        start: its state row at the beginning.
-        others: (K+1, m, 2) tracks, index 0 at the beginning.
-        limit_m: distance to be kept.
-        dt_s: length of a step.
+        task: what is searched for.
+        start: the own boat's state row at the beginning.
         lengths: (N,) steps per choice, summing to K.
-        rudders: choices of rudder, shares of full, rising, symmetric.
-        sizes: (5,) cells of x, y, heading, speed, thrust.
         width: most states per layer.
         actions: (N,) int64, filled with the action of each choice when found: speed choice * rudders + rudder.
 
     Returns:
         Whether a sequence was found, and whether no state was ever dropped for lack of width.
     """
-    room = width * N_SPEEDS * rudders.size
-    made, keys = np.empty((room, start.size)), np.empty(room, dtype=np.int64)
-    rates, origin = np.empty(room), np.empty((room, 2), dtype=np.int64)
-    table = np.empty(_power_of_two(2 * room), dtype=np.int64)
+    most = width * N_SPEEDS * task.rudders.size
+    made, keys = np.empty((most, start.size)), np.empty(most, dtype=np.int64)
+    rates, origin = np.empty(most), np.empty((most, 2), dtype=np.int64)
+    room = Layer(made, keys, rates, origin, np.empty(_power_of_two(2 * most), dtype=np.int64))
     history = np.empty((lengths.size, width, 2), dtype=np.int64)
     layer, layer_rates = start.copy().reshape(1, -1), np.zeros(1)
     k, whole = 0, True
     for n in range(lengths.size):
-        node, action = _finish(p, layer, layer_rates, others, k, limit_m, dt_s, rudders)
+        node, action = _finish(task, layer, layer_rates, k)
         if node >= 0:
             actions[n:] = action
             _trace(history, n, node, actions)
             return True, whole
         steps = lengths[n]
-        count = _expand(p, layer, others, k, steps, limit_m, dt_s, rudders, sizes, made, keys, rates, origin, table)
+        count = _expand(task, layer, k, steps, room)
         if count == 0:
             return False, whole
         chosen = _choose(rates[:count], width)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
@@ -14,7 +14,7 @@ from steerclear.shield.platforms.step import step_boat
 
 from ..jit import kernel
 from .ladder import take_escapes
-from .rows import build_rows, set_inputs
+from .rows import Pairs, Program, build_rows, set_inputs
 from .values import WAYS, Setup, fill_margins, least_margin, mark_failing, near_pairs, run_on, set_targets
 
 ROUNDS = 2
@@ -55,13 +55,10 @@ def _program(
     setup: Setup,
     state: Array,
     ours: BoolArray,
-    near: BoolArray,
-    ways: Array,
-    target: Array,
+    pairs: Pairs,
     asked: Array,
     commands: Array,
     later: Array,
-    margin: Array,
 ) -> bool:
     """Nearest inputs to those asked for that keep all targets, linearised and checked; True when the check holds."""
     n = state.shape[0]
@@ -72,6 +69,7 @@ def _program(
     z, row = np.zeros((n, 5)), np.zeros(L.N_STATE)
     z_now, z0, answer = np.zeros(2 * own), np.zeros(2 * own), np.zeros(2 * own)
     C, d = np.zeros((WAYS * n * n + 4 * n, 2 * own)), np.zeros(WAYS * n * n + 4 * n)
+    program = Program(slot, z, z_now, C, d)
     for attempt in range(ROUNDS):
         for i in range(n):
             if ours[i]:
@@ -79,7 +77,7 @@ def _program(
                 z_now[2 * slot[i] : 2 * slot[i] + 2] = z[i, :2]
         if attempt == 0:
             z0[:] = z_now
-        rows = build_rows(setup, ours, near, slot, later, ways, target, z, z_now, C, d)
+        rows = build_rows(setup, ours, pairs, later, program)
         if project(C[:rows], d[:rows], z0, answer) != OPTIMAL:
             return False
         for i in range(n):
@@ -89,8 +87,8 @@ def _program(
                 if abs(answer[k] - z0[k]) > SAME or abs(answer[k + 1] - z0[k + 1]) > SAME:
                     commands[i, 0], commands[i, 1] = _command(setup, state[i], answer[k], answer[k + 1], z[i, 2], i)
         predict(setup, state, ours, commands, later)
-        fill_margins(setup, ours, near, later, ways, margin)
-        if _holds(near, margin, target):
+        fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
+        if _holds(pairs.near, pairs.margin, pairs.target):
             return True
     return False
 
@@ -100,21 +98,18 @@ def _ladder(
     setup: Setup,
     state: Array,
     ours: BoolArray,
-    near: BoolArray,
-    ways: Array,
-    target: Array,
+    pairs: Pairs,
     commands: Array,
     later: Array,
-    margin: Array,
     side: Array,
     movers: BoolArray,
 ) -> None:
     """Boats short of a target escape, and those that then fall short by it, until nobody is added."""
     for _ in range(state.shape[0]):
-        take_escapes(setup, state, ours, near, movers, commands, side)
+        take_escapes(setup, state, ours, pairs.near, movers, commands, side)
         predict(setup, state, ours, commands, later)
-        fill_margins(setup, ours, near, later, ways, margin)
-        if mark_failing(setup, ours, near, margin, target, movers):
+        fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
+        if mark_failing(setup, ours, pairs.near, pairs.margin, pairs.target, movers):
             return
 
 
@@ -155,6 +150,7 @@ def decide_game(
     _ask(wanted, ours, sent, reason)
     asked, later, ways = sent.copy(), state.copy(), np.empty((n, WAYS, L.N_STATE))
     near, target, margin = np.zeros((n, n), np.bool_), np.zeros((n, n)), np.full((n, n), np.inf)
+    pairs = Pairs(near, ways, target, margin)
     near_pairs(setup, state, ours, near)
     set_targets(setup, state, near, target)
     run_on(setup, state, 1, ways)
@@ -162,14 +158,14 @@ def decide_game(
     fill_margins(setup, ours, near, later, ways, margin)
     movers = np.zeros(n, np.bool_)
     if not mark_failing(setup, ours, near, margin, target, movers):
-        if _program(setup, state, ours, near, ways, target, asked, sent, later, margin):
+        if _program(setup, state, ours, pairs, asked, sent, later):
             movers[:] = False
             for i in range(n):
                 if ours[i] and (sent[i] != asked[i]).any():
                     reason[i] = QP
         else:
             sent[:] = asked
-            _ladder(setup, state, ours, near, ways, target, sent, later, margin, side, movers)
+            _ladder(setup, state, ours, pairs, sent, later, side, movers)
     for i in range(n):
         certificate_m[i] = least_margin(setup, ours, near, margin, i) if ours[i] else np.inf
         if movers[i]:

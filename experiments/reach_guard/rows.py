@@ -11,6 +11,7 @@ with the same terms of a team-mate decided for together, and one row for each wa
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
@@ -23,6 +24,33 @@ from .values import WAYS, Setup, joint, slope_of
 
 AIM_M = 0.01
 """Rows aim this much beyond the target, so that curvature of the value does not fail the exact check."""
+
+
+class Pairs(NamedTuple):
+    """Pairs of n boats that count.
+
+    ``near`` (n, n) which these are, ``ways`` (n, WAYS, N_STATE) opponents one step on, ``target`` (n, n) margins to
+    keep and ``margin`` (n, n) those there are, m.
+    """
+
+    near: BoolArray
+    ways: Array
+    target: Array
+    margin: Array
+
+
+class Program(NamedTuple):
+    """The program of m boats.
+
+    ``slot`` (n,) place of each own boat in it, -1 for others, ``z`` (n, 5) see `set_inputs`, ``z_now`` (2 m,) inputs of
+    the candidate, ``C`` (rows, 2 m) and ``d`` (rows,) its rows, of which ``WAYS * n * n + 4 * n`` are enough.
+    """
+
+    slot: IntArray
+    z: Array
+    z_now: Array
+    C: Array
+    d: Array
 
 
 @kernel
@@ -63,66 +91,39 @@ def _close(C: Array, d: Array, r: int, lack: float, z_now: Array, root: float) -
 
 @kernel
 def _pair_rows(
-    setup: Setup,
-    ours: BoolArray,
-    slot: IntArray,
-    i: int,
-    j: int,
-    later: Array,
-    ways: Array,
-    target: float,
-    z: Array,
-    z_now: Array,
-    C: Array,
-    d: Array,
-    r: int,
+    setup: Setup, ours: BoolArray, i: int, j: int, later: Array, pairs: Pairs, program: Program, r: int
 ) -> int:
+    """Rows of boat i against boat j; returns the number of the next."""
+    slot, z, z_now, C, d = program
     both, root = joint(setup, ours, i, j), math.sqrt(setup.speed_weight)
     for way in range(WAYS if setup.team[i] != setup.team[j] else 1):
-        slope = slope_of(setup, i, j, later[i], later[j] if both else ways[j, way])
+        slope = slope_of(setup, i, j, later[i], later[j] if both else pairs.ways[j, way])
         C[r, :] = 0.0
         C[r, 2 * slot[i]], C[r, 2 * slot[i] + 1] = slope.own_heading * z[i, 3], slope.own_speed * z[i, 4]
         if both:
             C[r, 2 * slot[j]], C[r, 2 * slot[j] + 1] = slope.other_heading * z[j, 3], slope.other_speed * z[j, 4]
-        if _close(C, d, r, setup.radius_m + target + AIM_M - slope.value_m, z_now, root):
+        if _close(C, d, r, setup.radius_m + pairs.target[i, j] + AIM_M - slope.value_m, z_now, root):
             r += 1
     return r
 
 
 @kernel
-def build_rows(
-    setup: Setup,
-    ours: BoolArray,
-    near: BoolArray,
-    slot: IntArray,
-    later: Array,
-    ways: Array,
-    target: Array,
-    z: Array,
-    z_now: Array,
-    C: Array,
-    d: Array,
-) -> int:
+def build_rows(setup: Setup, ours: BoolArray, pairs: Pairs, later: Array, program: Program) -> int:
     """Stack the rows of all near pairs and the limits of the inputs; returns how many rows there are.
 
     Args:
         setup: constants.
         ours: (n,) boats decided for.
-        near: (n, n) pairs that count.
-        slot: (n,) place of each own boat in the program, -1 for others.
+        pairs: what is to be kept.
         later: (n, N_STATE) states after the candidate commands.
-        ways: (n, WAYS, N_STATE) opponents one step on.
-        target: (n, n) margins to keep, m.
-        z: (n, 5) see `set_inputs`.
-        z_now: (2 m,) inputs of the candidate.
-        C: (rows, 2 m) written; ``WAYS * n * n + 4 * n`` rows are enough.
-        d: (rows,) written.
+        program: its rows are written.
     """
+    near, z_now, C, d = pairs.near, program.z_now, program.C, program.d
     n, r = near.shape[0], 0
     for i in range(n):
         for j in range(n):
             if near[i, j]:
-                r = _pair_rows(setup, ours, slot, i, j, later, ways, target[i, j], z, z_now, C, d, r)
+                r = _pair_rows(setup, ours, i, j, later, pairs, program, r)
     root = math.sqrt(setup.speed_weight)
     for c in range(z_now.shape[0]):
         for side in range(2):

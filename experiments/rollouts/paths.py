@@ -42,6 +42,14 @@ class Setup(NamedTuple):
     pick: int
 
 
+class Around(NamedTuple):
+    """The other boats: who is ``near`` (n,), everybody's ``path`` (n, K, 2), and how discs ``grow`` (n,), m/s."""
+
+    near: BoolArray
+    path: Array
+    grow: Array
+
+
 @kernel
 def advance(setup: Setup, i: int, row: Array, speed_mps: float, heading_deg: float) -> None:
     """One step of boat i under an absolute command, by hull and autopilot model, in place."""
@@ -105,20 +113,20 @@ def mark_near(setup: Setup, i: int, state: Array, steps: int, near: BoolArray) -
 
 
 @kernel
-def gap_at(setup: Setup, near: BoolArray, path: Array, grow: Array, k: int, x: float, y: float) -> float:
+def gap_at(setup: Setup, around: Around, k: int, x: float, y: float) -> float:
     """Least clearance of a place at step k from all who are near, m; 0 is the radius to keep."""
-    least = math.inf
-    for j in range(near.shape[0]):
-        if near[j]:
-            gap = math.hypot(path[j, k, 0] - x, path[j, k, 1] - y) - grow[j] * k * setup.dt_s
+    path, least = around.path, math.inf
+    for j in range(path.shape[0]):
+        if around.near[j]:
+            gap = math.hypot(path[j, k, 0] - x, path[j, k, 1] - y) - around.grow[j] * k * setup.dt_s
             least = min(least, gap)
     return least - setup.radius_m
 
 
 @kernel
-def gap_after(setup: Setup, near: BoolArray, path: Array, k: int, row: Array) -> float:
+def gap_after(setup: Setup, around: Around, k: int, row: Array) -> float:
     """Least clearance for ever after step k if every boat then holds its course, m."""
-    course = math.radians(row[L.HEADING])
+    near, path, course = around.near, around.path, math.radians(row[L.HEADING])
     least = math.inf
     for j in range(near.shape[0]):
         if not near[j]:

@@ -25,9 +25,10 @@ What the paper leaves to the user, and what stands here:
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
@@ -37,7 +38,7 @@ from ..jit import kernel
 from ..textbook.inputs import command_of_inputs, inputs_of_command
 from ..textbook.program import TOLERANCE, holds
 from .area import share_left
-from .paths import NO_PLAN, Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
+from .paths import NO_PLAN, Around, Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
 from .settings import AREA
 
 PASSED, CHANGED, POLICY = 0, 1, 2
@@ -54,16 +55,22 @@ SAME = 1e-9
 """Inputs this near to the wanted ones are the wanted ones."""
 
 
+class Inputs(NamedTuple):
+    """The wanted inputs ``z0`` (2,), the largest turn, deg, and the least and greatest of both inputs (2, 2)."""
+
+    z0: Array
+    unit: float
+    box: Array
+
+
 @kernel
-def value_of(
-    setup: Setup, i: int, start: Array, k: int, speed: float, heading: float, near: BoolArray, path: Array, grow: Array
-) -> float:
+def value_of(setup: Setup, i: int, start: Array, k: int, speed: float, heading: float, around: Around) -> float:
     """V of a policy, a command held from step k on in the state ``start``: least clearance over the horizon, m."""
     row = start.copy()
-    least = gap_at(setup, near, path, grow, k, row[L.X], row[L.Y])
+    least = gap_at(setup, around, k, row[L.X], row[L.Y])
     for t in range(1, setup.steps + 1):
         advance(setup, i, row, speed, heading)
-        least = min(least, gap_at(setup, near, path, grow, k + t, row[L.X], row[L.Y]))
+        least = min(least, gap_at(setup, around, k + t, row[L.X], row[L.Y]))
     return least
 
 
@@ -121,14 +128,21 @@ def _command_of_mode(setup: Setup, i: int, m: int, state: Array, wanted: Array, 
 
 @kernel
 def _row_of(
-    setup: Setup, i: int, state: Array, later: Array, shift: Array, z0: Array, speed: float, heading: float,
-    near: BoolArray, path: Array, grow: Array, row: Array,
-) -> tuple[float, float]:  # fmt: skip
+    setup: Setup,
+    i: int,
+    state: Array,
+    later: Array,
+    shift: Array,
+    z0: Array,
+    command: tuple[float, float],
+    around: Around,
+    row: Array,
+) -> tuple[float, float]:
     """Write a mode's row over the inputs; returns its right-hand side and the mode's value V, m."""
     values = np.empty(4)
     for k in range(4):
         start = state if k == 0 else later[k - 1]
-        values[k] = value_of(setup, i, start, min(k, 1), speed, heading, near, path, grow)
+        values[k] = value_of(setup, i, start, min(k, 1), command[0], command[1], around)
     for k in range(2):
         row[k] = (values[k + 2] - values[1]) / (shift[k] * setup.dt_s)
     have = (values[1] - values[0]) / setup.dt_s + setup.alpha_per_s * values[0]
@@ -161,16 +175,16 @@ def _better(value: float, score: float, best_value: float, best_score: float) ->
 
 @kernel
 def take_mode(
-    setup: Setup, i: int, state: Array, wanted: Array, plan: Array, unit: float, box: Array, z0: Array,
-    near: BoolArray, path: Array, grow: Array, row: Array,
-) -> tuple[int, float, float]:  # fmt: skip
+    setup: Setup, i: int, state: Array, wanted: Array, plan: Array, inputs: Inputs, around: Around, row: Array
+) -> tuple[int, float, float]:
     """The mode taken, its row (written), right-hand side and value; safe ones first, by what pleases, then V."""
+    z0, unit, box = inputs
     later, trial, z = np.empty((3, L.N_STATE)), np.empty(2), np.empty(2)
     shift = _next_states(setup, i, state, z0, unit, box, later)
     best, best_need, best_value, best_score = -1, 0.0, -math.inf, -math.inf
     for m in range(setup.library.shape[0] + BEFORE):
-        speed, heading = _command_of_mode(setup, i, m, state, wanted, plan)
-        need, value = _row_of(setup, i, state, later, shift, z0, speed, heading, near, path, grow, trial)
+        command = _command_of_mode(setup, i, m, state, wanted, plan)
+        need, value = _row_of(setup, i, state, later, shift, z0, command, around, trial)
         score = _pleases(setup, trial, need, box, z0, z) if value > 0.0 else -math.inf
         if best < 0 or _better(value, score, best_value, best_score):
             best, best_need, best_value, best_score = m, need, value, score
@@ -181,9 +195,7 @@ def take_mode(
 
 
 @kernel
-def _decide_boat(
-    setup: Setup, i: int, state: Array, near: BoolArray, path: Array, grow: Array, plan: Array, sent: Array
-) -> tuple[int, float]:
+def _decide_boat(setup: Setup, i: int, state: Array, around: Around, plan: Array, sent: Array) -> tuple[int, float]:
     """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
     params, limits = setup.params[i], setup.limits[i]
     gain, turn, most = inputs_of_command(params, limits, state, sent[0], sent[1], setup.dt_s)
@@ -191,7 +203,7 @@ def _decide_boat(
     box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
     _input_box(setup, i, state, box)
     z0[0], z0[1] = clamp(gain / limits[2], box[0, 0], box[0, 1]), turn / unit
-    m, need, value = take_mode(setup, i, state, sent, plan, unit, box, z0, near, path, grow, row)
+    m, need, value = take_mode(setup, i, state, sent, plan, Inputs(z0, unit, box), around, row)
     plan[1], plan[2] = _command_of_mode(setup, i, m, state, sent, plan)
     if answer_of(row, need, box, z0, z):
         same = abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME
@@ -199,7 +211,7 @@ def _decide_boat(
             sent[0], sent[1] = command_of_inputs(params, limits, state, z[0] * limits[2], z[1] * unit, setup.dt_s)
         after = state.copy()
         step_boat(params, after, sent[0], sent[1], setup.dt_s)
-        then = value_of(setup, i, after, 1, plan[1], plan[2], near, path, grow)
+        then = value_of(setup, i, after, 1, plan[1], plan[2], around)
         if then >= (1.0 - setup.alpha_per_s * setup.dt_s) * value - SLACK_M:
             return PASSED if same else CHANGED, value
     sent[0], sent[1] = plan[1], wrap_degrees(plan[2] - state[L.HEADING])
@@ -213,6 +225,7 @@ def decide_game(
     """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
     n, steps = state.shape[0], setup.steps + 1
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
+    around = Around(near, path, grow)
     predict_all(setup, state, ours, plan, path, grow)
     for i in range(n):
         if not ours[i]:
@@ -220,7 +233,7 @@ def decide_game(
         if plan[i, 0] == NO_PLAN:
             plan[i, 1], plan[i, 2] = state[i, L.SPEED], state[i, L.HEADING]
         if mark_near(setup, i, state, steps, near):
-            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], near, path, grow, plan[i], sent[i])
+            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], around, plan[i], sent[i])
         plan[i, 0], plan[i, 3] = 0.0, sent[i, 0]
         plan[i, 4] = wrap_degrees(state[i, L.HEADING] + sent[i, 1])
         roll_plan(setup, i, state[i], plan[i], path[i])

@@ -87,15 +87,13 @@ def _answer(
     start: Array,
     z: Array,
     unit: Array,
-    status: int,
-    relaxed: bool,
+    code: int,
     sent: Array,
 ) -> int:
-    """Write boat i's command; returns why it is what it is."""
-    if status == UNSOLVED:
+    """Write boat i's command; returns why it is what it is, the code for one that is the wanted one."""
+    if code == UNSOLVED:
         sent[0], sent[1] = 0.0, wanted[1]
         return UNSOLVED
-    code = RELAXED if relaxed else PASSED
     if abs(z[0] - start[0]) <= SAME and abs(z[1] - start[1]) <= SAME:
         return code
     sent[0], sent[1] = _command(setup, state, wanted, i, z, unit)
@@ -141,7 +139,8 @@ def decide_game(
     for i in np.flatnonzero(met):
         k = 2 * slot[i]
         start, answer = z0[k : k + 2], z[k : k + 2]
-        reason[i] = _answer(setup, state[i], wanted[i], i, start, answer, unit[i], status, loose[i], sent[i])
+        code = UNSOLVED if status == UNSOLVED else (RELAXED if loose[i] else PASSED)
+        reason[i] = _answer(setup, state[i], wanted[i], i, start, answer, unit[i], code, sent[i])
 
 
 @kernel

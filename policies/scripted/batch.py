@@ -81,10 +81,18 @@ class ScriptedBatch:
         """
         if team != self._team or core.n_games != self._out.shape[0]:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
-        command_batch(
-            self._codes, self._boats, self._memory, self._given, self._streams, self._field, self._limits, core.team,
-            core.state, core.is_tagged, core.has_flag, core.on_side, core.flag_home, core.flag_position, self._out,
-        )  # fmt: skip
+        games = S.Game(
+            core.state,
+            self._limits,
+            core.team,
+            core.is_tagged,
+            core.has_flag,
+            core.on_side,
+            core.flag_home,
+            core.flag_position,
+            self._field,
+        )
+        command_batch(self._codes, self._boats, self._memory, self._given, self._streams, games, self._out)
         return self._out
 
     @property

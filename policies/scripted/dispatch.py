@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
+from steerclear.shield.jit import Array, IntArray, lean_kernel
 
 from .attack import HARD_REACH_M, easy_attack, field_attack
 from .defend import hard, hard_defend, medium_defend
@@ -49,21 +49,7 @@ def command_boat(
 
 @lean_kernel
 def command_team(
-    codes: IntArray,
-    boats: IntArray,
-    memory: Array,
-    given: Array,
-    streams: np.ndarray,
-    field: Array,
-    limits: Array,
-    team: IntArray,
-    state: Array,
-    is_tagged: BoolArray,
-    has_flag: BoolArray,
-    on_side: BoolArray,
-    flag_home: Array,
-    flag_position: Array,
-    out: Array,
+    codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, game: Game, out: Array
 ) -> None:
     """Commands of the boats of one team in one game, into ``out`` (n_team, 2): speed m/s, relative heading deg.
 
@@ -73,18 +59,9 @@ def command_team(
         memory: (n_team, N_MEMORY), advanced in place.
         given: (n_team, k, 2) waypoints in m; k = 0 for random ones.
         streams: (n_team,) uint64 random streams, advanced in place.
-        field: (N_FIELD,).
-        limits: (n, N_LIMIT).
-        team: (n,) 0 blue, 1 red.
-        state: (n, N_STATE).
-        is_tagged: (n,).
-        has_flag: (n,).
-        on_side: (n,).
-        flag_home: (2, 2) m.
-        flag_position: (2, 2) m.
+        game: what is seen of it.
         out: (n_team, 2), written.
     """
-    game = Game(state, limits, team, is_tagged, has_flag, on_side, flag_home, flag_position, field)
     for slot in range(boats.size):
         speed, heading = command_boat(game, boats[slot], codes[slot], memory[slot], given[slot], streams, slot)
         out[slot, 0] = speed
@@ -93,28 +70,23 @@ def command_team(
 
 @lean_kernel
 def command_batch(
-    codes: IntArray,
-    boats: IntArray,
-    memory: Array,
-    given: Array,
-    streams: np.ndarray,
-    field: Array,
-    limits: Array,
-    team: IntArray,
-    state: Array,
-    is_tagged: BoolArray,
-    has_flag: BoolArray,
-    on_side: BoolArray,
-    flag_home: Array,
-    flag_position: Array,
-    out: Array,
+    codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, games: Game, out: Array
 ) -> None:
     """``command_team`` for every game: the same arguments, with a leading axis of games.
 
-    ``boats``, ``given``, ``field``, ``limits``, ``team`` and ``flag_home`` are the same in all games and have none.
+    ``boats`` and ``given`` are the same in all games and have none, nor have ``limits``, ``team``, ``flag_home`` and
+    ``field`` of the games.
     """
-    for g in range(state.shape[0]):
-        command_team(
-            codes[g], boats, memory[g], given, streams[g], field, limits, team, state[g], is_tagged[g], has_flag[g],
-            on_side[g], flag_home, flag_position[g], out[g],
-        )  # fmt: skip
+    for g in range(games.state.shape[0]):
+        game = Game(
+            games.state[g],
+            games.limits,
+            games.team,
+            games.is_tagged[g],
+            games.has_flag[g],
+            games.on_side[g],
+            games.flag_home,
+            games.flag_position[g],
+            games.field,
+        )
+        command_team(codes[g], boats, memory[g], given, streams[g], game, out[g])

@@ -9,7 +9,7 @@ import numpy as np
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..memory import Memory
 from ..platforms import layout as L
-from ..scene import Boats, Fixed, Tuning
+from ..scene import Scene
 from ..work import Work
 from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
 from .effort import all_spent
@@ -57,20 +57,7 @@ def holds_for_longer(slot: int, work: Work) -> bool:
 
 
 @lean_kernel
-def choose_plan(
-    i: int,
-    wanted_mps: float,
-    done: int,
-    exhaustive: bool,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-) -> None:
+def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``exhaustive`` the best of all.
 
     The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept; with a
@@ -82,6 +69,8 @@ def choose_plan(
 
     Once the decision has cost its limit the best so far will do, see `effort`.
     """
+    state, boats, plans = scene.state, scene.boats, scene.plans
+    tuning, memory, work = scene.tuning, scene.memory, scene.work
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
@@ -90,21 +79,21 @@ def choose_plan(
     for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
-        side, togo, speed = candidate(i, p, wanted_mps, heading, boats, plans, memory)
+        side, togo, speed = candidate(i, p, wanted_mps, heading, scene)
         hard = p > 0 and hard_turn(plans[p - 1])
         if hard and togo >= (no_more_starboard if side > 0.0 else no_more_port):
             continue
-        set_out(i, trial, side, togo, speed, done, state, boats, tuning, work)
-        if compared and refused_by_tables(i, trial, best, ours, boats, work):
+        set_out(i, trial, side, togo, speed, done, scene)
+        if compared and refused_by_tables(i, trial, best, scene):
             continue
-        run_out(i, trial, done, state, boats, tuning, work)
-        merit = rate_path(i, trial, best, state, ours, boats, fixed, tuning, work)
+        run_out(i, trial, done, scene)
+        merit = rate_path(i, trial, best, scene)
         if hard and holds_for_longer(trial, work):
             if side > 0.0:
                 no_more_starboard = togo
             else:
                 no_more_port = togo
-        kept_merit = merit + preference(i, p, side, togo, merit, boats, tuning, memory)
+        kept_merit = merit + preference(i, p, side, togo, merit, scene)
         if kept_merit > best + SAME_MERIT:
             best = kept_merit
             _take(i, trial, merit, work)
@@ -116,17 +105,9 @@ def choose_plan(
 
 
 @lean_kernel
-def refresh(
-    i: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    work: Work,
-) -> None:
+def refresh(i: int, scene: Scene) -> None:
     """Rate boat i's plan again against the others' present plans."""
-    work.merit[i] = rate_path(i, i, -1e9, state, ours, boats, fixed, tuning, work)
+    scene.work.merit[i] = rate_path(i, i, -1e9, scene)
 
 
 @lean_kernel
@@ -152,21 +133,13 @@ def hold(i: int, held: Array, work: Work) -> None:
 
 
 @lean_kernel
-def recheck(
-    who: BoolArray,
-    held: Array,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-) -> bool:
-    """Whether all boats of ours keep clear when those of ``who`` go on, from newly predicted states, as they were.
+def recheck(scene: Scene) -> bool:
+    """Whether all boats of ours keep clear when movers go on, from newly predicted states, as they were.
 
-    Each is offered the manoeuvre in ``held`` and failing that the one in memory.
+    Each is offered the manoeuvre in ``plan.held`` and failing that the one in memory.
     """
+    state, ours, memory, work = scene.state, scene.ours, scene.memory, scene.work
+    who, held = scene.plan.moving, scene.plan.held
     n, trial = state.shape[0], state.shape[0]
     for i in range(n):
         if who[i]:
@@ -174,64 +147,40 @@ def recheck(
             if not math.isnan(held[i, 1]):
                 togo = angle_to_go(work.next_state[i, L.HEADING], held[i, 1], held[i, 0])
                 togo = 0.0 if togo > DONE_DEG else togo
-            lay_path(i, i, held[i, 0], togo, held[i, 2], 1, state, boats, tuning, work)
+            lay_path(i, i, held[i, 0], togo, held[i, 2], 1, scene)
     for i in range(n):
         if not who[i]:
             continue
-        refresh(i, state, ours, boats, fixed, tuning, work)
+        refresh(i, scene)
         heading = work.next_state[i, L.HEADING]
         if work.merit[i] >= PAIR_SAFE or not remembered(i, 1, heading, memory):
             continue
-        lay_path(
-            i, trial, memory.side[i], kept_turn(i, heading, memory), memory.speed_mps[i], 1, state, boats, tuning, work
-        )
-        merit = rate_path(i, trial, work.merit[i], state, ours, boats, fixed, tuning, work)
+        lay_path(i, trial, memory.side[i], kept_turn(i, heading, memory), memory.speed_mps[i], 1, scene)
+        merit = rate_path(i, trial, work.merit[i], scene)
         if merit > work.merit[i]:
             _take(i, trial, merit, work)
     good = True
     for i in range(n):
         if ours[i]:
-            refresh(i, state, ours, boats, fixed, tuning, work)
+            refresh(i, scene)
             good = good and work.merit[i] >= PAIR_SAFE
     return good
 
 
 @lean_kernel
-def lay_first(
-    commands: Array,
-    done: int,
-    who: BoolArray,
-    state: Array,
-    boats: Boats,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-) -> None:
+def lay_first(scene: Scene, done: int, who: BoolArray) -> None:
     """Give each boat of ``who`` the manoeuvre to begin with: the one in memory, else the first of the family."""
+    state, memory, work = scene.state, scene.memory, scene.work
     for i in range(state.shape[0]):
         if who[i]:
             heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
             first = 0 if remembered(i, done, heading, memory) else 1
-            side, togo, speed = candidate(i, first, commands[i, 0], heading, boats, plans, memory)
-            lay_path(i, i, side, togo, speed, done, state, boats, tuning, work)
+            side, togo, speed = candidate(i, first, scene.plan.commands[i, 0], heading, scene)
+            lay_path(i, i, side, togo, speed, done, scene)
 
 
 @lean_kernel
-def assign_plans(
-    commands: Array,
-    done: int,
-    exhaustive: bool,
-    who: BoolArray,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-) -> bool:
+def assign_plans(scene: Scene, done: int, exhaustive: bool, who: BoolArray) -> bool:
     """Give the boats of ``who`` a manoeuvre, from their predicted (done = 1) or present states (0).
 
     Boats of ours outside ``who`` keep the paths they have. A boat that was short of its margin on its escape is only
@@ -241,8 +190,9 @@ def assign_plans(
     Returns:
         Whether all boats of ours keep clear of all boats and of fixed things.
     """
+    state, ours, tuning, memory, work = scene.state, scene.ours, scene.tuning, scene.memory, scene.work
     n = state.shape[0]
-    lay_first(commands, done, who, state, boats, plans, tuning, memory, work)
+    lay_first(scene, done, who)
     stale = True
     work.searched[:] = -1
     changes = 0
@@ -252,26 +202,13 @@ def assign_plans(
             if not who[i]:
                 continue
             if not (exhaustive and sweep == 0):
-                refresh(i, state, ours, boats, fixed, tuning, work)
+                refresh(i, scene)
                 if settled(i, sweep, exhaustive, memory, work) or all_spent(tuning, work):
                     continue
             if work.searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
                 continue
             side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
-            choose_plan(
-                i,
-                commands[i, 0],
-                done,
-                exhaustive and sweep == 0,
-                state,
-                ours,
-                boats,
-                fixed,
-                plans,
-                tuning,
-                memory,
-                work,
-            )
+            choose_plan(i, scene.plan.commands[i, 0], done, exhaustive and sweep == 0, scene)
             if work.plan[i, 0] != side or work.plan[i, 1] != togo or work.plan[i, 2] != speed:
                 changes += 1
             work.searched[i] = changes
@@ -283,6 +220,6 @@ def assign_plans(
     for i in range(n):
         if ours[i]:
             if stale or not who[i]:
-                refresh(i, state, ours, boats, fixed, tuning, work)
+                refresh(i, scene)
             good = good and work.merit[i] >= PAIR_SAFE
     return good

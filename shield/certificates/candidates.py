@@ -7,7 +7,7 @@ import math
 from ..jit import Array, lean_kernel
 from ..memory import Memory
 from ..platforms import layout as L
-from ..scene import Boats, Tuning
+from ..scene import Scene, Tuning
 from .paths import angle_to_go
 from .rating import FIXED_LOST
 
@@ -41,10 +41,9 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
 
 
 @lean_kernel
-def candidate(
-    i: int, p: int, wanted_mps: float, heading_deg: float, boats: Boats, plans: Array, memory: Memory
-) -> tuple[float, float, float]:
+def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
     """Manoeuvre number p of boat i: 0 is the one in memory, the rest the family; (side, turn deg, speed m/s)."""
+    boats, plans, memory = scene.boats, scene.plans, scene.memory
     if p == 0:
         return memory.side[i], kept_turn(i, heading_deg, memory), memory.speed_mps[i]
     row = plans[p - 1]
@@ -65,10 +64,9 @@ def hysteresis(merit: float, tuning: Tuning) -> float:
 
 
 @lean_kernel
-def preference(
-    i: int, p: int, side: float, togo_deg: float, merit: float, boats: Boats, tuning: Tuning, memory: Memory
-) -> float:
+def preference(i: int, p: int, side: float, togo_deg: float, merit: float, scene: Scene) -> float:
     """What manoeuvre number p of a boat on its escape gains or loses in merit by the hysteresis."""
+    boats, tuning, memory = scene.boats, scene.tuning, scene.memory
     if not memory.escaping[i]:
         return 0.0
     if boats.look[i] == 0:

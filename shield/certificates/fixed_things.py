@@ -11,8 +11,7 @@ import math
 
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Fixed
-from ..work import Work
+from ..scene import Boats, Fixed, Scene
 from .clearance import MARGIN
 from .surroundings import clear_of_obstacles, clear_of_rules, first_touch
 
@@ -37,58 +36,34 @@ def grace(boats: Boats, fixed: Fixed) -> float:
 
 
 @lean_kernel
-def clear_of_fixed(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array) -> None:
+def clear_of_fixed(i: int, slot: int, scene: Scene, out: Array) -> None:
     """Clearance row of boat i on the path in ``slot`` from obstacles at any time, field edge and keep-out circles.
 
     ``work.spare2`` is overwritten.
     """
+    state, boats, fixed, work = scene.state, scene.boats, scene.fixed, scene.work
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
     drift_m = fixed.current_mps * boats.sample_s
     near = boats.static_samples[i]
-    clear_of_rules(state[i], path, near, last, fixed.field, fixed.keep_out, way_m, drift_m, boats.sample_s, out)
-    clear_of_obstacles(
-        state[i],
-        path,
-        last,
-        way_m,
-        drift_m,
-        grace(boats, fixed),
-        fixed.circles,
-        fixed.segments,
-        fixed.segment_m,
-        fixed.side_m,
-        work.spare2,
-    )
+    clear_of_rules(state[i], path, near, last, fixed, way_m, drift_m, boats.sample_s, out)
+    clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, fixed), fixed, work.spare2)
     if work.spare2[MARGIN] < out[MARGIN]:
         copy_row(out, work.spare2)
 
 
 @lean_kernel
-def clear_of_near_obstacles(
-    i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work, out: Array
-) -> None:
+def clear_of_near_obstacles(i: int, slot: int, scene: Scene, out: Array) -> None:
     """The same from obstacles alone until a half turn could be over."""
-    clear_of_obstacles(
-        state[i],
-        work.path[slot],
-        boats.static_samples[i],
-        way_per_sample(i, state, boats),
-        0.0,
-        grace(boats, fixed),
-        fixed.circles,
-        fixed.segments,
-        fixed.segment_m,
-        fixed.side_m,
-        out,
-    )
+    state, boats, fixed, work = scene.state, scene.boats, scene.fixed, scene.work
+    path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.static_samples[i]
+    clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, fixed), fixed, out)
 
 
 @lean_kernel
-def share_before_touch(i: int, slot: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> float:
+def share_before_touch(i: int, slot: int, scene: Scene) -> float:
     """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
+    state, boats, fixed, work = scene.state, scene.boats, scene.fixed, scene.work
     last = boats.static_samples[i]
     way_m = way_per_sample(i, state, boats)
-    path, leave = work.path[slot], grace(boats, fixed)
-    circles, walls, hull_m = fixed.circles, fixed.segments, fixed.segment_m
-    first = first_touch(state[i], path, last, way_m, 0.0, leave, circles, walls, hull_m, fixed.side_m)
+    first = first_touch(state[i], work.path[slot], last, way_m, 0.0, grace(boats, fixed), fixed)
     return first / (last + 1.0)

@@ -14,8 +14,7 @@ from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
 from ..platforms.usv import wrap_degrees
-from ..scene import Boats, Tuning
-from ..work import Work
+from ..scene import Scene
 
 DRIVEN_MPS, DRIVEN_X, DRIVEN_Y, DRIVEN_S = range(4)
 """What drives a boat: speed m/s (NaN: not driven), place it is steered at, m (NaN: none, the heading error is 0), and
@@ -32,8 +31,9 @@ def error_to(row: Array, x: float, y: float) -> float:
 
 
 @lean_kernel
-def foresee(state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def foresee(scene: Scene) -> None:
     """Write the ways of boats of ``work.known`` into ``work.path``: sample 0 is one step of the model from now."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     for j in range(state.shape[0]):
         if not work.known[j]:
             continue

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..jit import BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Tuning
+from ..scene import Boats, Scene
 from ..tables.lookup import WHOLE_S
 from ..work import Work
-from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Search
 from .paths import READY_SAMPLE
-from .pursuer import clear_of_pursuer, stays_away
+from .pursuer import Hunt, Pursuer, clear_of_pursuer, stays_away
 from .values import looked_up, margin_when_ready, out_of_reach, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
@@ -34,8 +34,9 @@ CHASE_LEAD_SHARE = 0.3
 
 
 @lean_kernel
-def closing(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> float:
+def closing(i: int, j: int, scene: Scene) -> float:
     """Most the distance of a pair can shrink from sample to sample, m."""
+    state, boats = scene.state, scene.boats
     top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
     top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
     return (top_i + top_j) * boats.sample_s
@@ -50,18 +51,7 @@ def fade_over(lasts: int, i: int, boats: Boats) -> float:
 
 
 @lean_kernel
-def clear_of_hunter(
-    i: int,
-    j: int,
-    slot: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-    cap_m: float,
-) -> None:
+def clear_of_hunter(i: int, j: int, slot: int, scene: Scene, floor_m: float, cap_m: float) -> None:
     """Clearance of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
     The worst of several hunters: steering at the boat or for the meeting point, turning hard or gently. The one that
@@ -69,24 +59,23 @@ def clear_of_hunter(
     as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust is full,
     of a beset boat (see `values.find_beset`) not before ``boats.joint_samples``.
     """
+    boats, work = scene.boats, scene.work
     ready = int(work.ready[slot, READY_SAMPLE])
-    till_ready = ready >= 0 and tabled(i, j, ours, boats, work)
+    till_ready = ready >= 0 and tabled(i, j, boats, work)
     closely = boats.hunt_samples[i] + boats.thrust_samples[i]
     if ready >= 0:
         closely = min(closely, ready + boats.hunt_samples[i])
     lasts = closely + (0 if till_ready else boats.chase_samples[i, j])
-    if not till_ready and _never_near(i, j, slot, lasts, state, boats, tuning, work, cap_m):
+    if not till_ready and _never_near(i, j, slot, lasts, scene, cap_m):
         work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = cap_m, lasts, 1.0, 0.0
         return
-    fade = fade_over(lasts, i, boats)
+    hunt = hunt_of(i, j, slot, lasts, closely, till_ready, scene)
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
         manner = first_then_rest(first, number)
-        weight = _run_hunter(
-            i, j, slot, manner, lasts, closely, fade, till_ready, state, boats, tuning, work, floor_m, cap_m
-        )
+        weight = _run_hunter(i, j, slot, manner, hunt, scene, floor_m, cap_m)
         if till_ready and work.spare[MARGIN] >= floor_m:
             _look_up_end(i, j, slot, weight, boats, work)
         if work.spare[MARGIN] < work.out[MARGIN]:
@@ -97,42 +86,36 @@ def clear_of_hunter(
 
 
 @lean_kernel
-def _never_near(
-    i: int, j: int, slot: int, lasts: int, state: Array, boats: Boats, tuning: Tuning, work: Work, cap_m: float
-) -> bool:
+def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene, cap_m: float) -> bool:
     """Whether no run of opponent j, however it steers, ends with less than the cap: most need not be made."""
+    state, boats, work = scene.state, scene.boats, scene.work
     way = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED]) * boats.sample_s
-    closing_m, radius_m = closing(i, j, state, boats, tuning), work.radius[i, j]
+    closing_m, radius_m = closing(i, j, scene), work.radius[i, j]
     return stays_away(work.path[slot], work.course[j, 0], work.course[j, 1], way, lasts, closing_m, radius_m, cap_m)
 
 
 @lean_kernel
-def _run_hunter(
-    i: int,
-    j: int,
-    slot: int,
-    manner: int,
-    lasts: int,
-    closely: int,
-    fade: float,
-    till_ready: bool,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-    cap_m: float,
-) -> float:
-    """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by.
+def hunt_of(i: int, j: int, slot: int, lasts: int, closely: int, till_ready: bool, scene: Scene) -> Hunt:
+    """A hunt of boat i by opponent j that lasts so many samples, or until the thrust on the path in ``slot`` is full.
 
-    The hunt lasts so many samples; how far it leads the boat goes by that. Negative margins fade by a factor a sample.
+    How far the hunter leads the boat goes by how long it lasts. For ``closely`` see `Hunt`.
     """
-    sample_s = boats.sample_s
+    boats, work = scene.boats, scene.work
     samples = min(lasts, int(work.ready[slot, READY_SAMPLE])) if till_ready else lasts
+    adverse = _adverse_samples(samples, work.fear_s[j], boats)
+    ahead = (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts
+    return Hunt(boats.sample_s, samples, adverse, closely, ahead, fade_over(lasts, i, boats), till_ready)
+
+
+@lean_kernel
+def _run_hunter(
+    i: int, j: int, slot: int, manner: int, hunt: Hunt, scene: Scene, floor_m: float, cap_m: float
+) -> float:
+    """Clearance from opponent j hunting in one manner, into ``work.spare``; returns what negative margins faded by."""
+    state, boats, work = scene.state, scene.boats, scene.work
     course = work.course[j]
-    turn = math.radians(boats.granted_turn_dps[j]) * sample_s  # also from rest: thrust, and with it turn, comes soon
-    return clear_of_pursuer(
-        work.path[slot],
+    turn = math.radians(boats.granted_turn_dps[j]) * boats.sample_s  # also from rest: thrust, and turn, comes soon
+    pursuer = Pursuer(
         course[0],
         course[1],
         course[2],
@@ -144,20 +127,9 @@ def _run_hunter(
         boats.granted_loss[j] * RUDDERS[manner // 2 + 1],
         RUDDERS[manner // 2] * turn,
         manner % 2 == 1,
-        (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
-        sample_s,
-        samples,
-        _adverse_samples(samples, work.fear_s[j], boats),
-        closely,
-        closing(i, j, state, boats, tuning),
-        work.radius[i, j],
-        fade,
-        floor_m,
-        cap_m,
-        till_ready,
-        work.hunter,
-        work.spare,
     )
+    search = Search(closing(i, j, scene), work.radius[i, j], floor_m, cap_m)
+    return clear_of_pursuer(work.path[slot], pursuer, hunt, search, work.hunter, work.spare)
 
 
 @lean_kernel
@@ -172,7 +144,7 @@ def _adverse_samples(samples: int, fear_s: float, boats: Boats) -> int:
 def _look_up_end(i: int, j: int, slot: int, weight: float, boats: Boats, work: Work) -> None:
     """Lower the clearance in ``work.spare`` to the value where the boat's thrust is full and the hunter's run ends."""
     path, ready, hunter = work.path[slot], work.ready[slot], work.hunter
-    margin = margin_when_ready(i, j, path, ready, hunter[0], hunter[1], hunter[2], hunter[3], hunter[4], boats, work)
+    margin = margin_when_ready(i, j, slot, boats, work)
     if margin < 0.0:
         margin *= weight
     if margin < work.spare[MARGIN]:
@@ -228,71 +200,44 @@ def _clear_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> None
 
 
 @lean_kernel
-def _clear_by_run(
-    i: int,
-    j: int,
-    slot: int,
-    floor_m: float,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
+def _clear_by_run(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> None:
     """Clearance of a beset boat from opponent j, run through for a while and looked up from there, into ``work.out``.
 
     At most the cap; on a manoeuvre on which thrust never is full the boat is lost.
     """
+    tuning, work = scene.tuning, scene.work
     work.out[SAMPLE] = 0.0
     if work.ready[slot, READY_SAMPLE] < 0.0:
         work.out[MARGIN] = -work.radius[i, j]
-    elif out_of_reach(i, j, slot, closing(i, j, state, boats, tuning), state, boats, tuning, work):
+    elif out_of_reach(i, j, slot, closing(i, j, scene), scene):
         work.out[MARGIN] = tuning.margin_cap_m
     else:
-        clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+        clear_of_hunter(i, j, slot, scene, floor_m, tuning.margin_cap_m)
     work.joint_m[slot] = min(work.joint_m[slot], work.out[MARGIN])
 
 
 @lean_kernel
-def _clear_of_threat(
-    i: int,
-    j: int,
-    slot: int,
-    level_m: float,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> bool:
+def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) -> bool:
     """Note what is feared of opponent j; False when it is short of its target and below the level."""
-    floor_m, told = min(work.threat_target_m[i, j], level_m), looked_up(i, j, slot, ours, boats, work)
+    boats, tuning, work = scene.boats, scene.tuning, scene.work
+    floor_m, told = min(work.threat_target_m[i, j], level_m), looked_up(i, j, slot, boats, work)
     if told:
         _clear_by_table(i, j, slot, boats, work)
     else:
         # one cap for all: a hunter's steps depend on it, and must not depend on who is looked at before
-        clear_of_hunter(i, j, slot, state, ours, boats, tuning, work, floor_m, tuning.margin_cap_m)
+        clear_of_hunter(i, j, slot, scene, floor_m, tuning.margin_cap_m)
     work.threats_m[slot, j] = work.out[MARGIN]
     _note_threat(j, slot, work.threat_target_m[i, j], work)
     if not work.out[MARGIN] >= floor_m or not told or not work.beset[i]:
         return work.out[MARGIN] >= floor_m
     floor_m = min(work.joint_target_m[i], level_m)
-    _clear_by_run(i, j, slot, floor_m, state, ours, boats, tuning, work)
+    _clear_by_run(i, j, slot, floor_m, scene)
     _note_threat(j, slot, work.joint_target_m[i], work)
     return work.out[MARGIN] >= floor_m
 
 
 @lean_kernel
-def worst_hunter(
-    i: int,
-    slot: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    level_m: float,
-) -> None:
+def worst_hunter(i: int, slot: int, scene: Scene, level_m: float) -> None:
     """Clearance from each hunting opponent, in ``work.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
     What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre.
@@ -303,6 +248,7 @@ def worst_hunter(
     ``work.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
     first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
+    state, ours, boats, work = scene.state, scene.ours, scene.boats, scene.work
     if not work.hunters_known[slot]:
         work.hunters_known[slot] = True
         _forget_threats(slot, work)
@@ -311,7 +257,7 @@ def worst_hunter(
             j = first_then_rest(first, number)
             if j == i or not work.near[i, j] or work.breach[i, j] or not hunts(i, j, ours, boats):
                 continue
-            if not _clear_of_threat(i, j, slot, level_m, state, ours, boats, tuning, work):
+            if not _clear_of_threat(i, j, slot, level_m, scene):
                 work.first_hunter[i] = j
                 work.hunters_known[slot] = False
                 break

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..jit import copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
-from ..scene import Boats, Tuning
+from ..scene import Boats, Scene
 from ..work import Work
 from .clearance import FAR
 from .hunters import first_then_rest
-from .paths import trace_path
+from .paths import Manoeuvre, Span, trace_path
 from .rating import STRAIGHT_BASE, STRAIGHT_SAFE
 from .values import looked_up, margin_at_once, set_place, tabled
 
@@ -31,45 +31,36 @@ def hunters_run(i: int, slot: int, boats: Boats, work: Work) -> int:
     for j in range(work.near.shape[0]):
         if j == i or not work.near[i, j] or boats.team[i] == boats.team[j] or boats.granted_turn_dps[j] == 0.0:
             continue
-        if not tabled(i, j, work.nobody, boats, work):
+        if not tabled(i, j, boats, work):
             return HUNTERS
-        if not looked_up(i, j, slot, work.nobody, boats, work):
+        if not looked_up(i, j, slot, boats, work):
             how = HUNTERS_TILL_READY
     return how
 
 
 @lean_kernel
-def set_out(
-    i: int,
-    slot: int,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    done: int,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
+def set_out(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Write a manoeuvre of boat i into ``slot`` and where its opponents are looked up for it."""
+    work = scene.work
     work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2] = side, togo_deg, speed_mps
     work.hunters_known[slot] = False
-    set_place(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
+    set_place(i, slot, side, togo_deg, speed_mps, done, scene)
 
 
 @lean_kernel
-def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Boats, work: Work) -> bool:
+def refused_by_tables(i: int, slot: int, best: float, scene: Scene) -> bool:
     """Whether by the tables alone the merit of the manoeuvre in ``slot`` cannot exceed ``best``: no path is needed.
 
     It cannot when a margin is short of its target and the least of them is no better than the best manoeuvre's. Who
     refused the last one is asked first, and nobody after the answer is clear.
     """
+    ours, boats, work = scene.ours, scene.boats, scene.work
     if best < STRAIGHT_SAFE:
         return False
     first, least, fails = work.first_refuser[i], FAR, False
     for number in range(ours.shape[0]):
         j = first_then_rest(first, number)
-        if j == i or not work.near[i, j] or not looked_up(i, j, slot, ours, boats, work):
+        if j == i or ours[j] or not work.near[i, j] or not looked_up(i, j, slot, boats, work):
             continue
         enough_m = min(work.threat_target_m[i, j], best - STRAIGHT_BASE) - CLEARLY_M
         margin = margin_at_once(i, j, slot, enough_m, boats, work)
@@ -82,8 +73,9 @@ def refused_by_tables(i: int, slot: int, best: float, ours: BoolArray, boats: Bo
 
 
 @lean_kernel
-def lay_command(i: int, slot: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def lay_command(i: int, slot: int, scene: Scene) -> None:
     """Write where boat i is during the step it is predicted for, as far as that is of several moves."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     if tuning.moves == 1:
         return
     copy_row(work.row, state[i])
@@ -95,8 +87,9 @@ def lay_command(i: int, slot: int, state: Array, boats: Boats, tuning: Tuning, w
 
 
 @lean_kernel
-def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def run_out(i: int, slot: int, done: int, scene: Scene) -> None:
     """Trace the manoeuvre in ``slot`` of boat i, from its predicted state (done = 1) or its present one (0)."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     how = hunters_run(i, slot, boats, work)
     samples = boats.samples[i]
     if how != NO_HUNTERS:
@@ -106,18 +99,13 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         earliest = max(earliest, boats.joint_samples)
     earliest = min(earliest, samples)
     beyond = boats.hunt_samples[i] + boats.chased_samples[i] if how == HUNTERS else 0
-    side, togo_deg, speed_mps = work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2]
+    manoeuvre = Manoeuvre(work.plan[slot, 0], work.plan[slot, 1], work.plan[slot, 2])
     moves = 0
     if done == 1:
         moves = tuning.moves
-        lay_command(i, slot, state, boats, tuning, work)
+        lay_command(i, slot, scene)
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
-    trace_path(
-        boats.params[i],
-        work.row,
-        side,
-        togo_deg,
-        speed_mps,
+    span = Span(
         tuning.model_s,
         moves,
         boats.stride,
@@ -127,24 +115,12 @@ def run_out(i: int, slot: int, done: int, state: Array, boats: Boats, tuning: Tu
         boats.hunt_samples[i],
         earliest,
         boats.ready_thrust[i],
-        work.path[slot],
-        work.ready[slot],
     )
+    trace_path(boats.params[i], work.row, manoeuvre, span, work.path[slot], work.ready[slot])
 
 
 @lean_kernel
-def lay_path(
-    i: int,
-    slot: int,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    done: int,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
+def lay_path(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Trace a manoeuvre of boat i into ``slot``, from its predicted state (done = 1) or its present one (0)."""
-    set_out(i, slot, side, togo_deg, speed_mps, done, state, boats, tuning, work)
-    run_out(i, slot, done, state, boats, tuning, work)
+    set_out(i, slot, side, togo_deg, speed_mps, done, scene)
+    run_out(i, slot, done, scene)

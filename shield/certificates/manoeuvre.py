@@ -17,9 +17,9 @@ import math
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import next_thrust
-from ..scene import Boats, Tuning
+from ..scene import Scene
 from ..work import Work
-from .clearance import FAR, MARGIN, clear_of_course
+from .clearance import FAR, MARGIN, Course, Search, clear_of_course
 from .effort import HUNTER_COST, begin_counting
 from .foreseen import foresee
 from .hunters import closing
@@ -36,8 +36,9 @@ RECOVERY_S = 1.5
 
 
 @lean_kernel
-def could_meet(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> bool:
+def could_meet(i: int, j: int, scene: Scene) -> bool:
     """Whether any two manoeuvres could bring team-mates i and j near each other, see `look_around`."""
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
     top = max(boats.fastest_mps[i], state[i, L.SPEED]) + max(boats.fastest_mps[j], state[j, L.SPEED])
     horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * boats.sample_s + tuning.tail_s
     dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
@@ -46,7 +47,7 @@ def could_meet(i: int, j: int, state: Array, boats: Boats, tuning: Tuning) -> bo
 
 
 @lean_kernel
-def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work) -> None:
+def look_around(scene: Scene, margin_m: Array) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
     A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + tail). No boat ever
@@ -57,13 +58,14 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
     The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     n = state.shape[0]
     begin_counting(work)
-    run_opponents(1, ours, state, boats, tuning, work, work.ways)
-    foresee(state, boats, tuning, work)
+    run_opponents(1, scene)
+    foresee(scene)
     for i in range(n):
         work.hunted[i] = False
-        work.reach_samples[i] = _reach_samples(i, state, ours, boats, tuning)
+        work.reach_samples[i] = _reach_samples(i, scene)
         work.first_hunter[i] = work.first_refuser[i] = 0
         work.first_manner[i, :] = 0
         heading = math.radians(state[i, L.HEADING])
@@ -99,16 +101,17 @@ def look_around(state: Array, margin_m: Array, ours: BoolArray, boats: Boats, tu
                 work.breach[j, i] = now < least
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
-    find_beset(ours, state, boats, work)
+    find_beset(scene)
 
 
 @lean_kernel
-def _reach_samples(i: int, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning) -> int:
+def _reach_samples(i: int, scene: Scene) -> int:
     """Samples over which opponents of boat i may be followed.
 
     One whose thrust stays enough for the next step, whatever is commanded, is followed as boats are that have all of
     theirs; so is one that is not ours, whose manoeuvres nobody looks at.
     """
+    state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     if not ours[i]:
         return boats.hunt_samples[i]
     row = state[i]
@@ -121,35 +124,19 @@ def _reach_samples(i: int, state: Array, ours: BoolArray, boats: Boats, tuning: 
 
 
 @lean_kernel
-def clear_of_opponent(
-    i: int, j: int, path: Array, state: Array, boats: Boats, tuning: Tuning, work: Work, floor_m: float, cap_m: float
-) -> None:
+def clear_of_opponent(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
     """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
-    sample_s = boats.sample_s
-    course = work.course[j]
-    way = state[j, L.SPEED] * sample_s
-    clear_of_course(
-        path,
-        work.path[0, :0],
-        course[0],
-        course[1],
-        way * course[2],
-        way * course[3],
-        boats.samples[i],
-        tuning.tail_s / sample_s,
-        closing(i, j, state, boats, tuning),
-        work.radius[i, j],
-        floor_m,
-        cap_m,
-        work.out,
-    )
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
+    now, way = work.course[j], state[j, L.SPEED] * boats.sample_s
+    course = Course(work.path[0, :0], now[0], now[1], way * now[2], way * now[3])
+    search = Search(closing(i, j, scene), work.radius[i, j], floor_m, cap_m)
+    clear_of_course(path, course, boats.samples[i], tuning.tail_s / boats.sample_s, search, work.out)
 
 
 @lean_kernel
-def _rank_recovery(
-    i: int, j: int, path: Array, state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, work: Work
-) -> None:
+def _rank_recovery(i: int, j: int, path: Array, scene: Scene) -> None:
     """In breach no margin is left to compare: rank by not closing further and by the distance soon after."""
+    state, ours, boats, work = scene.state, scene.ours, scene.boats, scene.work
     sample_s = boats.sample_s
     k = min(boats.samples[i], max(1, int(RECOVERY_S / sample_s)))
     if ours[j] or work.known[j]:
@@ -179,44 +166,21 @@ def told_margin(i: int, state: Array, work: Work) -> float:
 
 
 @lean_kernel
-def clear_of_boat(
-    i: int,
-    j: int,
-    path: Array,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-    cap_m: float,
-) -> None:
+def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
     """Clearance row of boat i on ``path`` from boat j, into ``work.out``."""
+    ours, boats, tuning, work = scene.ours, scene.boats, scene.tuning, scene.work
     floor, cap = floor_m, cap_m
     if work.breach[i, j]:
         floor, cap = -FAR, FAR
     if ours[j] or work.known[j]:
         samples = min(boats.samples[i], boats.samples[j])
-        tail = tuning.tail_s / boats.sample_s
-        clear_of_course(
-            path,
-            work.path[j],
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            samples,
-            tail,
-            closing(i, j, state, boats, tuning),
-            work.radius[i, j],
-            floor,
-            cap,
-            work.out,
-        )
+        course = Course(work.path[j], 0.0, 0.0, 0.0, 0.0)
+        search = Search(closing(i, j, scene), work.radius[i, j], floor, cap)
+        clear_of_course(path, course, samples, tuning.tail_s / boats.sample_s, search, work.out)
     else:
-        clear_of_opponent(i, j, path, state, boats, tuning, work, floor, cap)
+        clear_of_opponent(i, j, path, scene, floor, cap)
     if work.breach[i, j]:
-        _rank_recovery(i, j, path, state, ours, boats, tuning, work)
+        _rank_recovery(i, j, path, scene)
 
 
 @lean_kernel
@@ -226,21 +190,13 @@ def must_keep(i: int, j: int, ours: BoolArray, work: Work) -> float:
 
 
 @lean_kernel
-def worst_clearance(
-    i: int,
-    slot: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-    floor_m: float,
-) -> None:
+def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
     """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses.
 
     ``work.short[slot]`` says whether one of them is below what must be kept; then the one that is so by most binds,
     of margins below 0 the least.
     """
+    state, ours, tuning, work = scene.state, scene.ours, scene.tuning, scene.work
     clear = work.clear[slot]
     clear[MARGIN] = FAR
     work.bound[slot] = -1
@@ -251,7 +207,7 @@ def worst_clearance(
             continue
         least_m = must_keep(i, j, ours, work)
         enough_m = max(least_m + ROUNDING_M, min(clear[MARGIN], tuning.margin_cap_m))
-        clear_of_boat(i, j, work.path[slot], state, ours, boats, tuning, work, floor_m, enough_m)
+        clear_of_boat(i, j, work.path[slot], scene, floor_m, enough_m)
         lacks_m = work.out[MARGIN] - least_m
         if lacks_m < shortest_m:
             work.short[slot], shortest_m = True, lacks_m

@@ -9,6 +9,7 @@ candidate command, or after the manoeuvre's own first step.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
@@ -35,6 +36,56 @@ SETTLED_MPS = 1e-3
 Only of a boat that gains speed: one that slows down may seem to settle there for one step of its way below."""
 
 
+class Manoeuvre(NamedTuple):
+    """Turn to one side, then straight on.
+
+    Attributes:
+        side: clockwise when > 0; its size is the share of full rudder.
+        togo_deg: turn to make before running straight, deg, >= 0.
+        speed_mps: speed commanded throughout, m/s.
+    """
+
+    side: float
+    togo_deg: float
+    speed_mps: float
+
+
+class Span(NamedTuple):
+    """What of a manoeuvre's path is written, and how.
+
+    Attributes:
+        dt_s: model step, s.
+        done: 0 when it starts in the present state; else in the state so many steps from now, and the samples until
+            then are written already (the first, of one step, is written with the rest).
+        stride: model steps between samples.
+        samples: number of samples after sample 0.
+        least: number of them after which the path may end.
+        beyond: number of them after the one where thrust is full that the path goes on for.
+        closely: number of them for which it follows the model; a straight run then goes on as its speed settles.
+        earliest: first sample at which that counts, at most ``samples``.
+        ready_thrust: thrust, percent, from which the boat has all of it.
+    """
+
+    dt_s: float
+    done: int
+    stride: int
+    samples: int
+    least: int
+    beyond: int
+    closely: int
+    earliest: int
+    ready_thrust: float
+
+
+class Straight(NamedTuple):
+    """A straight run from (x, y), m: what it goes east and north in a step, m, or per m/s of speed."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+
+
 @lean_kernel
 def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
     """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
@@ -59,124 +110,73 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 
 @lean_kernel
-def _note_ready(
-    k: int, earliest: int, thrust: float, ready_thrust: float, heading_rad: float, speed_mps: float, ready: Array
-) -> None:
+def _note_ready(k: int, span: Span, thrust: float, heading_rad: float, speed_mps: float, ready: Array) -> None:
     """Note the first sample, from the earliest that counts, at which thrust is full."""
-    if ready[READY_SAMPLE] < 0.0 and k >= earliest and thrust >= ready_thrust:
+    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust:
         ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, heading_rad, speed_mps
 
 
 @lean_kernel
-def _note_done(
-    row: Array, done: int, stride: int, earliest: int, ready_thrust: float, path: Array, ready: Array
-) -> tuple[int, int]:
+def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
+    """Write sample k: that of a state."""
+    path[k, 0], path[k, 1] = row[L.X], row[L.Y]
+    _note_ready(k, span, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
+
+
+@lean_kernel
+def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> tuple[int, int]:
     """Write the sample of a state so many steps on, if there is one then; returns the next sample and the step."""
     step = done - 1
-    k = step // stride
-    if step % stride == 0:
-        path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-        _note_ready(k, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
+    k = step // span.stride
+    if step % span.stride == 0:
+        _note_state(k, span, row, path, ready)
     return k + 1, step
 
 
 @lean_kernel
-def trace_path(
-    params: Array,
-    row: Array,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    dt_s: float,
-    done: int,
-    stride: int,
-    samples: int,
-    least: int,
-    beyond: int,
-    closely: int,
-    earliest: int,
-    ready_thrust: float,
-    path: Array,
-    ready: Array,
-) -> None:
-    """Write positions, m, along an escape manoeuvre: ``path[: samples + 1]``, or fewer, see ``least`` and ``beyond``.
+def _goes_on(k: int, span: Span, ready: Array) -> bool:
+    """Whether sample k is still to be written."""
+    if k > span.samples:
+        return False
+    return k <= span.least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + span.beyond
+
+
+@lean_kernel
+def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
+    """Write positions, m, along a manoeuvre: ``path[: span.samples + 1]``, or fewer, see ``least`` and ``beyond``.
 
     Args:
         params: platform row of the boat.
         row: state to start from; used up.
-        side: clockwise when > 0; its size is the share of full rudder.
-        togo_deg: turn to make before running straight, deg, >= 0.
-        speed_mps: speed commanded throughout, m/s.
-        dt_s: model step, s.
-        done: 0 when ``row`` is the present state; else it is the state so many steps from now, and the samples until
-            then are written already (the first, of one step, is written here).
-        stride: model steps between samples.
-        samples: number of samples after sample 0.
-        least: number of them after which the path may end.
-        beyond: number of them after the one where thrust is full that the path goes on for.
-        closely: number of them for which it follows the model; a straight run then goes on as its speed settles.
-        earliest: first sample at which that counts, at most ``samples``.
-        ready_thrust: thrust, percent, from which the boat has all of it.
+        manoeuvre: what is carried out.
+        span: what is written.
         path: shape (>= samples + 1, 2), float64.
         ready: shape (4,), what is noted, see `READY_SAMPLE`.
     """
     ready[READY_SAMPLE], ready[TURNING_SAMPLE] = -1.0, -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
-        _trace_usv(
-            params,
-            row,
-            side,
-            togo_deg,
-            speed_mps,
-            dt_s,
-            done,
-            stride,
-            samples,
-            least,
-            beyond,
-            closely,
-            earliest,
-            ready_thrust,
-            path,
-            ready,
-        )
+        _trace_usv(params, row, manoeuvre, span, path, ready)
         return
-    if done == 0:
+    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
+    if span.done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
-    k, step = _note_done(row, max(1, done), stride, earliest, ready_thrust, path, ready)
-    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
+    k, step = _note_done(max(1, span.done), span, row, path, ready)
+    while _goes_on(k, span, ready):
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
-        if step % stride == 0:
-            path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-            _note_ready(k, earliest, row[L.THRUST], ready_thrust, math.radians(row[L.HEADING]), row[L.SPEED], ready)
+        if step % span.stride == 0:
+            _note_state(k, span, row, path, ready)
             k += 1
 
 
 @lean_kernel
-def _trace_usv(
-    params: Array,
-    row: Array,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    dt_s: float,
-    done: int,
-    stride: int,
-    samples: int,
-    least: int,
-    beyond: int,
-    closely: int,
-    earliest: int,
-    ready_thrust: float,
-    path: Array,
-    ready: Array,
-) -> None:
+def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
     """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
 
     The turn of a step is rudder, thrust and sign in one: the rudder held until less than such a step's turn is left,
     then the one that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
     """
+    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
     x, y, v = row[L.X], row[L.Y], row[L.SPEED]
     thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
     heading = math.radians(row[L.HEADING])
@@ -188,10 +188,10 @@ def _trace_usv(
     gained = 0.0
     turning = True
     k, step = 0, -1
-    if done > 0:
-        k, step = _note_done(row, done, stride, earliest, ready_thrust, path, ready)
+    if span.done > 0:
+        k, step = _note_done(span.done, span, row, path, ready)
         ready[TURNING_SAMPLE] = k - 1.0
-    while k <= samples and (k <= least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + beyond):
+    while _goes_on(k, span, ready):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0
@@ -220,32 +220,31 @@ def _trace_usv(
         gained_before, gained = gained, mean - v
         v = min(max(mean, 0.0), top)
         step += 1
-        if step % stride == 0:
+        if step % span.stride == 0:
             path[k, 0], path[k, 1] = x, y
             ready[TURNING_SAMPLE] = k if turning else ready[TURNING_SAMPLE]
             if ready[READY_SAMPLE] < 0.0:
-                _note_ready(k, earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)
+                _note_ready(k, span, thrust, math.atan2(ux, uy), v, ready)
             k += 1
-        if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= samples:
+        if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= span.samples:
             if change < STEADY_SPEED:
-                _note_ready(max(k, earliest), earliest, thrust, ready_thrust, math.atan2(ux, uy), v, ready)  # as now
-                last = _last_sample(samples, least, beyond, ready)
-                _run_on(x, y, ux * v * dt_s, uy * v * dt_s, step, k, stride, last, path)
+                _note_ready(max(k, span.earliest), span, thrust, math.atan2(ux, uy), v, ready)  # as now
+                _run_on(Straight(x, y, ux * v * dt_s, uy * v * dt_s), step, k, span, path, ready)
                 return
-            rate = _rate(gained, gained_before, k - closely, ready)
+            rate = _rate(gained, gained_before, k - span.closely, ready)
             settled = _settled(v, gained, rate, min(speed_mps, top))
             if settled > 0.0:
-                last = _last_sample(samples, least, beyond, ready)
-                _settle(x, y, ux * dt_s, uy * dt_s, v, settled, rate, step, k, stride, last, path)
+                short = (v - settled) * rate / (1.0 - rate)
+                _settle(Straight(x, y, ux * dt_s, uy * dt_s), settled, short, rate, step, k, span, path, ready)
                 return
 
 
 @lean_kernel
-def _last_sample(samples: int, least: int, beyond: int, ready: Array) -> int:
+def _last_sample(span: Span, ready: Array) -> int:
     """Last sample of a path that is straight and steady from here on."""
     if ready[READY_SAMPLE] < 0.0:
-        return samples
-    return min(samples, max(least, int(ready[READY_SAMPLE]) + beyond))
+        return span.samples
+    return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
 
 
 @lean_kernel
@@ -269,38 +268,35 @@ def _settled(speed_mps: float, gained_mps: float, rate: float, commanded_mps: fl
 
 @lean_kernel
 def _settle(
-    x: float,
-    y: float,
-    ux: float,
-    uy: float,
-    speed_mps: float,
+    run: Straight,
     settled_mps: float,
+    short_mps: float,
     rate: float,
     step: int,
     k: int,
-    stride: int,
-    samples: int,
+    span: Span,
     path: Array,
+    ready: Array,
 ) -> None:
     """Fill the rest of a path with a straight run whose speed settles: what it still gains falls geometrically.
 
-    ``(ux, uy)`` is the way of a step per m/s; ``rate`` is what a step gains over what the one before did.
+    ``run`` tells the way of a step per m/s, ``rate`` what a step gains over what the one before did; the speeds of all
+    steps to come fall short of the settled one by ``short_mps`` in sum.
     """
-    short = (speed_mps - settled_mps) * rate / (1.0 - rate)
+    stride, last = span.stride, _last_sample(span, ready)
     left, per_sample = rate ** (k * stride - step), rate**stride
-    while k <= samples:
-        way = (k * stride - step) * settled_mps + short * (1.0 - left)
-        path[k, 0], path[k, 1] = x + way * ux, y + way * uy
+    while k <= last:
+        way = (k * stride - step) * settled_mps + short_mps * (1.0 - left)
+        path[k, 0], path[k, 1] = run.x + way * run.dx, run.y + way * run.dy
         left *= per_sample
         k += 1
 
 
 @lean_kernel
-def _run_on(
-    x: float, y: float, dx: float, dy: float, step: int, k: int, stride: int, samples: int, path: Array
-) -> None:
+def _run_on(run: Straight, step: int, k: int, span: Span, path: Array, ready: Array) -> None:
     """Fill the rest of a path with equal steps: a steady straight run needs no model."""
-    while k <= samples:
-        ahead = k * stride - step
-        path[k, 0], path[k, 1] = x + ahead * dx, y + ahead * dy
+    last = _last_sample(span, ready)
+    while k <= last:
+        ahead = k * span.stride - step
+        path[k, 0], path[k, 1] = run.x + ahead * run.dx, run.y + ahead * run.dy
         k += 1

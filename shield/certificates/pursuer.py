@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ..jit import Array, lean_kernel
-from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Leg, Search, nearest_on
 
 LONGEST_STRIDE = 6
 """Samples a hunter far away is moved on at once."""
@@ -14,29 +15,65 @@ CHASE_STRIDE = 4
 """Samples a hunter that is near is moved on at once when it follows a boat that has long run straight."""
 
 
+class Pursuer(NamedTuple):
+    """A neighbour that steers for the boat, and what is granted to it.
+
+    Attributes:
+        x: its position now, east, m.
+        y: north, m.
+        ux: its heading as a unit vector, east.
+        uy: north.
+        speed_mps: its speed, m/s.
+        top_speed_mps: its top speed, m/s.
+        acc_mps2: its acceleration, m/s^2.
+        dec_mps2: rate at which it loses speed in a turn, m/s^2.
+        loss: share of its top speed it loses in a turn of ``turn_rad`` per sample.
+        turn_rad: its turn per sample, rad.
+        lead: steer for the meeting point instead of the boat itself.
+    """
+
+    x: float
+    y: float
+    ux: float
+    uy: float
+    speed_mps: float
+    top_speed_mps: float
+    acc_mps2: float
+    dec_mps2: float
+    loss: float
+    turn_rad: float
+    lead: bool
+
+
+class Hunt(NamedTuple):
+    """For how long a pursuer is followed, and what that comes to.
+
+    Attributes:
+        sample_s: time between samples, s.
+        samples: last sample.
+        adverse: sample from which on it holds its course and speed.
+        closely: sample from which on the boat runs straight: it is followed in longer strides.
+        ahead: most samples by which it leads the boat.
+        fade: factor of negative margins per sample, 0 to 1.
+        to_end: follow it to the last sample also when it comes near no more.
+    """
+
+    sample_s: float
+    samples: int
+    adverse: int
+    closely: int
+    ahead: float
+    fade: float
+    to_end: bool
+
+
 @lean_kernel
-def _note_faded(
-    out: Array,
-    worst: float,
-    weight: float,
-    radius_m: float,
-    x0: float,
-    y0: float,
-    x1: float,
-    y1: float,
-    k: int,
-    span: int,
-) -> float:
-    """Least margin over a straight segment, weighted when negative; noted in ``out`` when below ``worst``."""
+def _note_faded(out: Array, worst: float, weight: float, radius_m: float, leg: Leg, k: int, span: int) -> float:
+    """Least margin over a leg of so many samples, weighted when negative; noted in ``out`` when below ``worst``."""
     limit = radius_m + (worst if worst >= 0.0 else worst / weight)
     if limit <= 0.0:
         return worst
-    dx, dy = x1 - x0, y1 - y0
-    length = dx * dx + dy * dy
-    part = 0.0
-    if length > 0.0:
-        part = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / length))
-    x, y = x0 + part * dx, y0 + part * dy
+    part, x, y = nearest_on(leg)
     square = x * x + y * y
     if square >= limit * limit:
         return worst
@@ -124,33 +161,7 @@ def stays_away(
 
 
 @lean_kernel
-def clear_of_pursuer(
-    own: Array,
-    x: float,
-    y: float,
-    ux: float,
-    uy: float,
-    speed_mps: float,
-    top_speed_mps: float,
-    acc_mps2: float,
-    dec_mps2: float,
-    loss: float,
-    turn_rad: float,
-    lead: bool,
-    ahead: float,
-    sample_s: float,
-    samples: int,
-    adverse: int,
-    closely: int,
-    closing_m: float,
-    radius_m: float,
-    fade: float,
-    floor_m: float,
-    cap_m: float,
-    to_end: bool,
-    end: Array,
-    out: Array,
-) -> float:
+def clear_of_pursuer(own: Array, pursuer: Pursuer, hunt: Hunt, search: Search, end: Array, out: Array) -> float:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
 
     Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
@@ -158,49 +169,32 @@ def clear_of_pursuer(
 
     Args:
         own: the boat's path, m.
-        x: the neighbour's position now, east, m.
-        y: north, m.
-        ux: its heading as a unit vector, east.
-        uy: north.
-        speed_mps: its speed, m/s.
-        top_speed_mps: its top speed, m/s.
-        acc_mps2: acceleration granted to it, m/s^2.
-        dec_mps2: rate at which it loses speed in a turn, m/s^2.
-        loss: share of its top speed it loses in a turn of ``turn_rad`` per sample.
-        turn_rad: granted turn per sample, rad.
-        lead: steer for the meeting point instead of the boat itself.
-        ahead: most samples by which it leads the boat.
-        sample_s: time between samples, s.
-        samples: last sample.
-        adverse: sample from which on it holds its course and speed.
-        closely: sample from which on the boat runs straight: it is followed in longer strides.
-        closing_m: most the distance can shrink per sample, m.
-        radius_m: radius to keep, m.
-        fade: factor of negative margins per sample, 0 to 1.
-        floor_m: margin below which the search stops, m.
-        cap_m: margin above which nothing is looked at closely, m.
-        to_end: follow it to the last sample also when it comes near no more.
+        pursuer: the neighbour.
+        hunt: how long it is followed.
+        search: how closely it is looked at.
         end: where it is then, shape (5,): x, y, m, heading as a unit vector, speed m/s.
         out: the result row.
 
     Returns:
         The factor that negative margins have faded by at the end.
     """
-    root = radius_m + cap_m
-    fastest_mps = max(top_speed_mps, speed_mps)
-    worst = cap_m
+    x, y, ux, uy, speed_mps = pursuer.x, pursuer.y, pursuer.ux, pursuer.uy, pursuer.speed_mps
+    closing_m, samples, adverse, turn_rad = search.closing_m, hunt.samples, hunt.adverse, pursuer.turn_rad
+    root = search.radius_m + search.cap_m
+    fastest_mps = max(pursuer.top_speed_mps, speed_mps)
+    worst = search.cap_m
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
     weight = 1.0
-    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = cap_m, samples, 1.0, 0.0
+    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = search.cap_m, samples, 1.0, 0.0
     c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
     x0, y0 = own[0, 0] - x, own[0, 1] - y
     k = 0
     while k < samples:
-        stride = 1 if k < closely else CHASE_STRIDE
+        stride = 1 if k < hunt.closely else CHASE_STRIDE
         square = x0 * x0 + y0 * y0
         if square > worth:
             free = int((math.sqrt(square) - root) / closing_m)
-            if free >= samples - k and not to_end:
+            if free >= samples - k and not hunt.to_end:
                 break
             stride = max(stride, min(free, LONGEST_STRIDE))
         stride = min(stride, samples - k)
@@ -211,23 +205,24 @@ def clear_of_pursuer(
             c, s = c * c1 - s * s1, s * c1 + c * s1
         k += stride
         ax, ay = own[k, 0] - x, own[k, 1] - y
-        if lead:
+        if pursuer.lead:
             before = k - stride
             vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
-            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, ahead)
-        time_s, new_speed = stride * sample_s, speed_mps
+            ax, ay = _aim(x0, y0, vx, vy, speed_mps * hunt.sample_s, hunt.ahead)
+        time_s, new_speed = stride * hunt.sample_s, speed_mps
         if k <= adverse:
             ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
-            new_speed = _speed_after(speed_mps, fastest_mps * (1.0 - loss * rudder), acc_mps2, dec_mps2, time_s)
+            steady_mps = fastest_mps * (1.0 - pursuer.loss * rudder)
+            new_speed = _speed_after(speed_mps, steady_mps, pursuer.acc_mps2, pursuer.dec_mps2, time_s)
         way = 0.5 * (speed_mps + new_speed) * time_s
         speed_mps = new_speed
         x += way * ux
         y += way * uy
         x1, y1 = own[k, 0] - x, own[k, 1] - y
         for _ in range(stride):
-            weight *= fade
-        worst = _note_faded(out, worst, weight, radius_m, x0, y0, x1, y1, k, stride)
-        if worst < floor_m:
+            weight *= hunt.fade
+        worst = _note_faded(out, worst, weight, search.radius_m, Leg(x0, y0, x1, y1), k, stride)
+        if worst < search.floor_m:
             return weight
         x0, y0 = x1, y1
     end[0], end[1], end[2], end[3], end[4] = x, y, ux, uy, speed_mps

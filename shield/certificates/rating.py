@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..jit import Array, BoolArray, lean_kernel
-from ..scene import Boats, Fixed, Tuning
+from ..jit import BoolArray, lean_kernel
+from ..scene import Scene
 from ..work import Work
 from .clearance import FAR, MARGIN, SAMPLE
 from .effort import spend
@@ -60,18 +60,7 @@ def _ask_no_hunters(slot: int, work: Work) -> None:
 
 
 @lean_kernel
-def _rate_touching(
-    i: int,
-    slot: int,
-    share: float,
-    best: float,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    work: Work,
-) -> float:
+def _rate_touching(i: int, slot: int, share: float, best: float, scene: Scene) -> float:
     """Merit of a path that touches an obstacle after that share of a half turn's time.
 
     A boat that is hunted had better be stopped late: who is stopped is caught. Among manoeuvres that touch at the same
@@ -79,7 +68,8 @@ def _rate_touching(
     more; of a boat that nobody hunts, always, and the later touch decides between those that are as deep. Through a
     wall the depth is how far behind it the manoeuvre goes, which is least for the one that meets it most gently.
     """
-    clear_of_near_obstacles(i, slot, state, boats, fixed, work, work.spare2)
+    work = scene.work
+    clear_of_near_obstacles(i, slot, scene, work.spare2)
     depth_m = -work.spare2[MARGIN]
     shallow = 1.0 - depth_m / DEEP_M if depth_m < 0.5 * DEEP_M else 0.25 * DEEP_M / depth_m
     merit = OBSTACLE_BASE * shallow + LATER_WORTH * share
@@ -88,23 +78,13 @@ def _rate_touching(
     work.decided[slot] = np.inf
     if merit <= best:
         return merit
-    worst_hunter(i, slot, state, ours, boats, tuning, work, -FAR)
+    worst_hunter(i, slot, scene, -FAR)
     work.bound[slot], work.decided[slot] = FIXED_THING, np.inf
     return merit
 
 
 @lean_kernel
-def rate_path(
-    i: int,
-    slot: int,
-    best: float,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    work: Work,
-) -> float:
+def rate_path(i: int, slot: int, best: float, scene: Scene) -> float:
     """Merit of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
     What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
@@ -112,10 +92,11 @@ def rate_path(
     spare. Of a manoeuvre that fails at the first the merit is the margin itself, m. The clearance told is from all
     boats, whatever the merit hangs on.
     """
+    tuning, work = scene.tuning, scene.work
     spend(work.cost[i], work)
     clear = work.clear[slot]
     floor = best if best < STRAIGHT_SAFE else 0.0
-    worst_clearance(i, slot, state, ours, boats, tuning, work, min(floor, 0.0))
+    worst_clearance(i, slot, scene, min(floor, 0.0))
     work.fixed[slot, MARGIN] = FAR
     work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
@@ -123,16 +104,16 @@ def rate_path(
         if not work.breach[i, work.bound[slot]]:  # there the merit is a rank
             work.decided[slot] = clear[SAMPLE]
         return clear[MARGIN]
-    share = share_before_touch(i, slot, state, boats, fixed, work)
+    share = share_before_touch(i, slot, scene)
     if share < 1.0:
         _ask_no_hunters(slot, work)
-        return _rate_touching(i, slot, share, best, state, ours, boats, fixed, tuning, work)
+        return _rate_touching(i, slot, share, best, scene)
     sure = clear[MARGIN]
     short = work.short[slot]
     if short and STRAIGHT_BASE + sure <= best:
         _ask_no_hunters(slot, work)
         return STRAIGHT_BASE + sure
-    worst_hunter(i, slot, state, ours, boats, tuning, work, _level_to_beat(best))
+    worst_hunter(i, slot, scene, _level_to_beat(best))
     if short or work.fails[slot]:
         threat = work.threat_m[slot]
         least = min(sure, threat) if short else threat
@@ -140,7 +121,7 @@ def rate_path(
             work.decided[slot] = np.inf
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
     work.decided[slot] = np.inf
-    clear_of_fixed(i, slot, state, boats, fixed, work, work.fixed[slot])
+    clear_of_fixed(i, slot, scene, work.fixed[slot])
     to_spare_m = work.fixed[slot, MARGIN] - work.fixed_target_m[i]
     spare = SPARE_WORTH * min(clear[MARGIN], tuning.margin_cap_m)
     if to_spare_m >= 0.0:
@@ -150,26 +131,10 @@ def rate_path(
 
 
 @lean_kernel
-def worst_off(ours: BoolArray, work: Work) -> int:
-    """The boat of ours whose merit is least, the first of several; -1 when none is ours."""
-    worst = -1
-    for i in range(ours.shape[0]):
-        if ours[i] and (worst < 0 or work.merit[i] < work.merit[worst]):
-            worst = i
-    return worst
-
-
-@lean_kernel
 def worst_merit(ours: BoolArray, work: Work) -> float:
     """Least merit of any boat of ours."""
-    worst = worst_off(ours, work)
-    return work.merit[worst] if worst >= 0 else 2.0 * PAIR_SAFE
-
-
-@lean_kernel
-def only_fixed(ours: BoolArray, work: Work) -> bool:
-    """Whether all that some boat of ours is short of concerns fixed things."""
+    least = 2.0 * PAIR_SAFE
     for i in range(ours.shape[0]):
-        if ours[i] and work.merit[i] < PAIR_SAFE and work.bound[i] != FIXED_THING:
-            return False
-    return True
+        if ours[i]:
+            least = min(least, work.merit[i])
+    return least

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 from ..jit import Array, lean_kernel
+from ..scene import Fixed
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 
 RETURN_S = 10.0
@@ -39,15 +40,6 @@ def _inside(side: int, x: float, y: float, field: Array) -> float:
     """How far inside one side of a rectangle (left, low, right, high) a point is, m; infinite where there is none."""
     at = x if side % 2 == 0 else y
     return at - field[side] if side < 2 else field[side] - at
-
-
-@lean_kernel
-def beyond_field(x: float, y: float, field: Array) -> float:
-    """How far beyond the field a point is, m, by the side that it is furthest beyond; negative inside."""
-    least = FAR
-    for side in range(4):
-        least = min(least, _inside(side, x, y, field))
-    return -least
 
 
 @lean_kernel
@@ -110,13 +102,11 @@ def _to_segment(x: float, y: float, segment: Array, hull_m: float) -> tuple[floa
 
 
 @lean_kernel
-def _to_obstacle(
-    x: float, y: float, o: int, circles: Array, segments: Array, hull_m: float
-) -> tuple[float, float, float]:
+def _to_obstacle(x: float, y: float, o: int, fixed: Fixed) -> tuple[float, float, float]:
     """The same for obstacle number o: the circles come first, then the walls."""
-    if o < circles.shape[0]:
-        return _to_circle(x, y, circles[o])
-    return _to_segment(x, y, segments[o - circles.shape[0]], hull_m)
+    if o < fixed.circles.shape[0]:
+        return _to_circle(x, y, fixed.circles[o])
+    return _to_segment(x, y, fixed.segments[o - fixed.circles.shape[0]], fixed.segment_m)
 
 
 @lean_kernel
@@ -126,11 +116,11 @@ def _side(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> flo
 
 
 @lean_kernel
-def _through(x0: float, y0: float, x1: float, y1: float, o: int, circles: Array, segments: Array) -> bool:
+def _through(x0: float, y0: float, x1: float, y1: float, o: int, fixed: Fixed) -> bool:
     """Whether the way from one point to another goes through obstacle number o, a wall; never through a circle."""
-    if o < circles.shape[0]:
+    if o < fixed.circles.shape[0]:
         return False
-    ax, ay, bx, by = segments[o - circles.shape[0]]
+    ax, ay, bx, by = fixed.segments[o - fixed.circles.shape[0]]
     if (_side(x0, y0, ax, ay, bx, by) > 0.0) == (_side(x1, y1, ax, ay, bx, by) > 0.0):
         return False
     return (_side(ax, ay, x0, y0, x1, y1) > 0.0) != (_side(bx, by, x0, y0, x1, y1) > 0.0)
@@ -142,8 +132,7 @@ def clear_of_rules(
     path: Array,
     near_samples: int,
     samples: int,
-    field: Array,
-    keep_out: Array,
+    fixed: Fixed,
     way_m: float,
     drift_m: float,
     sample_s: float,
@@ -159,8 +148,7 @@ def clear_of_rules(
         path: positions, m, shape (>= samples + 1, 2).
         near_samples: last sample at which the edge counts.
         samples: last sample.
-        field: (xmin, ymin, xmax, ymax), m.
-        keep_out: shape (k, 3): centre x, y and radius, m.
+        fixed: the edge and the circles, as they are to be kept.
         way_m: most the boat moves through the water from sample to sample, m.
         drift_m: most a current carries it meanwhile, m.
         sample_s: time from sample to sample, s.
@@ -168,14 +156,14 @@ def clear_of_rules(
     """
     out[MARGIN] = FAR
     for side in range(4):
-        if _inside(side, here[0], here[1], field) < 0.0:
-            _way_back(side, here, path, samples, sample_s, field, out)
+        if _inside(side, here[0], here[1], fixed.field) < 0.0:
+            _way_back(side, here, path, samples, sample_s, fixed.field, out)
         else:
-            _within(side, path, near_samples, drift_m, field, out)
-    for c in range(keep_out.shape[0]):
+            _within(side, path, near_samples, drift_m, fixed.field, out)
+    for c in range(fixed.keep_out.shape[0]):
         k = 0
         while k <= samples:
-            margin, nx, ny = _to_circle(path[k, 0], path[k, 1], keep_out[c])
+            margin, nx, ny = _to_circle(path[k, 0], path[k, 1], fixed.keep_out[c])
             margin -= k * drift_m
             _lower(out, margin, k, nx, ny)
             k += max(1, int((margin - out[MARGIN]) / (way_m + drift_m)))
@@ -189,10 +177,7 @@ def clear_of_obstacles(
     way_m: float,
     drift_m: float,
     grace: float,
-    circles: Array,
-    segments: Array,
-    hull_m: float,
-    side_m: float,
+    fixed: Fixed,
     out: Array,
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
@@ -208,23 +193,21 @@ def clear_of_obstacles(
         way_m: most the boat moves through the water from sample to sample, m.
         drift_m: most a current carries it meanwhile, m.
         grace: factor per sample on what is excused.
-        circles: shape (c, 3): centre x, y and radius, m.
-        segments: shape (s, 4): ends x0, y0, x1, y1, m.
-        hull_m: distance the boat's centre keeps from segments, m.
-        side_m: distance from a segment within which it is not known on which side of it the boat is, m.
+        fixed: the circles and walls, as they are to be kept.
         out: clearance row.
     """
+    hull_m, circles = fixed.segment_m, fixed.circles.shape[0]
     out[MARGIN] = FAR
-    for o in range(circles.shape[0] + segments.shape[0]):
-        apart_m = _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0]
-        excused, known = min(0.0, apart_m), apart_m + hull_m >= side_m
+    for o in range(circles + fixed.segments.shape[0]):
+        apart_m = _to_obstacle(here[0], here[1], o, fixed)[0]
+        excused, known = min(0.0, apart_m), apart_m + hull_m >= fixed.side_m
         fall_m = way_m + drift_m - excused * (1.0 - grace)
         behind, x, y = False, here[0], here[1]
         k = 0
         while k <= samples:
-            margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)
-            near_m = FAR if o < circles.shape[0] else margin + hull_m  # a wall farther off is not gone through
-            if known and _through(x, y, path[k, 0], path[k, 1], o, circles, segments):
+            margin, nx, ny = _to_obstacle(path[k, 0], path[k, 1], o, fixed)
+            near_m = FAR if o < circles else margin + hull_m  # a wall farther off is not gone through
+            if known and _through(x, y, path[k, 0], path[k, 1], o, fixed):
                 behind = not behind
             if behind:
                 margin, nx, ny = -near_m - hull_m - k * drift_m, -nx, -ny
@@ -243,23 +226,20 @@ def first_touch(
     way_m: float,
     drift_m: float,
     grace: float,
-    circles: Array,
-    segments: Array,
-    hull_m: float,
-    side_m: float,
+    fixed: Fixed,
 ) -> int:
     """First sample of a path that is too near to an obstacle, ``samples + 1`` for none; arguments as above."""
     first = samples + 1
-    for o in range(circles.shape[0] + segments.shape[0]):
-        apart_m = _to_obstacle(here[0], here[1], o, circles, segments, hull_m)[0]
-        excused, known = min(0.0, apart_m), apart_m + hull_m >= side_m
+    for o in range(fixed.circles.shape[0] + fixed.segments.shape[0]):
+        apart_m = _to_obstacle(here[0], here[1], o, fixed)[0]
+        excused, known = min(0.0, apart_m), apart_m + fixed.segment_m >= fixed.side_m
         fall_m = way_m + drift_m - excused * (1.0 - grace)
         x, y = here[0], here[1]
         k = 0
         while k < first:
-            margin = _to_obstacle(path[k, 0], path[k, 1], o, circles, segments, hull_m)[0]
+            margin = _to_obstacle(path[k, 0], path[k, 1], o, fixed)[0]
             margin -= excused * grace**k + k * drift_m
-            if margin < 0.0 or (known and _through(x, y, path[k, 0], path[k, 1], o, circles, segments)):
+            if margin < 0.0 or (known and _through(x, y, path[k, 0], path[k, 1], o, fixed)):
                 first = k
             x, y = path[k, 0], path[k, 1]
             k += max(1, int(margin / fall_m))

@@ -14,11 +14,11 @@ import math
 
 import numpy as np
 
-from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
-from ..scene import Boats, Tuning
+from ..scene import Boats, Scene
 from ..tables.grid import CAP
 from ..tables.lookup import Gradient, own_speed_cell, table_gradient, table_value
 from ..work import Work
@@ -47,15 +47,14 @@ def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
 
 
 @lean_kernel
-def run_opponents(
-    steps: int, ours: BoolArray, state: Array, boats: Boats, tuning: Tuning, work: Work, ways: Array
-) -> None:
-    """Write where the opponents that tables are looked up for may be after some steps: ``ways`` (n, WAYS, 5).
+def run_opponents(steps: int, scene: Scene) -> None:
+    """Write where the opponents that tables are looked up for may be after some steps: ``work.ways``.
 
     These are steps of the boat model, and no fewer than there are in one of decisions.
 
     What was known of margins against opponents holds no more.
     """
+    state, ours, boats, tuning, work = scene.state, scene.ours, scene.boats, scene.tuning, scene.work
     work.hunters_known[:] = False
     work.looked[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
@@ -69,16 +68,17 @@ def run_opponents(
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(max(steps, tuning.moves)):
                 actuate(params, work.row, speed, turn, tuning.model_s)
-            _note_place(work.row, boats.ready_thrust[j], ways[j, way])
+            _note_place(work.row, boats.ready_thrust[j], work.ways[j, way])
 
 
 @lean_kernel
-def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
+def find_beset(scene: Scene) -> None:
     """Mark the boats of ours of more than one opponent of which the tables tell something, at whatever thrust.
 
     Each table knows of one opponent only: two may each leave a way out, and not the same. Opponents of such a boat
     are run through for some time as well, before they are looked up: then one manoeuvre has to do for all.
     """
+    state, ours, boats, work = scene.state, scene.ours, scene.boats, scene.work
     n = state.shape[0]
     for i in range(n):
         work.beset[i] = False
@@ -87,7 +87,7 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
         _note_place(state[i], boats.ready_thrust[i], work.place[i])
         count = 0
         for j in range(n):
-            if j == i or not work.near[i, j] or not tabled(i, j, ours, boats, work):
+            if j == i or ours[j] or not work.near[i, j] or not tabled(i, j, boats, work):
                 continue
             told_m = boats.tables.axes[boats.table[i, j], CAP] - work.radius[i, j] - boats.table_margin_m - 1e-9
             if table_margin(i, j, work.place[i], work.ways[j], told_m, boats, work) < FAR:
@@ -98,14 +98,13 @@ def find_beset(ours: BoolArray, state: Array, boats: Boats, work: Work) -> None:
 
 
 @lean_kernel
-def out_of_reach(
-    i: int, j: int, slot: int, closing_m: float, state: Array, boats: Boats, tuning: Tuning, work: Work
-) -> bool:
+def out_of_reach(i: int, j: int, slot: int, closing_m: float, scene: Scene) -> bool:
     """Whether no run of opponent j, looked up at its end, can bring the margin on the path in ``slot`` below its cap.
 
     It cannot when the opponent, straight at where the boat is then, stays where the table tells enough for all headings
     and speeds, and cannot come near before. ``closing_m`` is the most the distance shrinks by from sample to sample.
     """
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     k, kept_m = int(work.ready[slot, READY_SAMPLE]), work.radius[i, j]
     if k < 0 or kept_m > boats.told_radius_m:
         return False
@@ -123,23 +122,13 @@ def out_of_reach(
 
 
 @lean_kernel
-def set_place(
-    i: int,
-    slot: int,
-    side: float,
-    togo_deg: float,
-    speed_mps: float,
-    done: int,
-    state: Array,
-    boats: Boats,
-    tuning: Tuning,
-    work: Work,
-) -> None:
+def set_place(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Write where boat i is looked up for the manoeuvre in ``slot``.
 
     That is its predicted state (done = 1), the same for every manoeuvre, or where it is ``boats.look`` steps into the
     manoeuvre (done = 0): within one step manoeuvres hardly differ.
     """
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     if boats.look[i] == 0:
         return
     copy_row(work.row, work.next_state[i] if done == 1 else state[i])
@@ -149,46 +138,35 @@ def set_place(
 
 
 @lean_kernel
-def tabled(i: int, j: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
+def tabled(i: int, j: int, boats: Boats, work: Work) -> bool:
     """Whether a table is for boat i and opponent j, and tells enough of them."""
     table = boats.table[i, j]
-    if table < 0 or ours[j] or work.breach[i, j]:
+    if table < 0 or work.breach[i, j]:
         return False
     return work.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
 
 
 @lean_kernel
-def looked_up(i: int, j: int, slot: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
+def looked_up(i: int, j: int, slot: int, boats: Boats, work: Work) -> bool:
     """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
-    return work.place[slot, PLACE_USABLE] != 0.0 and tabled(i, j, ours, boats, work)
+    return work.place[slot, PLACE_USABLE] != 0.0 and tabled(i, j, boats, work)
 
 
 @lean_kernel
-def margin_when_ready(
-    i: int,
-    j: int,
-    path: Array,
-    ready: Array,
-    x: float,
-    y: float,
-    ux: float,
-    uy: float,
-    speed_mps: float,
-    boats: Boats,
-    work: Work,
-) -> float:
-    """Margin, m, of boat i where a run of opponent j ends that is to be looked up: at (x, y), heading (ux, uy)."""
+def margin_when_ready(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """Margin, m, of boat i where a run of opponent j ends that is to be looked up, in ``work.hunter``."""
+    path, ready, hunter = work.path[slot], work.ready[slot], work.hunter
     table, k = boats.table[i, j], int(ready[READY_SAMPLE])
     value = table_value(
         boats.tables,
         table,
         work.fear_s[j],
-        x - path[k, 0],
-        y - path[k, 1],
+        hunter[0] - path[k, 0],
+        hunter[1] - path[k, 1],
         ready[READY_HEADING],
-        math.atan2(ux, uy),
+        math.atan2(hunter[2], hunter[3]),
         ready[READY_SPEED],
-        speed_mps,
+        hunter[4],
     )
     if value >= boats.tables.axes[table, CAP] - 1e-9:
         return FAR

@@ -30,7 +30,6 @@ from .grid import (
 
 STEPS = 255
 """Values are kept as whole steps of cap / 255, rounded down."""
-NO_TABLE = -1
 
 LEVELS_S = (3.0, 6.0, 9.0, 12.0, 20.0)
 """Times T for which a table keeps V(x, T), the distance that can be kept from an other that does its worst for T,

@@ -19,7 +19,7 @@ from .active import widen
 from .lookup import LEVELS_S, pack
 from .moves import Moves, moves_of
 from .settings import RUDDERS, OtherMay, Problem, places
-from .sweep import sweep
+from .sweep import Pursuit, Ways, sweep
 
 TOLERANCE_M = 5e-4
 """Smaller changes of a value within one step are left out."""
@@ -125,9 +125,13 @@ class _Solver:
         other = moves_of(problem.other, grid.other_speeds_mps(), rudders, problem.dt_s)
         own_speed = places(own.speed_mps, grid.own_top_mps, grid.n_own)
         other_speed = places(other.speed_mps, grid.other_top_mps, grid.n_other)
-        self.moves = (own.place_m, own.turn_rad, own_speed, other.place_m, other.turn_rad, other_speed)
-        self.cooperative = problem.other_may is OtherMay.COOPERATIVE
-        self.reach_m = _reach(own) + _reach(other)
+        self.game = Pursuit(
+            self.axes,
+            Ways(own.place_m, own.turn_rad, own_speed),
+            Ways(other.place_m, other.turn_rad, other_speed),
+            problem.other_may is OtherMay.COOPERATIVE,
+            _reach(own) + _reach(other),
+        )
         own_turn = float(np.abs(own.turn_rad).max())
         self.turns_rad = (own_turn, own_turn + float(np.abs(other.turn_rad).max()))
 
@@ -136,23 +140,11 @@ class _Solver:
         values, changed = state.values.copy(), np.zeros_like(state.active)
 
         def piece(row: int) -> float:
-            return sweep(
-                state.values,
-                values,
-                state.hints,
-                state.active,
-                changed,
-                self.axes,
-                *self.moves,
-                self.cooperative,
-                self.reach_m,
-                TOLERANCE_M,
-                row,
-            )
+            return sweep(state.values, values, state.hints, state.active, changed, self.game, TOLERANCE_M, row)
 
         rows = np.flatnonzero(state.active.any(axis=(1, 2))).tolist()
         residual = max(pool.map(piece, rows), default=0.0)
-        active = widen(changed, self.axes, self.reach_m, *self.turns_rad)
+        active = widen(changed, self.axes, self.game.reach_m, *self.turns_rad)
         state.values, state.active, state.residual_m = values, active, residual
         state.iterations += 1
 

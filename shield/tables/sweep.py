@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,53 @@ from .grid import N_BETA, N_OTHER, N_OWN, N_PSI, blend, even_place, rho_node, rh
 TWO_PI = 2.0 * math.pi
 SNAP = 1e-7
 """Places this near a node are put on it (a share of a cell): turns that fit the grid then cause no blur."""
+
+
+class Ways(NamedTuple):
+    """What one table step does to a boat: `moves.Moves`, with speeds as the grid has them.
+
+    Attributes:
+        place_m: `Moves.place_m`.
+        turn_rad: `Moves.turn_rad`.
+        speed: speed cell and place in it after each move, shape ``(speeds, rudders, 2)``.
+    """
+
+    place_m: Array
+    turn_rad: Array
+    speed: Array
+
+
+class Pursuit(NamedTuple):
+    """A game of two boats on a grid.
+
+    Attributes:
+        axes: description of the grid.
+        own: moves of the own boat.
+        other: moves of the other boat.
+        cooperative: whether the other boat helps.
+        reach_m: how far the two boats together can move in one step, m.
+    """
+
+    axes: Array
+    own: Ways
+    other: Ways
+    cooperative: bool
+    reach_m: float
+
+
+class Move(NamedTuple):
+    """One move of a boat: its trail (sub_steps, 2), m, its turn, rad, and the speed cell and place in it after it."""
+
+    trail_m: Array
+    turn_rad: float
+    speed: tuple[int, float]
+
+
+@kernel
+def move_of(ways: Ways, speed: int, rudder: int) -> Move:
+    """The move from a speed node with a rudder."""
+    after = ways.speed[speed, rudder]
+    return Move(ways.place_m[speed, rudder], ways.turn_rad[speed, rudder], (int(after[0]), after[1]))
 
 
 @kernel
@@ -78,85 +125,44 @@ def closest(x: float, y: float, sin: float, cos: float, own: Array, other: Array
 
 @kernel
 def outcome(
-    values: NDArray[Any],
-    axes: Array,
-    x: float,
-    y: float,
-    psi: float,
-    sin: float,
-    cos: float,
-    reach_m: float,
-    own_place: Array,
-    own_turn: float,
-    own_speed: tuple[int, float],
-    other_place: Array,
-    other_turn: float,
-    other_speed: tuple[int, float],
+    values: NDArray[Any], game: Pursuit, x: float, y: float, psi: float, sin: float, cos: float, own: Move, other: Move
 ) -> float:
     """Value after one step of one pair of moves: the smaller of what came in between and what is to come."""
+    own_place, other_place = own.trail_m, other.trail_m
     last = own_place.shape[0] - 1
     x1 = x + other_place[last, 0] * cos + other_place[last, 1] * sin - own_place[last, 0]
     y1 = y - other_place[last, 0] * sin + other_place[last, 1] * cos - own_place[last, 1]
     rho = math.sqrt(x1 * x1 + y1 * y1)
-    later = value_at(
-        values, 0, axes, rho, psi + other_turn - own_turn, math.atan2(x1, y1) - own_turn, own_speed, other_speed
-    )
-    if 0.5 * (math.sqrt(x * x + y * y) + rho - reach_m) < later:
+    heading, bearing = psi + other.turn_rad - own.turn_rad, math.atan2(x1, y1) - own.turn_rad
+    later = value_at(values, 0, game.axes, rho, heading, bearing, own.speed, other.speed)
+    if 0.5 * (math.sqrt(x * x + y * y) + rho - game.reach_m) < later:
         later = min(later, closest(x, y, sin, cos, own_place, other_place))
     return later
 
 
 @kernel
 def cell_value(
-    values: NDArray[Any],
-    axes: Array,
-    x: float,
-    y: float,
-    psi: float,
-    reach_m: float,
-    own_place: Array,
-    own_turn: Array,
-    own_speed: Array,
-    other_place: Array,
-    other_turn: Array,
-    other_speed: Array,
-    cooperative: bool,
-    old: float,
-    hint: int,
+    values: NDArray[Any], game: Pursuit, x: float, y: float, psi: float, a: int, b: int, old: float, hint: int
 ) -> tuple[float, int]:
     """Best the own boat can get from here, no higher than ``old``, and the rudders (own * 8 + other) of it.
 
-    Moves are rows of `moves.Moves` for one speed; ``own_speed`` holds (rudder, 2): speed cell and place in it.
-    The own rudder of the hint is tried first, each answer of the other that hurt last is tried first.
+    The boats are at their speed nodes a and b. The own rudder of the hint is tried first, each answer of the other that
+    hurt last is tried first.
     """
     sin, cos = math.sin(psi), math.cos(psi)
-    n_own, n_other = own_turn.shape[0], other_turn.shape[0]
+    n_own, n_other, cooperative = game.own.turn_rad.shape[1], game.other.turn_rad.shape[1], game.cooperative
     best, choice = -1.0, hint
     first, worst = hint // 8, hint % 8
     for step in range(n_own):
         r = (first + step) % n_own
+        own = move_of(game.own, a, r)
         low = 1e9
         if cooperative:
             low = -1.0
         answer, start = worst, worst
         for turn in range(n_other):
             s = (start + turn) % n_other
-            value = outcome(
-                values,
-                axes,
-                x,
-                y,
-                psi,
-                sin,
-                cos,
-                reach_m,
-                own_place[r],
-                own_turn[r],
-                (int(own_speed[r, 0]), own_speed[r, 1]),
-                other_place[s],
-                other_turn[s],
-                (int(other_speed[s, 0]), other_speed[s, 1]),
-            )
+            value = outcome(values, game, x, y, psi, sin, cos, own, move_of(game.other, b, s))
             if cooperative:
                 if value > low:
                     low, answer = value, s
@@ -182,15 +188,7 @@ def sweep(
     hints: NDArray[np.uint8],
     active: BoolArray,
     changed: BoolArray,
-    axes: Array,
-    own_place: Array,
-    own_turn: Array,
-    own_speed: Array,
-    other_place: Array,
-    other_turn: Array,
-    other_speed: Array,
-    cooperative: bool,
-    reach_m: float,
+    game: Pursuit,
     tolerance_m: float,
     row: int,
 ) -> float:
@@ -202,21 +200,14 @@ def sweep(
         hints: best rudders of each cell, kept from one iteration to the next.
         active: places (range, relative heading, bearing) that may change; others are skipped.
         changed: set to True for the places that did change.
-        axes: description of the grid.
-        own_place: own `Moves.place_m`.
-        own_turn: own `Moves.turn_rad`.
-        own_speed: speed cell and place in it after each own move, shape ``(speeds, rudders, 2)``.
-        other_place: the same of the other boat.
-        other_turn: the same of the other boat.
-        other_speed: the same of the other boat.
-        cooperative: whether the other boat helps.
-        reach_m: how far the two boats together can move in one step, m.
+        game: the two boats, and the grid.
         tolerance_m: smaller changes are left out, m.
         row: range index.
 
     Returns:
         The largest change, m.
     """
+    axes = game.axes
     n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
     n_own, n_other = int(axes[N_OWN]), int(axes[N_OTHER])
     largest = 0.0
@@ -232,23 +223,7 @@ def sweep(
             for a in range(n_own):
                 for b in range(n_other):
                     old = values[at]
-                    new, hints[at] = cell_value(
-                        values,
-                        axes,
-                        x,
-                        y,
-                        psi,
-                        reach_m,
-                        own_place[a],
-                        own_turn[a],
-                        own_speed[a],
-                        other_place[b],
-                        other_turn[b],
-                        other_speed[b],
-                        cooperative,
-                        old,
-                        hints[at],
-                    )
+                    new, hints[at] = cell_value(values, game, x, y, psi, a, b, old, hints[at])
                     if new < old - tolerance_m:
                         out[at] = new
                         changed[row, j, k] = True

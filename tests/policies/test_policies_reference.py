@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear.policies.scripted import layout as S
 from steerclear.policies.scripted.dispatch import command_team
-from steerclear.policies.scripted.layout import Behaviour
+from steerclear.policies.scripted.layout import Behaviour, Game
 from steerclear.shield.platforms import layout as L
 
 DATA = Path(__file__).parent / "data" / "organisers.npz"
@@ -41,10 +41,9 @@ def replay(name, codes):
         state = np.zeros((6, L.N_STATE))
         state[:, [L.X, L.Y]], state[:, L.HEADING] = run["position"][t], run["heading"][t]
         state[:, L.SPEED] = run["speed"][t]
-        command_team(
-            codes, boats, memory, given, streams, field, limits, team, state, run["is_tagged"][t], run["has_flag"][t],
-            run["on_side"][t], homes, run["flag_position"][t], ours[t],
-        )  # fmt: skip
+        seen = [run[name][t] for name in ("is_tagged", "has_flag", "on_side")]
+        game = Game(state, limits, team, *seen, homes, run["flag_position"][t], field)
+        command_team(codes, boats, memory, given, streams, game, ours[t])
     return ours, run["action"]
 
 

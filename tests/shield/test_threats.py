@@ -8,9 +8,8 @@ from shield_loops import packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
+from steerclear.shield.filter.screening import set_targets
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.screening import set_targets
-from steerclear.shield.setup import boats_of
 
 CAP_M = ShieldConfig().margin_cap_m
 
@@ -22,8 +21,7 @@ def remembered(rows, team, platform):
     shield = Shield(profile="rammers")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
     seat = shield._seats[0]
-    boats = boats_of(shield.config, fleet.platforms, tuple(team))
-    set_targets(fleet.controlled, boats, shield._tuning, seat.memory, seat.work)
+    set_targets(seat.scene)
     return decisions, seat.memory, seat.work
 
 

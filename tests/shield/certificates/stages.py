@@ -3,12 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield import Surroundings, flow, linearised, plan, screening
+from steerclear.shield import Surroundings, plan
 from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
+from steerclear.shield.filter import flow, linearised, screening
+from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.program import Program, solve
 from steerclear.shield.scene import Scene, path_samples
 from steerclear.shield.setup import boats_of, plans_of, tuning_of
 from steerclear.shield.shared import share
@@ -31,7 +32,7 @@ class Stages(NamedTuple):
     @property
     def scene(self):
         """What the stages take."""
-        return share(Scene(*self[2:]))
+        return share(Scene(*self))
 
 
 def stages_of(config, state, platforms, team, surroundings=None):
@@ -55,63 +56,38 @@ def stages_of(config, state, platforms, team, surroundings=None):
 
 def screened(at, wanted):
     """Screen the wanted commands; True when they are safe."""
-    return screening.screen(
-        at.state,
-        wanted,
-        np.zeros(len(wanted)),
-        at.ours,
-        at.boats,
-        at.fixed,
-        at.plans,
-        at.tuning,
-        at.memory,
-        at.work,
-        at.plan,
-    )
+    return screening.screen(at.scene, wanted, np.zeros(len(wanted)))
 
 
 def screened_with_all_pairs(at, wanted):
     """`screening.screen` again, with no pair left out."""
     n = len(wanted)
-    look_around(at.state, np.zeros(n), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(n))
     left_out = ~at.work.near & ~np.eye(n, dtype=bool)
     at.work.radius[left_out] = at.tuning.radius_m
     at.work.near[left_out] = True
-    screening.set_targets(at.ours, at.boats, at.tuning, at.memory, at.work)
+    screening.set_targets(at.scene)
     for i in range(n):
         at.plan.commands[i] = wanted[i]
         at.plan.slack_m[i], at.plan.moving[i] = 0.0, False
         at.plan.reason[i] = plan.PASSED if at.ours[i] else plan.NOT_COVERED
         if at.ours[i]:
-            screening.predict(i, at.plan.commands, at.state, at.boats, at.tuning, at.work)
+            screening.predict(i, at.plan.commands, at.scene)
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
     at.plan.kept_commands[:] = at.plan.commands
-    safe = assign_plans(
-        at.plan.commands,
-        1,
-        False,
-        at.ours,
-        at.state,
-        at.ours,
-        at.boats,
-        at.fixed,
-        at.plans,
-        at.tuning,
-        at.memory,
-        at.work,
-    )
+    safe = assign_plans(at.scene, 1, False, at.ours)
     return safe, int(left_out.sum()) // 2
 
 
 def checked(at, count):
     """The exact check of the candidate commands."""
-    return linearised.check(count, at.state, at.ours, at.boats, at.fixed, at.tuning, at.memory, at.work, at.plan)
+    return linearised.check(count, at.scene)
 
 
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
-    return flow.linearise(at.scene, at.state, at.ours)
+    return flow.linearise(at.scene)
 
 
 def decided(at, safe, solver="quadprog"):
@@ -124,8 +100,8 @@ def decided(at, safe, solver="quadprog"):
         z = _answer(at, count, rows, solver)
         if z is None:
             break
-        found = flow.accept(at.scene, z, count, at.state, at.ours)
-    flow.finish(at.scene, found == flow.SAFE, count, at.state, at.ours)
+        found = flow.accept(at.scene, z, count)
+    flow.finish(at.scene, found == flow.SAFE, count)
     return at.plan.commands.copy(), at.plan.reason.copy()
 
 

@@ -48,10 +48,10 @@ def test_a_hunter_holds_its_course_after_its_time():
         for time_s in TIMES_S[1:]:
             config = ShieldConfig(adversary_s=time_s, certificate="turning_circle")
             at = stages_of(config, state, ["heron"] * 2, [0, 1])
-            look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
+            look_around(at.scene, np.zeros(2))
             at.work.fear_s[:] = time_s
-            lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.state, at.boats, at.tuning, at.work)
-            clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
+            lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
+            clear_of_hunter(0, 1, 0, at.scene, -1e6, 50.0)
             margins.append(at.work.out[MARGIN])
         assert margins[-1] <= min(margins) + 0.25, "hunting for ever is the worst but for the strides of the run"
         narrowed += margins[0] > margins[-1] + 1.0

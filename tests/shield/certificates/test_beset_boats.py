@@ -7,10 +7,18 @@ import pytest
 from stages import decided, screened, stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.certificates.clearance import FAR, MARGIN
-from steerclear.shield.certificates.hunters import _run_hunter, closing, fade_over, worst_hunter
+from steerclear.shield.certificates.hunters import _run_hunter, closing, hunt_of, worst_hunter
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import look_around, worst_clearance
-from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail, trace_path
+from steerclear.shield.certificates.paths import (
+    READY_HEADING,
+    READY_SAMPLE,
+    READY_SPEED,
+    Manoeuvre,
+    Span,
+    sail,
+    trace_path,
+)
 from steerclear.shield.certificates.values import margin_at_once, out_of_reach, run_opponents, worst_at_once
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
@@ -32,13 +40,13 @@ def looked_around(*rows):
     at = stages_of(
         ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * len(rows), [0] + [1] * (len(rows) - 1)
     )
-    look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(len(rows)))
     return at
 
 
 def laid(at, side=1.0, turn_deg=90.0, speed_mps=3.0, done=0):
     at.work.next_state[0] = at.state[0]
-    lay_path(0, 0, side, turn_deg, speed_mps, done, at.state, at.boats, at.tuning, at.work)
+    lay_path(0, 0, side, turn_deg, speed_mps, done, at.scene)
 
 
 def around(random, count):
@@ -87,11 +95,9 @@ def run_and_looked_up(at, j, tables):
     """Least margin of opponent j over all its manners, by runs and by the table at their ends."""
     least, ready = 2.0, at.work.ready[0]
     lasts = int(ready[READY_SAMPLE] + at.boats.hunt_samples[0])
-    fade = fade_over(lasts, 0, at.boats)
+    hunt = hunt_of(0, j, 0, lasts, lasts, True, at.scene)
     for manner in range(6):
-        faded = _run_hunter(
-            0, j, 0, manner, lasts, lasts, fade, True, at.state, at.boats, at.tuning, at.work, -FAR, 2.0
-        )
+        faded = _run_hunter(0, j, 0, manner, hunt, at.scene, -FAR, 2.0)
         least = min(least, at.work.spare[MARGIN])
         hunter = at.work.hunter
         there = hunter[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
@@ -107,8 +113,8 @@ def rated(at):
     """Margins against the opponents on the path laid for the first boat, nothing known before."""
     at.work.hunters_known[:] = False
     at.work.looked[:] = np.nan
-    worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
-    worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+    worst_clearance(0, 0, at.scene, -FAR)
+    worst_hunter(0, 0, at.scene, -FAR)
     work = at.work
     told = work.joint_m[0], work.threat_m[0], work.fails[0], work.sealed[0], work.clear[0, MARGIN], work.bound[0]
     return (*work.threats_m[0], *told)
@@ -172,8 +178,8 @@ def test_runs_left_out_would_have_ended_at_the_cap():
         at.work.threat_target_m[0], at.work.joint_target_m[0] = 1.0, 1.5
         short, told_m = rated(at), at.boats.told_range_m.copy()
         for j in range(1, 4):
-            closing_m = closing(0, j, at.state, at.boats, at.tuning)
-            left_out += out_of_reach(0, j, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+            closing_m = closing(0, j, at.scene)
+            left_out += out_of_reach(0, j, 0, closing_m, at.scene)
         at.boats.told_range_m[:] = np.inf
         full = rated(at)
         at.boats.told_range_m[:] = told_m
@@ -186,10 +192,10 @@ def test_wider_tracks_are_not_left_out():
     far = boat(0.0, 90.0, 0.0)
     at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 20.0, 180.0), boat(15.0, 5.0, -90.0), far)
     laid(at)
-    closing_m = closing(0, 3, at.state, at.boats, at.tuning)
-    assert out_of_reach(0, 3, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+    closing_m = closing(0, 3, at.scene)
+    assert out_of_reach(0, 3, 0, closing_m, at.scene)
     at.work.radius[0, 3] += 0.01
-    assert not out_of_reach(0, 3, 0, closing_m, at.state, at.boats, at.tuning, at.work)
+    assert not out_of_reach(0, 3, 0, closing_m, at.scene)
 
 
 def test_what_is_known_of_a_path_is_what_would_be_found_again():
@@ -201,8 +207,8 @@ def test_what_is_known_of_a_path_is_what_would_be_found_again():
         fresh = rated(at)
         assert at.work.hunters_known[0]
         at.work.clear[0, MARGIN], at.work.bound[0] = FAR, -1
-        worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
-        worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
+        worst_clearance(0, 0, at.scene, -FAR)
+        worst_hunter(0, 0, at.scene, -FAR)
         assert (at.work.clear[0, MARGIN], at.work.bound[0]) == fresh[-2:]
         assert (*at.work.threats_m[0],) == fresh[: len(at.state)]
 
@@ -211,8 +217,8 @@ def test_nothing_is_known_of_a_path_whose_search_stopped_or_of_another_path():
     at = looked_around(boat(0.0, 0.0, 0.0), boat(0.0, 8.0, 180.0), boat(6.0, 5.0, -90.0))
     laid(at)
     at.work.threat_target_m[0] = 1.0
-    worst_clearance(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, -FAR)
-    worst_hunter(0, 0, at.state, at.ours, at.boats, at.tuning, at.work, 0.5)
+    worst_clearance(0, 0, at.scene, -FAR)
+    worst_hunter(0, 0, at.scene, 0.5)
     assert at.work.fails[0]
     assert not at.work.hunters_known[0]
     rated(at)
@@ -220,7 +226,7 @@ def test_nothing_is_known_of_a_path_whose_search_stopped_or_of_another_path():
     laid(at, -1.0)
     assert not at.work.hunters_known[0]
     rated(at)
-    run_opponents(1, at.ours, at.state, at.boats, at.tuning, at.work, at.work.ways)
+    run_opponents(1, at.scene)
     assert not at.work.hunters_known[0]
 
 
@@ -269,9 +275,13 @@ def test_nothing_is_noted_beyond_the_end_of_a_path(speed_mps, turn_deg):
         path, ready = np.full((samples + 1, 2), np.nan), np.full(4, -1.0)
         for earliest in range(samples + 1):
             trace_path(
-                at.boats.params[0], at.state[0].copy(), 1.0, turn_deg, 3.0, 0.1, 1, at.boats.stride, samples, samples,
-                0, samples, earliest, at.boats.ready_thrust[0], path, ready,
-            )  # fmt: skip
+                at.boats.params[0],
+                at.state[0].copy(),
+                Manoeuvre(1.0, turn_deg, 3.0),
+                Span(0.1, 1, at.boats.stride, samples, samples, 0, samples, earliest, at.boats.ready_thrust[0]),
+                path,
+                ready,
+            )
             assert ready[READY_SAMPLE] <= samples
             assert np.isfinite(path).all()
     hunt, thrust = at.boats.hunt_samples.copy(), at.boats.thrust_samples.copy()

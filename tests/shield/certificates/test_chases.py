@@ -10,7 +10,7 @@ from steerclear.shield.certificates.clearance import MARGIN
 from steerclear.shield.certificates.hunters import clear_of_hunter
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import look_around
-from steerclear.shield.certificates.paths import sail, trace_path
+from steerclear.shield.certificates.paths import Manoeuvre, Span, sail, trace_path
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
@@ -59,11 +59,12 @@ def any_boat(random, params):
 def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, seed):
     """The speed of what is left of the way settles geometrically: no step of the model is needed for it."""
     random, params = np.random.default_rng(seed), get_platform(platform).pack()
+    span = Span(0.1, 1, 2, 217, 28, 151, 30, 0, 85.0)
     for _ in range(80):
         row, speed = any_boat(random, params)
         togo = random.choice([0.0, 30.0, 90.0, 180.0])
         path, ready = np.full((400, 2), np.nan), np.zeros(4)
-        trace_path(params, row.copy(), 1.0, togo, speed, 0.1, 1, 2, 217, 28, 151, 30, 0, 85.0, path, ready)
+        trace_path(params, row.copy(), Manoeuvre(1.0, togo, speed), span, path, ready)
         last = 217 if ready[0] < 0 else min(217, max(28, int(ready[0]) + 151))
         assert np.isfinite(path[: last + 1]).all()
         for k in range(last + 1):
@@ -104,9 +105,9 @@ def told_m(bearing_deg, far_m, **settings):
     own[L.THRUST] = other[L.THRUST] = 100.0
     rows = np.array([own, other])
     at = stages_of(ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, **settings}), rows, ["heron"] * 2, [0, 1])
-    look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
-    lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.state, at.boats, at.tuning, at.work)
-    clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
+    look_around(at.scene, np.zeros(2))
+    lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
+    clear_of_hunter(0, 1, 0, at.scene, -1e6, 50.0)
     return float(at.work.out[MARGIN])
 
 

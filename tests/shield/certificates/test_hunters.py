@@ -58,10 +58,10 @@ def modelled(name, own, hunter, side, turn_deg):
         (name, name),
         (0, 1),
     )
-    look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(2))
     top = get_platform(name).max_speed_mps
-    lay_path(0, 0, side, turn_deg, top, 0, at.state, at.boats, at.tuning, at.work)
-    clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
+    lay_path(0, 0, side, turn_deg, top, 0, at.scene)
+    clear_of_hunter(0, 1, 0, at.scene, -1e6, 50.0)
     return at.work.out[MARGIN], int(at.boats.hunt_samples[0]) * at.boats.stride
 
 

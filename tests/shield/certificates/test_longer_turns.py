@@ -40,11 +40,11 @@ def scenes(name, count, thrust=100.0):
 def rated(at, p, top, done):
     """Merit of manoeuvre number p of boat 0, nothing cut short, with what it gains by the hysteresis."""
     heading = at.work.next_state[0, L.HEADING] if done else at.state[0, L.HEADING]
-    side, togo, speed = candidate(0, p, top, heading, at.boats, at.plans, at.memory)
+    side, togo, speed = candidate(0, p, top, heading, at.scene)
     trial = len(at.state)
-    lay_path(0, trial, side, togo, speed, done, at.state, at.boats, at.tuning, at.work)
-    merit = rate_path(0, trial, -1e9, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work)
-    return merit, merit + preference(0, p, side, togo, merit, at.boats, at.tuning, at.memory)
+    lay_path(0, trial, side, togo, speed, done, at.scene)
+    merit = rate_path(0, trial, -1e9, at.scene)
+    return merit, merit + preference(0, p, side, togo, merit, at.scene)
 
 
 CASES = pytest.mark.parametrize(
@@ -78,11 +78,11 @@ def test_the_best_of_all_is_found(name, thrust, done):
         heading = at.work.next_state[0, L.HEADING] if done else at.state[0, L.HEADING]
         first = 0 if remembered(0, done, heading, at.memory) else 1
         best = max(rated(at, p, top, done)[1] for p in range(first, at.boats.plans[0] + 1))
-        choose_plan(0, top, done, True, at.state, at.ours, at.boats, at.fixed, at.plans, at.tuning, at.memory, at.work)
+        choose_plan(0, top, done, True, at.scene)
         chosen = rated_as_chosen(at)
         assert chosen == pytest.approx(best, abs=at.tuning.hysteresis_m + 1e-9)
         assert at.work.merit[0] == pytest.approx(chosen, abs=1e-9)
 
 
 def rated_as_chosen(at):
-    return rate_path(0, 0, -1e9, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work)
+    return rate_path(0, 0, -1e9, at.scene)

@@ -72,7 +72,7 @@ def test_a_manoeuvre_is_worth_the_same_as_far_as_it_counts(crew):
             found = set()
             for j, manner in orders():
                 first(at, j, manner)
-                merit = rate_path(0, 0, best, at.state, at.ours, at.boats, at.fixed, at.tuning, at.work)
+                merit = rate_path(0, 0, best, at.scene)
                 short = merit <= best
                 cut += short
                 found.add((best,) if short else (merit, at.work.clear[0, MARGIN], at.work.bound[0]))
@@ -89,20 +89,7 @@ def test_the_same_manoeuvre_is_chosen(crew, done):
             found = set()
             for j, manner in orders():
                 first(at, j, manner)
-                choose_plan(
-                    0,
-                    top,
-                    done,
-                    exhaustive,
-                    at.state,
-                    at.ours,
-                    at.boats,
-                    at.fixed,
-                    at.plans,
-                    at.tuning,
-                    at.memory,
-                    at.work,
-                )
+                choose_plan(0, top, done, exhaustive, at.scene)
                 found.add((*at.work.plan[0], at.work.merit[0], at.work.clear[0, MARGIN], at.work.bound[0]))
                 changed += at.work.first_hunter[0] != j
             assert len(found) == 1

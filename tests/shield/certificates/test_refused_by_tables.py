@@ -35,7 +35,7 @@ def most_merit(at):
     """What the merit of the trial cannot exceed, and from how many look-ups that is known."""
     margins, fails = [FAR], False
     for j in range(1, 4):
-        if at.work.near[0, j] and looked_up(0, j, TRIAL, at.ours, at.boats, at.work):
+        if at.work.near[0, j] and looked_up(0, j, TRIAL, at.boats, at.work):
             margin = margin_at_once(0, j, TRIAL, -FAR, at.boats, at.work)
             fails = fails or margin < at.work.threat_target_m[0, j]
             margins.append(margin)
@@ -47,12 +47,12 @@ def test_the_answer_is_that_of_all_look_ups(done):
     answers = []
     for at, random in scenes(150):
         for side, togo in ((1.0, 0.0), (1.0, 90.0), (-1.0, 45.0), (-0.5, 180.0)):
-            set_out(0, TRIAL, side, togo, 3.0, done, at.state, at.boats, at.tuning, at.work)
+            set_out(0, TRIAL, side, togo, 3.0, done, at.scene)
             most = most_merit(at)
             at.work.first_refuser[0] = random.integers(0, 4)
             near = () if most > PAIR_SAFE else (most - 1e-4, most, most + 1e-4)
             for best in (-1e9, 50.0, STRAIGHT_SAFE, *near, STRAIGHT_BASE, 700.0, PAIR_SAFE):
-                refused = refused_by_tables(0, TRIAL, best, at.ours, at.boats, at.work)
+                refused = refused_by_tables(0, TRIAL, best, at.scene)
                 assert refused == (most <= best)
                 answers.append(refused)
     assert 0.1 < np.mean(answers) < 0.9

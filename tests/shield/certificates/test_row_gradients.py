@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed
 from stages import built, screened, stages_of
-from steerclear.shield import ShieldConfig, Surroundings, rows, screening
+from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.certificates.clearance import FAR, MARGIN
 from steerclear.shield.certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import clear_of_boat
 from steerclear.shield.certificates.values import WAYS, set_place, table_margin
+from steerclear.shield.filter import rows, screening
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -36,7 +37,7 @@ class Linearised:
 
     def __init__(self, at, count, rows_built):
         self.at, self.count = at, count
-        self.row = next(r for r in range(rows_built) if at.plan.kind[r] != rows.BOX_ROW)
+        self.row = next(r for r in range(rows_built) if at.plan.label[r, 1] != rows.LIMITS)
         self.manoeuvres = at.work.plan[: len(at.state)].copy()
         self.z = at.plan.z_now[: 2 * count].copy()
 
@@ -50,27 +51,27 @@ class Linearised:
             speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
             turn = z[2 * m] * at.plan.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
-            screening.predict(i, commands, at.state, at.boats, at.tuning, at.work)
-            lay_path(i, i, *self.manoeuvres[i], 1, at.state, at.boats, at.tuning, at.work)
+            screening.predict(i, commands, at.scene)
+            lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
 
     def margin(self, z):
         """Exact margin of the row's boat from what the row is about."""
         at = self.at
         self.move(z)
         i, j = at.plan.label[self.row]
-        if j != rows.NOBODY:
-            clear_of_boat(i, j, at.work.path[i], at.state, at.ours, at.boats, at.tuning, at.work, -FAR, FAR)
-        elif at.plan.kind[self.row] == rows.PAIR_ROW:
-            clear_of_near_obstacles(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
+        if j >= 0:
+            clear_of_boat(i, j, at.work.path[i], at.scene, -FAR, FAR)
+        elif j == rows.NEAR_OBSTACLES:
+            clear_of_near_obstacles(i, i, at.scene, at.work.out)
         else:
-            clear_of_fixed(i, i, at.state, at.boats, at.fixed, at.work, at.work.out)
+            clear_of_fixed(i, i, at.scene, at.work.out)
         return at.work.out[MARGIN]
 
     def gradients(self):
         """(coefficients of the row before it was scaled, finite differences), each (2 movers,)."""
         at, r, n = self.at, self.row, 2 * self.count
         C, d = at.plan.C[r, :n].copy(), at.plan.d[r]
-        target = at.work.target[at.plan.label[r, 0]] if at.plan.kind[r] == rows.PAIR_ROW else 0.0
+        target = at.work.target[at.plan.label[r, 0]] if at.plan.label[r, 1] != rows.FIXED_THINGS else 0.0
         aim_m = rows.AIM_M if at.plan.label[r, 1] >= 0 else rows.FIXED_AIM_M
         lack = target + aim_m - self.margin(self.z)
         scale = lack / (d - C @ self.z)
@@ -121,7 +122,7 @@ def table_row_gradients(task, way):
 
     def margin(z):
         task.move(z)
-        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.state, at.boats, at.tuning, at.work)
+        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.scene)
         return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
 
     now = margin(task.z)
@@ -171,9 +172,15 @@ def flag(y):
 
 
 @pytest.mark.parametrize(
-    ("around", "kind"), [(edge, rows.FIXED_ROW), (rule, rows.FIXED_ROW), (wall, rows.PAIR_ROW), (flag, rows.PAIR_ROW)]
+    ("around", "about"),
+    [
+        (edge, rows.FIXED_THINGS),
+        (rule, rows.FIXED_THINGS),
+        (wall, rows.NEAR_OBSTACLES),
+        (flag, rows.NEAR_OBSTACLES),
+    ],
 )
-def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around, kind):
+def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around, about):
     random, told, measured = np.random.default_rng(3), [], []
     for _ in range(60):
         state = np.zeros((1, L.N_STATE))
@@ -182,7 +189,7 @@ def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around,
         if screened(at, np.array([[2.9, 1.0]])):
             continue
         task = Linearised(at, *built(at))
-        if at.plan.kind[task.row] == kind:
+        if at.plan.label[task.row, 1] == about:
             a, b = task.gradients()
             told.append(a[0])
             measured.append(b[0])
@@ -197,7 +204,7 @@ def test_rows_are_of_unit_length_and_limits_are_exact():
     count, found = built(task.at)
     norms = np.linalg.norm(plan.C[:found, :n], axis=1)
     np.testing.assert_allclose(norms, 1.0, atol=1e-12)
-    boxes = plan.kind[:found] == rows.BOX_ROW
+    boxes = plan.label[:found, 1] == rows.LIMITS
     assert boxes.sum() == 4 * count
     root = np.sqrt(task.at.tuning.speed_weight)
     for z, inside in (([0.5, 0.5 * root] * 2, True), ([1.01, 0.0] * 2, False), ([0.0, 1.01 * root] * 2, False)):

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.certificates.clearance import MARGIN
+from steerclear.shield.certificates.clearance import MARGIN, Search
 from steerclear.shield.certificates.hunters import (
     FORGOTTEN_LOSS,
     RUDDERS,
     _run_hunter,
     clear_of_hunter,
     closing,
-    fade_over,
+    hunt_of,
 )
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.certificates.paths import READY_SAMPLE
-from steerclear.shield.certificates.pursuer import CHASE_STRIDE, clear_of_pursuer, stays_away
+from steerclear.shield.certificates.pursuer import CHASE_STRIDE, Hunt, Pursuer, clear_of_pursuer, stays_away
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
@@ -35,9 +35,9 @@ def scene(own, other, random):
         state[row] = fresh_state(x, y, random.uniform(-180.0, 180.0), random.uniform(0.0, 1.0) * top)
         state[row, [L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = random.uniform(0.0, 100.0), 0.0, 0.0
     at = stages_of(ShieldConfig(profile="rammers", certificate="turning_circle"), state, (own, other), (0, 1))
-    look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(2))
     side, turn = random.choice([-1.0, 1.0]), random.choice([0.0, 45.0, 120.0, 180.0])
-    lay_path(0, 0, side, turn, get_platform(own).max_speed_mps, 0, at.state, at.boats, at.tuning, at.work)
+    lay_path(0, 0, side, turn, get_platform(own).max_speed_mps, 0, at.scene)
     return at
 
 
@@ -52,15 +52,15 @@ def followed(at):
 def margins_of_all_runs(at):
     """Margins of all manners of hunting that count, each run through."""
     closely, lasts = followed(at)
-    fade, rudders = fade_over(lasts, 0, at.boats), len(RUDDERS) - 1
+    hunt, rudders = hunt_of(0, 1, 0, lasts, closely, False, at.scene), len(RUDDERS) - 1
     for manner in range(2 * (rudders if at.boats.granted_loss[1] > FORGOTTEN_LOSS else 1)):
-        _run_hunter(0, 1, 0, manner, lasts, closely, fade, False, at.state, at.boats, at.tuning, at.work, -1e6, CAP_M)
+        _run_hunter(0, 1, 0, manner, hunt, at.scene, -1e6, CAP_M)
         yield at.work.spare[MARGIN]
 
 
 def is_away(at, lasts):
     way = max(at.boats.params[1, L.MAX_SPEED], at.state[1, L.SPEED]) * at.boats.sample_s
-    closing_m, radius_m = closing(0, 1, at.state, at.boats, at.tuning), at.work.radius[0, 1]
+    closing_m, radius_m = closing(0, 1, at.scene), at.work.radius[0, 1]
     return stays_away(at.work.path[0], *at.work.course[1, :2], way, lasts, closing_m, radius_m, CAP_M)
 
 
@@ -87,7 +87,7 @@ def test_the_clearance_from_a_hunter_is_the_least_of_all_runs(own, other):
         at = scene(own, other, random)
         if not at.work.near[0, 1]:
             continue
-        clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, CAP_M)
+        clear_of_hunter(0, 1, 0, at.scene, -1e6, CAP_M)
         told, least = at.work.out[MARGIN], min(margins_of_all_runs(at))
         assert told == least
         short += least < CAP_M
@@ -103,9 +103,9 @@ def test_a_stride_that_cuts_off_a_way_round_the_hunter_counts():
     own = far_m * np.column_stack([np.cos(angles), np.sin(angles)])
     assert (np.linalg.norm(np.diff(own, axis=0), axis=1) < closing_m).all()
     assert (np.linalg.norm(own, axis=1) > radius_m + CAP_M + closing_m).all()
-    at_rest, out, end = (0.0,) * 6, np.zeros(4), np.zeros(5)
-    hunt = (False, 1.0, 0.2, CHASE_STRIDE, CHASE_STRIDE, 0, closing_m, radius_m, 1.0, -1e6, CAP_M, False)
-    clear_of_pursuer(own, 0.0, 0.0, 0.0, 1.0, *at_rest, *hunt, end, out)
+    at_rest, out, end = Pursuer(0.0, 0.0, 0.0, 1.0, *(0.0,) * 6, False), np.zeros(4), np.zeros(5)
+    hunt = Hunt(0.2, CHASE_STRIDE, CHASE_STRIDE, 0, 1.0, 1.0, False)
+    clear_of_pursuer(own, at_rest, hunt, Search(closing_m, radius_m, -1e6, CAP_M), end, out)
     assert out[MARGIN] < CAP_M
     assert not stays_away(own, 0.0, 0.0, 0.0, CHASE_STRIDE, closing_m, radius_m, CAP_M)
 
@@ -114,8 +114,8 @@ def test_who_may_come_near_is_run_through():
     """Close by: the answer is that of the runs, below the cap."""
     at = scene("heron", "surveyor", np.random.default_rng(1))
     at.state[1, [L.X, L.Y]] = at.state[0, [L.X, L.Y]] + [0.0, 4.0]
-    look_around(at.state, np.zeros(2), at.ours, at.boats, at.tuning, at.work)
-    clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, CAP_M)
+    look_around(at.scene, np.zeros(2))
+    clear_of_hunter(0, 1, 0, at.scene, -1e6, CAP_M)
     assert at.work.out[MARGIN] < CAP_M
     assert not is_away(at, int(at.boats.hunt_samples[0]))
 

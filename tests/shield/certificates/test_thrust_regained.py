@@ -10,7 +10,7 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.certificates.clearance import MARGIN
-from steerclear.shield.certificates.hunters import _run_hunter, clear_of_hunter, fade_over
+from steerclear.shield.certificates.hunters import _run_hunter, clear_of_hunter, hunt_of
 from steerclear.shield.certificates.laying import HUNTERS, HUNTERS_TILL_READY, NO_HUNTERS, hunters_run, lay_path
 from steerclear.shield.certificates.manoeuvre import look_around
 from steerclear.shield.certificates.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
@@ -44,12 +44,12 @@ def stages(*rows, other="surveyor", **settings):
         ["surveyor"] + [other] * (len(rows) - 1),
         [0] + [1] * (len(rows) - 1),
     )
-    look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(len(rows)))
     return at
 
 
 def laid(at, side=1.0, turn_deg=90.0, speed_mps=3.0, done=0):
-    lay_path(0, 0, side, turn_deg, speed_mps, done, at.state, at.boats, at.tuning, at.work)
+    lay_path(0, 0, side, turn_deg, speed_mps, done, at.scene)
 
 
 @pytest.mark.parametrize(("side", "turn_deg"), [(1.0, 0.0), (-1.0, 90.0), (0.5, 180.0)])
@@ -87,16 +87,15 @@ def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends()
             opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + random.uniform(90.0, 270.0)),
         )
         laid(at, 1.0, 90.0)
-        seen = at.state, at.boats, at.tuning, at.work, -1e6, 1e6
         lasts = int(at.boats.hunt_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
-        runs, values = [], []
+        runs, values, hunt = [], [], hunt_of(0, 1, 0, lasts, lasts, True, at.scene)
         for manner in range(6):
-            faded = _run_hunter(0, 1, 0, manner, lasts, lasts, fade_over(lasts, 0, at.boats), True, *seen)
+            faded = _run_hunter(0, 1, 0, manner, hunt, at.scene, -1e6, 1e6)
             runs.append(at.work.spare[MARGIN])
             margin = value_margin(at, tables)
             if margin is not None:
                 values.append(margin if margin >= 0.0 else margin * faded)
-        clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 1e6)
+        clear_of_hunter(0, 1, 0, at.scene, -1e6, 1e6)
         assert at.work.out[MARGIN] == pytest.approx(min(runs + values), abs=1e-9)
         from_value += bool(values) and min(values) < min(runs)
         from_run += not values or min(runs) < min(values)
@@ -121,7 +120,7 @@ def nimble(thrust, speed_mps, *others):
     row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
     rows = np.array([row, *others])
     at = stages_of(ShieldConfig(profile="rammers"), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
-    look_around(at.state, np.zeros(len(rows)), at.ours, at.boats, at.tuning, at.work)
+    look_around(at.scene, np.zeros(len(rows)))
     return at
 
 
@@ -151,7 +150,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
     for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
         at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
         laid(at, 1.0, 0.0, 2.0)
-        clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
+        clear_of_hunter(0, 1, 0, at.scene, -1e6, 50.0)
         assert (at.work.out[MARGIN] < 0.0) == fails
 
 
@@ -198,10 +197,8 @@ def test_margins_of_long_hunts_fade_as_much_by_their_end():
         laid(at, 1.0, 0.0, 2.0)
         hunt, build = herons_samples(at)
         lasts = min(int(at.work.ready[0, READY_SAMPLE]) + hunt, hunt + build)
-        fade = fade_over(lasts, 0, at.boats)
-        faded.append(
-            _run_hunter(0, 1, 0, 0, lasts, lasts, fade, False, at.state, at.boats, at.tuning, at.work, -1e6, 1e6)
-        )
+        hunt = hunt_of(0, 1, 0, lasts, lasts, False, at.scene)
+        faded.append(_run_hunter(0, 1, 0, 0, hunt, at.scene, -1e6, 1e6))
     np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
 
 
@@ -209,7 +206,7 @@ def test_a_boat_that_never_gets_its_thrust_back_is_run_through_to_the_end():
     at = stages(slow_boat(), opponent(0.0, 30.0, 180.0))
     laid(at, 1.0, 0.0, 0.0)
     assert at.work.ready[0, READY_SAMPLE] == -1.0
-    clear_of_hunter(0, 1, 0, at.state, at.ours, at.boats, at.tuning, at.work, -1e6, 50.0)
+    clear_of_hunter(0, 1, 0, at.scene, -1e6, 50.0)
     assert at.work.out[MARGIN] < 0.0
 
 

@@ -10,20 +10,18 @@ import math
 
 import numpy as np
 
+from ..certificates.clearance import MARGIN
+from ..certificates.effort import all_spent
+from ..certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
+from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..liveness.right_of_way import forget_pressing, note_pressing
+from ..plan import BEST_EFFORT, ESCAPE, QP, unchanged
+from ..platforms import layout as L
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 from .backup import back_up, mark_answer, opposed
-from .certificates.clearance import MARGIN
-from .certificates.effort import all_spent
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
-from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
-from .memory import Memory
-from .plan import BEST_EFFORT, ESCAPE, QP, Plan, unchanged
-from .platforms import layout as L
-from .platforms.usv import wrap_degrees
-from .right_of_way import forget_pressing, note_pressing
-from .scene import Boats, Scene, Tuning
 from .screening import screen
-from .work import Work
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups take over."""
@@ -39,12 +37,13 @@ LEAST_TURN_DEG = 1e-3
 
 
 @lean_kernel
-def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work, plan: Plan) -> None:
+def commit(scene: Scene) -> None:
     """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
 
     Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
     of a manoeuvre are not: another may trade one for the other, so for other boats the least counts for all.
     """
+    ours, boats, memory, work, plan = scene.ours, scene.boats, scene.memory, scene.work, scene.plan
     for i in range(ours.shape[0]):
         if not ours[i]:
             memory.kept[i] = False
@@ -67,70 +66,76 @@ def commit(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, memory: 
         else:
             memory.threat_m[i, :] = work.threat_m[i]
         memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
-        note_pressing(i, state, ours, tuning, memory, work, plan)
+        note_pressing(i, scene)
 
 
 @lean_kernel
-def _note_causes(ours: BoolArray, work: Work, plan: Plan) -> None:
+def _note_causes(scene: Scene) -> None:
     """Note what each boat's wanted command is short of."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
         plan.cause[i] = work.bound[i] if ours[i] and work.merit[i] < PAIR_SAFE else -1
 
 
 @lean_kernel
-def _tell_of_fixed_things(ours: BoolArray, work: Work, plan: Plan) -> None:
+def _tell_of_fixed_things(scene: Scene) -> None:
     """Say of a command that was changed for fixed things, and keeps them now, that these bind and no boat."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
         if ours[i] and plan.cause[i] == FIXED_THING and work.merit[i] >= PAIR_SAFE and not unchanged(i, plan):
             work.bound[i] = FIXED_THING
 
 
 @lean_kernel
-def finish(scene: Scene, safe: bool, count: int, state: Array, ours: BoolArray) -> None:
+def finish(scene: Scene, safe: bool, count: int) -> None:
     """Name the reasons of a checked answer, or send the backups without one; then remember the escapes."""
-    boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
     if safe:
-        mark_answer(count, QP, plan)
+        mark_answer(count, QP, scene.plan)
     else:
-        count = pick_movers(ours, work, plan)
-        back_up(count, state, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan)
-    _tell_of_fixed_things(ours, work, plan)
-    commit(state, ours, boats, tuning, memory, work, plan)
+        count = pick_movers(scene)
+        back_up(count, scene)
+    _tell_of_fixed_things(scene)
+    commit(scene)
+
+
+@lean_kernel
+def _take_in(state: Array, ours: BoolArray, scene: Scene) -> None:
+    """Note what is to be decided about."""
+    for i in range(ours.shape[0]):
+        copy_row(scene.state[i], state[i])
+        scene.ours[i] = ours[i]
 
 
 @lean_kernel
 def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> int:
     """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_BACK_UP`."""
-    boats, tuning, memory, work, plan = scene.boats, scene.tuning, scene.memory, scene.work, scene.plan
-    if screen(state, wanted, margin_m, ours, boats, scene.fixed, scene.plans, tuning, memory, work, plan):
-        plan.cause[:] = -1
-        finish(scene, True, 0, state, ours)
+    _take_in(state, ours, scene)
+    if screen(scene, wanted, margin_m):
+        scene.plan.cause[:] = -1
+        finish(scene, True, 0)
         return PASSES
-    _note_causes(ours, work, plan)
-    return TO_BACK_UP if opposed(ours, plan) else TO_SOLVE
+    _note_causes(scene)
+    return TO_BACK_UP if opposed(ours, scene.plan) else TO_SOLVE
 
 
 @lean_kernel
-def linearise(scene: Scene, state: Array, ours: BoolArray) -> tuple[int, int]:
+def linearise(scene: Scene) -> tuple[int, int]:
     """Rows about the candidate commands: how many boats take part, and how many rows.
 
     -1 when there are too many, or the decision has cost its limit.
     """
     if all_spent(scene.tuning, scene.work):
         return 0, -1
-    count = pick_movers(ours, scene.work, scene.plan)
-    return count, build(count, state, ours, scene.boats, scene.fixed, scene.tuning, scene.work, scene.plan)
+    count = pick_movers(scene)
+    return count, build(count, scene)
 
 
 @lean_kernel
-def accept(scene: Scene, z: Array, count: int, state: Array, ours: BoolArray) -> int:
+def accept(scene: Scene, z: Array, count: int) -> int:
     """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`."""
-    boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    if not take_answer(z, count, state, boats, tuning, plan):
+    if not take_answer(z, count, scene):
         return NO_ANSWER
-    if check(count, state, ours, boats, scene.fixed, tuning, scene.memory, work, plan):
-        return SAFE
-    return UNSAFE
+    return SAFE if check(count, scene) else UNSAFE
 
 
 @lean_kernel
@@ -141,10 +146,10 @@ def decide_compiled(scene: Scene, state: Array, wanted: Array, margin_m: Array, 
         return
     found, count = UNSAFE, 0
     for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-        count, rows = linearise(scene, state, ours)
+        count, rows = linearise(scene)
         if rows < 0 or not solve_compiled(count, rows, scene.plan):
             break
-        found = accept(scene, scene.plan.z, count, state, ours)
+        found = accept(scene, scene.plan.z, count)
         if found != UNSAFE:
             break
-    finish(scene, found == SAFE, count, state, ours)
+    finish(scene, found == SAFE, count)

@@ -6,18 +6,16 @@ the program, which are linear, then find no answer, and a boat that wants throug
 
 from __future__ import annotations
 
-from .certificates.effort import all_spent
-from .certificates.rating import PAIR_SAFE, worst_merit
-from .jit import Array, BoolArray, lean_kernel
+from ..certificates.effort import all_spent
+from ..certificates.rating import PAIR_SAFE, worst_merit
+from ..jit import lean_kernel
+from ..plan import Plan
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 from .linearised import check
-from .memory import Memory
-from .plan import Plan
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn
-from .platforms.usv import wrap_degrees
-from .scene import Boats, Fixed, Tuning
 from .screening import set_targets
-from .work import Work
 
 LOOKS = 6
 """Looks for the least share of an escape, the first at none of it: to a 32nd of the way."""
@@ -39,8 +37,9 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 
 
 @lean_kernel
-def _go_back(share: float, i: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> None:
+def _go_back(share: float, i: int, scene: Scene) -> None:
     """Command of boat i that share of the way back from its escape, ``plan.eased``."""
+    state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
     speed = plan.eased[i, 1] + share * (plan.kept_commands[i, 0] - plan.eased[i, 1])
     speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
@@ -49,8 +48,9 @@ def _go_back(share: float, i: int, state: Array, boats: Boats, tuning: Tuning, p
 
 
 @lean_kernel
-def _no_worse(ours: BoolArray, work: Work, plan: Plan) -> bool:
+def _no_worse(scene: Scene) -> bool:
     """Whether no boat of ours has less than with all escapes."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
     worse = False
     for i in range(ours.shape[0]):
         worse = worse or (ours[i] and work.merit[i] < plan.eased[i, 2] - NO_WORSE)
@@ -58,26 +58,16 @@ def _no_worse(ours: BoolArray, work: Work, plan: Plan) -> bool:
 
 
 @lean_kernel
-def _ease_one(
-    i: int,
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> None:
+def _ease_one(i: int, count: int, scene: Scene) -> None:
     """Bring boat i's command as near to the wanted one as is no worse for any boat of ours."""
+    plan = scene.plan
     speed, heading = plan.commands[i, 0], plan.commands[i, 1]
     kept, too_far, at = 0.0, 2.0, 0.0
     for _ in range(LOOKS):
         at = 0.5 * (kept + too_far)
-        _go_back(at, i, state, boats, tuning, plan)
-        check(count, state, ours, boats, fixed, tuning, memory, work, plan)
-        if _no_worse(ours, work, plan):
+        _go_back(at, i, scene)
+        check(count, scene)
+        if _no_worse(scene):
             kept = at
         else:
             too_far = at
@@ -85,32 +75,23 @@ def _ease_one(
             return
     if at == kept:
         return
-    _go_back(kept, i, state, boats, tuning, plan)
+    _go_back(kept, i, scene)
     if kept == 0.0:
         plan.commands[i, 0], plan.commands[i, 1] = speed, heading
-    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+    check(count, scene)
 
 
 @lean_kernel
-def ease(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> None:
+def ease(count: int, scene: Scene) -> None:
     """Take back of the movers' escapes, boat by boat, what is not needed to keep what they keep.
 
     Margins from boats are those that have to be kept, as when the wanted commands were screened; escapes that do not
     keep them are carried out as they are. Of fixed things only their distance is asked for.
     """
-    set_targets(ours, boats, tuning, memory, work)
+    state, ours, tuning, work, plan = scene.state, scene.ours, scene.tuning, scene.work, scene.plan
+    set_targets(scene)
     work.fixed_target_m[:] = 0.0
-    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+    check(count, scene)
     if worst_merit(ours, work) < PAIR_SAFE:
         return
     for i in range(ours.shape[0]):
@@ -121,4 +102,4 @@ def ease(
         i = plan.movers[m]
         plan.eased[i, 0] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
         plan.eased[i, 1] = plan.commands[i, 0]
-        _ease_one(i, count, state, ours, boats, fixed, tuning, memory, work, plan)
+        _ease_one(i, count, scene)

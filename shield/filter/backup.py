@@ -14,24 +14,22 @@ import math
 
 import numpy as np
 
-from .certificates.assign import assign_plans
-from .certificates.candidates import candidate, remembered
-from .certificates.clearance import MARGIN
-from .certificates.effort import all_spent
-from .certificates.fixed_things import clear_of_near_obstacles
-from .certificates.laying import lay_path
-from .certificates.manoeuvre import could_meet, told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, rate_path, worst_merit
-from .certificates.values import run_opponents
+from ..certificates.assign import assign_plans
+from ..certificates.candidates import candidate, remembered
+from ..certificates.clearance import MARGIN
+from ..certificates.effort import all_spent
+from ..certificates.fixed_things import clear_of_near_obstacles
+from ..certificates.laying import lay_path
+from ..certificates.manoeuvre import could_meet, told_margin
+from ..certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, rate_path, worst_merit
+from ..certificates.values import run_opponents
+from ..jit import BoolArray, lean_kernel
+from ..plan import BEST_EFFORT, ESCAPE, Plan, unchanged
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn, full_turn
+from ..scene import Scene
 from .easing import ease
-from .jit import Array, BoolArray, lean_kernel
 from .linearised import check, list_movers
-from .memory import Memory
-from .plan import BEST_EFFORT, ESCAPE, Plan, unchanged
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn, full_turn
-from .scene import Boats, Fixed, Tuning
-from .work import Work
 
 
 @lean_kernel
@@ -66,51 +64,37 @@ def mark_answer(count: int, reason: int, plan: Plan) -> None:
 
 
 @lean_kernel
-def _given_up(i: int, state: Array, boats: Boats, fixed: Fixed, work: Work) -> float:
+def _given_up(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and fixed things, m."""
+    state, work = scene.state, scene.work
     least = min(told_margin(i, state, work), work.fixed[i, MARGIN])
     if work.merit[i] < FIXED_LOST and work.bound[i] == FIXED_THING:  # of an obstacle near in time nothing is noted
-        clear_of_near_obstacles(i, i, state, boats, fixed, work, work.spare2)
+        clear_of_near_obstacles(i, i, scene, work.spare2)
         least = min(least, work.spare2[MARGIN])
     return max(0.0, -least)
 
 
 @lean_kernel
-def first_move(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
-    """Command of the first step of boat i's manoeuvre, through the autopilot's inverse."""
+def set_off(i: int, scene: Scene) -> None:
+    """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
+    state, boats, tuning, work, plan = scene.state, scene.boats, scene.tuning, scene.work, scene.plan
     side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
+    plan.held[i, 0], plan.held[i, 1], plan.held[i, 2] = side, np.nan, speed
     if togo > 0.0:
+        plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side)
         togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
     plan.commands[i, 0] = speed
     plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
 
 
 @lean_kernel
-def set_off(i: int, state: Array, boats: Boats, tuning: Tuning, work: Work, plan: Plan) -> None:
-    """Make boat i's command and plan those of its backup manoeuvre."""
-    first_move(i, state, boats, tuning, work, plan)
-    side, togo = work.plan[i, 0], work.plan[i, 1]
-    plan.held[i, 0], plan.held[i, 2] = side, work.plan[i, 2]
-    plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
-
-
-@lean_kernel
-def _could_keep(
-    i: int,
-    slot: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    work: Work,
-    plan: Plan,
-) -> float:
+def _could_keep(i: int, slot: int, scene: Scene) -> float:
     """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
     for j in range(ours.shape[0]):
         if ours[j] and not plan.moving[j]:
             work.near[i, j] = False
-    rank = rate_path(i, slot, -1e9, state, ours, boats, fixed, tuning, work)
+    rank = rate_path(i, slot, -1e9, scene)
     for j in range(ours.shape[0]):
         if ours[j] and not plan.moving[j]:
             work.near[i, j] = work.near[j, i]
@@ -118,66 +102,47 @@ def _could_keep(
 
 
 @lean_kernel
-def _passed_are_in_the_way(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> bool:
+def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
     """Whether some mover would keep more if team-mates whose wanted commands passed were not there.
 
     A boat that opponents or fixed things leave no way out is helped by nobody who gives up what was wanted.
     """
+    state, memory, work, plan = scene.state, scene.memory, scene.work, scene.plan
     trial = state.shape[0]
     for m in range(count):
         i = plan.movers[m]
         if work.merit[i] >= PAIR_SAFE:
             continue
-        if _could_keep(i, i, state, ours, boats, fixed, tuning, work, plan) > work.merit[i]:
+        if _could_keep(i, i, scene) > work.merit[i]:
             return True
         heading = state[i, L.HEADING]
         if not remembered(i, 0, heading, memory):
             continue
-        side, togo, speed = candidate(i, 0, 0.0, heading, boats, plans, memory)
-        lay_path(i, trial, side, togo, speed, 0, state, boats, tuning, work)
-        if _could_keep(i, trial, state, ours, boats, fixed, tuning, work, plan) > work.merit[i]:
+        side, togo, speed = candidate(i, 0, 0.0, heading, scene)
+        lay_path(i, trial, side, togo, speed, 0, scene)
+        if _could_keep(i, trial, scene) > work.merit[i]:
             return True
     return False
 
 
 @lean_kernel
-def _join(state: Array, ours: BoolArray, boats: Boats, tuning: Tuning, plan: Plan) -> int:
+def _join(scene: Scene) -> int:
     """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
+    ours, plan = scene.ours, scene.plan
     for i in range(ours.shape[0]):
         for m in range(ours.shape[0]):
-            if ours[i] and plan.place[m] >= 0 and could_meet(i, m, state, boats, tuning):
+            if ours[i] and plan.place[m] >= 0 and could_meet(i, m, scene):
                 plan.moving[i] = True
     return list_movers(plan)
 
 
 @lean_kernel
-def _assign_backups(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> bool:
+def _assign_backups(count: int, scene: Scene) -> bool:
     """Backups of the movers from the present state; whether all boats of ours then keep clear.
 
     Opponents are left where boats with tables look them up on such manoeuvres.
     """
+    ours, boats, work, plan = scene.ours, scene.boats, scene.work, scene.plan
     look = 1
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
@@ -188,65 +153,45 @@ def _assign_backups(
         work.joint_target_m[i] = 0.0
         work.fixed_target_m[i] = 0.0
         look = max(look, boats.look[i])
-    run_opponents(look, ours, state, boats, tuning, work, work.ways)
-    return assign_plans(plan.commands, 0, True, plan.moving, state, ours, boats, fixed, plans, tuning, memory, work)
+    run_opponents(look, scene)
+    return assign_plans(scene, 0, True, plan.moving)
 
 
 @lean_kernel
-def _find_backups(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> int:
+def _find_backups(count: int, scene: Scene) -> int:
     """Make the candidate of all movers' backups and check it; returns how many movers there are.
 
     All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
     fit what boats have whose wanted commands passed: where these are in the way, they take part, too.
     """
+    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     for _ in range(ours.shape[0]):
-        good = _assign_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+        good = _assign_backups(count, scene)
         movers = count
-        if not good and _passed_are_in_the_way(count, state, ours, boats, fixed, plans, tuning, memory, work, plan):
-            movers = _join(state, ours, boats, tuning, plan)
+        if not good and _passed_are_in_the_way(count, scene):
+            movers = _join(scene)
         if movers == count or all_spent(tuning, work):
             break
         count = movers
-    run_opponents(1, ours, state, boats, tuning, work, work.ways)
+    run_opponents(1, scene)
     for m in range(count):
-        set_off(plan.movers[m], state, boats, tuning, work, plan)
-    check(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        set_off(plan.movers[m], scene)
+    check(count, scene)
     return count
 
 
 @lean_kernel
-def back_up(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> None:
+def back_up(count: int, scene: Scene) -> None:
     """Send the backups where neither the wanted commands nor an answer of the program keeps everything.
 
     Where fixed things are all that is in the way, as little of them as keeps off these. The reason is ESCAPE, of boats
     that are short of something all the same BEST_EFFORT: avoidance does not switch itself off.
     """
-    count = _find_backups(count, state, ours, boats, fixed, plans, tuning, memory, work, plan)
+    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
+    count = _find_backups(count, scene)
     for m in range(count):
         i = plan.movers[m]
         plan.reason[i] = ESCAPE if work.merit[i] >= FIXED_LOST else BEST_EFFORT
-        plan.slack_m[i] = _given_up(i, state, boats, fixed, work)
+        plan.slack_m[i] = _given_up(i, scene)
     if _alone(ours, plan) and worst_merit(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
-        ease(count, state, ours, boats, fixed, tuning, memory, work, plan)
+        ease(count, scene)

@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import math
 
-from .jit import Array, BoolArray, lean_kernel
-from .memory import Memory
-from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, Plan, unchanged
-from .platforms import layout as L
-from .platforms.usv import wrap_degrees
-from .scene import Tuning
-from .work import Work
+from ..jit import Array, lean_kernel
+from ..memory import Memory
+from ..plan import BEST_EFFORT, QP, RIGHT_OF_WAY, unchanged
+from ..platforms import layout as L
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 
 NEAR_M = 2.0
 """Distance beyond what is to be kept within which a boat is alongside, m."""
@@ -48,8 +47,9 @@ PATIENCE = 3.0
 
 
 @lean_kernel
-def _alongside(i: int, turn_deg: float, speed_mps: float, state: Array, ours: BoolArray, work: Work) -> int:
+def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
     """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
+    state, ours, work = scene.state, scene.ours, scene.work
     found, least = -1, math.inf
     if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
         return found
@@ -85,35 +85,21 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 
 
 @lean_kernel
-def _who_blocks(
-    i: int,
-    turn_deg: float,
-    speed_mps: float,
-    state: Array,
-    ours: BoolArray,
-    memory: Memory,
-    work: Work,
-) -> int:
+def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
     """Boat that still keeps boat i from turning as it wants; -1 for none."""
+    state, memory = scene.state, scene.memory
     if not memory.kept[i] or memory.pressed_s[i] <= 0.0 or memory.free_s[i] > FREE_S:
         return -1
     turned_deg = wrap_degrees(state[i, L.HEADING] - memory.pressed_deg[i])
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
-    return _alongside(i, turn_deg, speed_mps, state, ours, work)
+    return _alongside(i, turn_deg, speed_mps, scene)
 
 
 @lean_kernel
-def _goes_on(
-    i: int,
-    turn_deg: float,
-    speed_mps: float,
-    state: Array,
-    ours: BoolArray,
-    memory: Memory,
-    work: Work,
-) -> bool:
+def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
     """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
+    state, ours, memory, work = scene.state, scene.ours, scene.memory, scene.work
     j = memory.blocked_by[i]
     if j < 0 or not ours[j] or not work.near[i, j] or not memory.kept[i]:
         return False
@@ -124,18 +110,10 @@ def _goes_on(
 
 
 @lean_kernel
-def _press(
-    i: int,
-    turn_deg: float,
-    speed_mps: float,
-    state: Array,
-    ours: BoolArray,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-) -> None:
+def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
     """Go on counting how long boat i has been kept from turning, and decide whether it gives way."""
-    j = _who_blocks(i, turn_deg, speed_mps, state, ours, memory, work)
+    state, tuning, memory = scene.state, scene.tuning, scene.memory
+    j = _who_blocks(i, turn_deg, speed_mps, scene)
     if j < 0:
         memory.pressed_s[i] = 0.0
     elif j != memory.blocked_by[i]:
@@ -152,17 +130,16 @@ def _press(
 
 
 @lean_kernel
-def apply_right_of_way(
-    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
-) -> None:
+def apply_right_of_way(i: int, scene: Scene) -> None:
     """Replace the wanted command of boat i where it has been kept from turning for long enough."""
+    tuning, memory, plan = scene.tuning, scene.memory, scene.plan
     speed_mps, turn_deg = plan.commands[i, 0], wrap_degrees(plan.commands[i, 1])
-    if memory.gives_way[i] != 0.0 and not _goes_on(i, turn_deg, speed_mps, state, ours, memory, work):
+    if memory.gives_way[i] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
         memory.gives_way[i], memory.pressed_s[i] = 0.0, 0.0
     if memory.gives_way[i] != 0.0:
         memory.pressed_s[i] += tuning.dt_s
     else:
-        _press(i, turn_deg, speed_mps, state, ours, tuning, memory, work)
+        _press(i, turn_deg, speed_mps, scene)
         if memory.gives_way[i] == 0.0 and memory.pressed_s[i] < tuning.give_way_after_s:
             return
     plan.commands[i, 1] = AWAY_DEG * memory.gives_way[i]
@@ -176,10 +153,9 @@ def forget_pressing(i: int, memory: Memory) -> None:
 
 
 @lean_kernel
-def note_pressing(
-    i: int, state: Array, ours: BoolArray, tuning: Tuning, memory: Memory, work: Work, plan: Plan
-) -> None:
+def note_pressing(i: int, scene: Scene) -> None:
     """Note since when, on what heading, boat i is kept from turning: its turn towards another was changed."""
+    state, tuning, memory, work, plan = scene.state, scene.tuning, scene.memory, scene.work, scene.plan
     if plan.reason[i] == RIGHT_OF_WAY:
         work.bound[i], memory.free_s[i] = memory.blocked_by[i], 0.0
         return
@@ -188,7 +164,7 @@ def note_pressing(
     if plan.reason[i] < QP or plan.reason[i] > BEST_EFFORT or j < 0 or unchanged(i, plan):
         return
     turn_deg, speed_mps = wrap_degrees(plan.kept_commands[i, 1]), plan.kept_commands[i, 0]
-    if _alongside(i, turn_deg, speed_mps, state, ours, work) != j:
+    if _alongside(i, turn_deg, speed_mps, scene) != j:
         return
     memory.free_s[i] = 0.0
     if memory.pressed_s[i] == 0.0:

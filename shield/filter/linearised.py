@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import math
 
+from ..certificates.assign import hold, recheck
+from ..certificates.effort import ROW_COST, spend
+from ..certificates.rating import PAIR_SAFE
+from ..jit import Array, copy_row, lean_kernel
+from ..plan import Plan
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn
+from ..scene import Scene
 from .active_set import OPTIMAL, project
-from .certificates.assign import hold, recheck
-from .certificates.effort import ROW_COST, spend
-from .certificates.rating import PAIR_SAFE
-from .jit import Array, BoolArray, copy_row, lean_kernel
-from .memory import Memory
-from .plan import Plan
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn
 from .rows import build_rows, inputs_of
-from .scene import Boats, Fixed, Tuning
 from .screening import predict
-from .work import Work
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
 
 
 @lean_kernel
-def pick_movers(ours: BoolArray, work: Work, plan: Plan) -> int:
+def pick_movers(scene: Scene) -> int:
     """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
     n = ours.shape[0]
     for i in range(n):
         if ours[i] and work.merit[i] < PAIR_SAFE:
@@ -48,50 +47,15 @@ def list_movers(plan: Plan) -> int:
 
 
 @lean_kernel
-def build(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    work: Work,
-    plan: Plan,
-) -> int:
+def build(count: int, scene: Scene) -> int:
     """Linearise about the candidate commands; returns the number of rows, -1 when there are too many."""
-    movers = plan.movers[:count]
+    work, plan = scene.work, scene.plan
     for m in range(count):
-        hold(movers[m], plan.held, work)
-        spend(work.cost[movers[m]], work)
-    inputs_of(
-        plan.commands,
-        plan.kept_commands,
-        movers,
-        state,
-        boats,
-        tuning,
-        work,
-        plan.wanted_turn,
-        plan.gain,
-        plan.z_now,
-        plan.z0,
-    )
-    rows = build_rows(
-        movers,
-        plan.place,
-        state,
-        ours,
-        boats,
-        fixed,
-        tuning,
-        work,
-        plan.gain,
-        plan.z_now[: 2 * count],
-        plan.C[:, : 2 * count],
-        plan.d,
-        plan.kind,
-        plan.label,
-    )
+        i = plan.movers[m]
+        hold(i, plan.held, work)
+        spend(work.cost[i], work)
+    inputs_of(count, scene)
+    rows = build_rows(count, scene)
     spend(ROW_COST * rows * count, work)
     return rows
 
@@ -104,11 +68,12 @@ def solve_compiled(count: int, rows: int, plan: Plan) -> bool:
 
 
 @lean_kernel
-def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning, plan: Plan) -> bool:
+def take_answer(z: Array, count: int, scene: Scene) -> bool:
     """Turn scaled inputs into the commands whose autopilot yields them; False when any of them is not finite.
 
     A boat whose inputs are unchanged keeps its wanted command, bit for bit.
     """
+    state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     root = math.sqrt(tuning.speed_weight)
     for m in range(2 * count):
         if not math.isfinite(z[m]):
@@ -130,18 +95,9 @@ def take_answer(z: Array, count: int, state: Array, boats: Boats, tuning: Tuning
 
 
 @lean_kernel
-def check(
-    count: int,
-    state: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> bool:
+def check(count: int, scene: Scene) -> bool:
     """Exact re-check of candidate commands: full model one step on, then the escapes the rows were about."""
+    plan = scene.plan
     for m in range(count):
-        predict(plan.movers[m], plan.commands, state, boats, tuning, work)
-    return recheck(plan.moving, plan.held, state, ours, boats, fixed, tuning, memory, work)
+        predict(plan.movers[m], plan.commands, scene)
+    return recheck(scene)

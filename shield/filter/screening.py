@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from .certificates.assign import assign_plans
-from .certificates.clearance import FAR
-from .certificates.manoeuvre import look_around
-from .jit import Array, BoolArray, copy_row, lean_kernel
-from .memory import Memory
-from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, Plan
-from .platforms import layout as L
-from .platforms.step import step_boat
-from .platforms.usv import wrap_degrees
-from .right_of_way import apply_right_of_way
-from .scene import Boats, Fixed, Tuning
-from .tables.grid import CAP
-from .work import Work
+from ..certificates.assign import assign_plans
+from ..certificates.clearance import FAR
+from ..certificates.manoeuvre import look_around
+from ..jit import Array, copy_row, lean_kernel
+from ..liveness.right_of_way import apply_right_of_way
+from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..platforms.usv import wrap_degrees
+from ..scene import Boats, Scene
+from ..tables.grid import CAP
+from ..work import Work
 
 
 @lean_kernel
-def predict(i: int, commands: Array, state: Array, boats: Boats, tuning: Tuning, work: Work) -> None:
+def predict(i: int, commands: Array, scene: Scene) -> None:
     """State of boat i one step after its command, by the full boat and autopilot model."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     copy_row(work.next_state[i], state[i])
     copy_row(work.command[i], commands[i])
     step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
@@ -35,12 +35,13 @@ def _most_told(i: int, j: int, boats: Boats, work: Work) -> float:
 
 
 @lean_kernel
-def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, work: Work) -> None:
+def set_targets(scene: Scene) -> None:
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
     What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
     be let go at once. That from team-mates of ours shrinks freely until it is small: what they will do is known.
     """
+    ours, boats, tuning, memory, work = scene.ours, scene.boats, scene.tuning, scene.memory, scene.work
     for i in range(ours.shape[0]):
         work.target[i] = 0.0
         work.mate_target_m[i] = 0.0
@@ -59,27 +60,16 @@ def set_targets(ours: BoolArray, boats: Boats, tuning: Tuning, memory: Memory, w
 
 
 @lean_kernel
-def screen(
-    state: Array,
-    wanted: Array,
-    margin_m: Array,
-    ours: BoolArray,
-    boats: Boats,
-    fixed: Fixed,
-    plans: Array,
-    tuning: Tuning,
-    memory: Memory,
-    work: Work,
-    plan: Plan,
-) -> bool:
+def screen(scene: Scene, wanted: Array, margin_m: Array) -> bool:
     """Check the wanted commands as they are; True when every boat still has its escape after them.
 
     An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
     the check.
     """
+    state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
     n = state.shape[0]
-    look_around(state, margin_m, ours, boats, tuning, work)
-    set_targets(ours, boats, tuning, memory, work)
+    look_around(scene, margin_m)
+    set_targets(scene)
     for i in range(n):
         copy_row(plan.commands[i], wanted[i])
         plan.slack_m[i] = 0.0
@@ -90,9 +80,9 @@ def screen(
         if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
-        apply_right_of_way(i, state, ours, tuning, memory, work, plan)
-        predict(i, plan.commands, state, boats, tuning, work)
+        apply_right_of_way(i, scene)
+        predict(i, plan.commands, scene)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):
         copy_row(plan.kept_commands[i], plan.commands[i])
-    return assign_plans(plan.commands, 1, False, ours, state, ours, boats, fixed, plans, tuning, memory, work)
+    return assign_plans(scene, 1, False, ours)
