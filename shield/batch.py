@@ -8,22 +8,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .arrays import NoNumbersError, numbers, truths, whole_numbers
+from .certificates.foreseen import DRIVEN_S
 from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .filter.flow import decide_compiled
-from .fleet import LARGEST, LARGEST_SPEED_MPS
+from .fleet import LARGEST, LARGEST_SPEED_MPS, usable_drives
 from .game_facts import facts_of_games, told_distances
-from .jit import Array, BoolArray, IntArray, copy_row, kernel
+from .jit import Array, BoolArray, IntArray, copy_row, kernel, lean_kernel
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
-from .scene import Scene, new_scene, path_samples
+from .scene import Boats, Scene, new_scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
+from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
+from .tracking.driving import driven_boats
 from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
 
@@ -36,12 +39,25 @@ class Asked(NamedTuple):
         wanted: (B, n, 2) wanted commands.
         ours: (B, n) boats to decide for.
         fear_s: (B, n) time for which each opponent may do its worst, s.
+        driven: (B, n, 4) what drives boats that something drives, see `Fleet.driven`.
+        known: (B, n) boats whose way is foreseen by that.
     """
 
     state: Array
     wanted: Array
     ours: BoolArray
     fear_s: Array
+    driven: Array
+    known: BoolArray
+
+
+class Hunting(NamedTuple):
+    """What boats are granted as opponents while nothing drives them, as in `Boats`."""
+
+    granted_turn_dps: Array
+    granted_acc_mps2: Array
+    table: IntArray
+    feared: BoolArray
 
 
 class Told(NamedTuple):
@@ -53,9 +69,30 @@ class Told(NamedTuple):
     cut_short: BoolArray
 
 
+@lean_kernel
+def _foresee_driven(driven: Array, known: BoolArray, hunting: Hunting, scene: Scene) -> None:
+    """Note what drives the boats of a game: they go their ways, and hunt nobody; see `setup.without_hunters`."""
+    boats, work = scene.boats, scene.work
+    for j in range(known.shape[0]):
+        copy_row(work.driven[j], driven[j])
+        work.known[j] = known[j]
+        boats.granted_turn_dps[j] = 0.0 if known[j] else hunting.granted_turn_dps[j]
+        boats.granted_acc_mps2[j] = 0.0 if known[j] else hunting.granted_acc_mps2[j]
+        boats.feared[j] = hunting.feared[j] and not known[j]
+        for i in range(known.shape[0]):
+            boats.table[i, j] = -1 if known[j] else hunting.table[i, j]
+
+
 @kernel
 def decide_games(
-    asked: Asked, told: Told, scene: Scene, memory: Memory, pending: Array, error_m: Array, late_m: float
+    asked: Asked,
+    told: Told,
+    scene: Scene,
+    hunting: Hunting,
+    memory: Memory,
+    pending: Array,
+    error_m: Array,
+    late_m: float,
 ) -> None:
     """Decide for every game in turn, for the moment its commands take effect.
 
@@ -76,6 +113,7 @@ def decide_games(
             if ahead[i, L.HEADING] != state[i, L.HEADING]:
                 wanted[i, 1] += state[i, L.HEADING] - ahead[i, L.HEADING]
         copy_row(work.fear_s, asked.fear_s[b])
+        _foresee_driven(asked.driven[b], asked.known[b], hunting, scene)
         take_memory(memory, b, scene.memory)
         decide_compiled(scene, ahead, wanted, margin_m, ours)
         put_memory(scene.memory, b, memory)
@@ -132,7 +170,8 @@ class BatchedShield:
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
             )
         n = len(self.platforms)
-        boats = boats_of(config, self.platforms, self.team)
+        boats, self._hunting = _boats_of_its_own(boats_of(config, self.platforms, self.team))
+        self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
         self._memory = new_memory(games, n)
         self._scene = new_scene(
             boats=boats,
@@ -149,6 +188,7 @@ class BatchedShield:
         self.reason = np.zeros((games, n), np.int64)
         self.certificate_m = np.full((games, n), np.inf)
         self.sent = np.zeros((games, n, 2))
+        self._undriven = np.full((games, n, 4), np.nan)
         self.cut_short = np.zeros(games, np.bool_)
 
     def reset(self, mask: BoolArray | None = None) -> None:
@@ -162,7 +202,14 @@ class BatchedShield:
         self._memory.escaping[which] = False
         self._pending[which] = np.nan
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray, visiting: BoolArray | None = None) -> Array:
+    def decide(
+        self,
+        state: Array,
+        wanted: Array,
+        ours: BoolArray,
+        visiting: BoolArray | None = None,
+        driven: Array | None = None,
+    ) -> Array:
         """Safe commands.
 
         Args:
@@ -171,6 +218,8 @@ class BatchedShield:
             wanted: (B, n, 2) speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds themselves.
             ours: (B, n) boats to decide for.
             visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: of none it is known.
+            driven: (B, n, 4) of boats that the games drive, see `Fleet.driven`; rows of NaN, or None, where nothing is
+                known. Those not decided for are foreseen as such.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
@@ -190,9 +239,12 @@ class BatchedShield:
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
         fear_s = np.where(seen, self.config.visitor_feared_s, self.config.feared_s)
-        asked = Asked(state, wanted, ours, fear_s)
+        driven = self._undriven if driven is None else _shaped("driven", driven, (*games, 4), numbers)
+        known = ~ours & usable_drives(driven) & (driven[..., DRIVEN_S] >= self._horizon_s)
+        asked = Asked(state, wanted, ours, fear_s, driven, known)
         told = Told(self.sent, self.reason, self.certificate_m, self.cut_short)
-        decide_games(asked, told, self._scene, self._memory, self._pending, self._margin, self._late_m)
+        scene = self._scene, self._hunting, self._memory
+        decide_games(asked, told, *scene, self._pending, self._margin, self._late_m)
         return self.sent
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
@@ -246,7 +298,14 @@ class GamesFilter:
             self._checked = core
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
-        return self.shield.decide(core.state, commands, ours, ~core.on_side)
+        return self.shield.decide(core.state, commands, ours, ~core.on_side, driven_boats(core))
+
+
+def _boats_of_its_own(boats: Boats) -> tuple[Boats, Hunting]:
+    """The same constants in arrays that are nobody else's, and what in them changes with who is driven."""
+    hunting = Hunting(boats.granted_turn_dps, boats.granted_acc_mps2, boats.table, boats.feared)
+    own = {name: array.copy() for name, array in hunting._asdict().items()}
+    return share(boats._replace(**own)), share(hunting)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

@@ -365,11 +365,11 @@ def _whole(name: str, values: ArrayLike, n: int) -> IntArray:
 
 
 def usable_drives(driven: Array) -> BoolArray:
-    """Rows of `Fleet.driven`, (n,), that a way can be foreseen by; of the others nothing is known.
+    """Rows of `Fleet.driven`, (..., 4), that a way can be foreseen by; of the others nothing is known.
 
     A speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at all, from
     which everything keeps clear.
     """
-    speed_mps, place_m = driven[:, 0], driven[:, 1:3]
-    nowhere, somewhere = np.isnan(place_m).all(axis=1), (np.abs(place_m) <= LARGEST).all(axis=1)
+    speed_mps, place_m = driven[..., 0], driven[..., 1:3]
+    nowhere, somewhere = np.isnan(place_m).all(axis=-1), (np.abs(place_m) <= LARGEST).all(axis=-1)
     return np.asarray((speed_mps >= 0.0) & (speed_mps <= LARGEST_SPEED_MPS) & (nowhere | somewhere))

@@ -14,7 +14,7 @@ from ..fleet import Fleet
 from ..game_facts import GameFacts, facts_of_games
 from ..jit import Array
 from ..surroundings import Surroundings
-from .driving import driven_boats
+from ..tracking.driving import driven_boats
 from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 
 
@@ -63,14 +63,14 @@ class MctfReader:
                 driven = driven | core.driven[0]
             controlled = controlled & ~driven
         # a copy: decisions are read after the step has moved the boats
-        state = core.state[0].copy()
+        state, driven = core.state[0].copy(), driven_boats(core)
         return Fleet(
             state,
             core.team,
             self._platforms,
             controlled,
             self.agent_ids,
-            driven=driven_boats(core),
+            driven=None if driven is None else driven[0],
             visiting=~core.on_side[0],
         )
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..jit import Array
-from .driving import inwards, time_until
+from ..tracking.driving import LEAST_MPS, inwards, nearest, time_until
 
 UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
 Row = tuple[float, float, float, float]
@@ -51,17 +51,18 @@ def _home(env: Any, player: Any) -> Row:
         radius_m = float(env.untag_radius)
     if math.isnan(radius_m):  # of another version: nobody knows when it is home
         return UNKNOWN
-    places = np.asarray(marks, dtype=np.float64)
-    mark = places[int(np.argmin(np.hypot(*(places - (x, y)).T)))]
-    ends_m = np.asarray(ends, dtype=np.float64)
-    return speed, float(mark[0]), float(mark[1]), time_until(x, y, ends_m, radius_m, max(speed, float(player.speed)))
+    position = np.array((x, y), dtype=np.float64)
+    mark = nearest(position, np.asarray(marks, dtype=np.float64))
+    until_s = time_until(position, np.asarray(ends, dtype=np.float64), radius_m, max(speed, float(player.speed)))
+    return speed, float(mark[0]), float(mark[1]), float(until_s)
 
 
 def _in(env: Any, player: Any) -> Row:
     """A boat out of bounds: straight off the nearest edge."""
     speed = float(player.get_max_speed()) * _fraction(env, "oob_speed_frac")
-    x, y, beyond_m = inwards(float(player.pos[0]), float(player.pos[1]), np.asarray(env.env_size, dtype=np.float64))
-    return speed, x, y, beyond_m / max(speed, float(player.speed), 1e-6)
+    position, size = np.asarray(player.pos, dtype=np.float64)[:2], np.asarray(env.env_size, dtype=np.float64)
+    place, beyond_m = inwards(position, size)
+    return speed, float(place[0]), float(place[1]), float(beyond_m) / max(speed, float(player.speed), LEAST_MPS)
 
 
 def _disabled_for_s(env: Any, player: Any) -> float:

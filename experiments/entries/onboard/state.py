@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.wrappers.driving import inwards, time_until
+from steerclear.shield.tracking.driving import LEAST_MPS, inwards, nearest, time_until
 
 UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
 NORMALISED_M = 1.5
@@ -102,20 +102,18 @@ def _drive(facts: Facts, sight: Sight, i: int, team: int, disabled_for_s: float)
 
 
 def _home(facts: Facts, sight: Sight, i: int, team: int) -> tuple[float, float, float, float]:
-    x, y, speed = sight.rows[i, [L.X, L.Y, L.SPEED]].tolist()
+    position, speed = sight.rows[i, [L.X, L.Y]], float(sight.rows[i, L.SPEED])
     share = min(facts.tag_share, facts.oob_share) if sight.oob[i] else facts.tag_share
     commanded = share * _top_mps(facts, i)
-    marks = np.array(facts.marks[team], dtype=np.float64)
-    mark = marks[int(np.argmin(np.hypot(*(marks - (x, y)).T)))]
-    until_s = time_until(x, y, np.array(facts.ends[team]), facts.untag_m, max(commanded, speed))
-    return commanded, float(mark[0]), float(mark[1]), until_s
+    mark = nearest(position, np.array(facts.marks[team], dtype=np.float64))
+    until_s = time_until(position, np.array(facts.ends[team]), facts.untag_m, max(commanded, speed))
+    return commanded, float(mark[0]), float(mark[1]), float(until_s)
 
 
 def _in(facts: Facts, sight: Sight, i: int) -> tuple[float, float, float, float]:
-    x, y, speed = sight.rows[i, [L.X, L.Y, L.SPEED]].tolist()
-    commanded = facts.oob_share * _top_mps(facts, i)
-    place_x, place_y, beyond_m = inwards(x, y, np.array(facts.size))
-    return commanded, place_x, place_y, beyond_m / max(commanded, speed, 1e-6)
+    speed, commanded = float(sight.rows[i, L.SPEED]), facts.oob_share * _top_mps(facts, i)
+    place, beyond_m = inwards(sight.rows[i, [L.X, L.Y]], np.array(facts.size))
+    return commanded, float(place[0]), float(place[1]), float(beyond_m) / max(commanded, speed, LEAST_MPS)
 
 
 def _top_mps(facts: Facts, i: int) -> float:
