@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.tracks import whole_steps
+from steerclear.shield.tracking.tracks import whole_steps
 
 MOST = {"delay_s": 2.0, "noise_m": 5.0, "current_mps": 2.0}
 """Largest value of each: s, m, m/s."""

@@ -12,8 +12,8 @@ from .certificates.manoeuvre import told_margin
 from .certificates.values import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
+from .filter.flow import decide_compiled
 from .fleet import LARGEST, LARGEST_SPEED_MPS
-from .flow import decide_compiled
 from .game_facts import facts_of_games, told_distances
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .memory import Memory, new_memory, put_memory, take_memory
@@ -24,7 +24,7 @@ from .same_games import check_same_games
 from .scene import Scene, new_scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
+from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
 
 

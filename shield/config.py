@@ -109,7 +109,7 @@ class ShieldConfig:
 
     def __post_init__(self) -> None:
         from .certificates import CERTIFICATES
-        from .program import check_solver
+        from .filter.program import check_solver
 
         for entry in fields(self):
             value = getattr(self, entry.name)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .kept_code import KeptCode
+from .compiled.kept_code import KeptCode
 
 F = TypeVar("F", bound=Callable[..., Any])
 Array = NDArray[np.float64]

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .answer import Answer, less_turn, to_send
-from .autopilots import Autopilots, all_told, unknown_memory
 from .certificates import CERTIFICATES
 from .certificates.foreseen import DRIVEN_S
 from .certificates.values import WAYS
@@ -18,20 +16,22 @@ from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
+from .filter.answer import Answer, less_turn, to_send
+from .filter.flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
+from .filter.limiting import tell_of_limits, within_limits
+from .filter.program import Program, solve
 from .fleet import Fleet, usable_drives
-from .flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .jit import Array, BoolArray
-from .limiting import tell_of_limits, within_limits
 from .memory import Memory, new_memory
 from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
-from .program import Program, solve
-from .remembering import Known, Stayed, carry_over, meets_new
 from .scene import Boats, Fixed, Scene, Tuning, new_scene, path_samples
 from .setup import boats_of, missing_tables, plans_of, tuning_of, without_hunters
 from .surroundings import OPEN_WATER, Surroundings
-from .tracks import prepare, queue_commands, steps_of_delay
+from .tracking.autopilots import Autopilots, all_told, unknown_memory
+from .tracking.remembering import Known, Stayed, carry_over, meets_new
+from .tracking.tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
 from .work import Work, new_work
 

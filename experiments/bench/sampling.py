@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, Surroundings
+from steerclear.shield.filter.program import Program
 from steerclear.shield.jit import Array
 from steerclear.shield.plan import Plan
-from steerclear.shield.program import Program
 
 from ..match import Match
 from ..spec import MatchSpec

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import qpsolvers
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.jit import Array
-from steerclear.shield.program import Program, solve
 
 from .timing import quantiles_us, time_calls
 

@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.errors import LiveError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from steerclear.shield.compiling import told_to
+from steerclear.shield.compiled.compiling import told_to
 from steerclear.shield.exceptions import SteerclearError
 
 from ..faults import fault_words, machine_words
@@ -86,7 +86,7 @@ class CompilingBar:
         self._said = False
 
     def goes_on(self, done: int, of: int) -> None:
-        """See `steerclear.shield.compiling.Listener`."""
+        """See `steerclear.shield.compiled.compiling.Listener`."""
         if not err().is_terminal:
             self._say()
             return
@@ -99,7 +99,7 @@ class CompilingBar:
         self._bar.update(self._bar.task_ids[0], completed=done, total=of)
 
     def ends(self) -> None:
-        """See `steerclear.shield.compiling.Listener`."""
+        """See `steerclear.shield.compiled.compiling.Listener`."""
         if self._bar is not None:
             self._bar.stop()
             self._bar = None

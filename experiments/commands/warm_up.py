@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from steerclear.shield.compiling import COMPILING, told_to
+from steerclear.shield.compiled.compiling import COMPILING, told_to
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in
 
@@ -52,8 +52,8 @@ class _Shown:
         self._bar.update(self._task, description=f"compiling {name}", refresh=True)
 
     def goes_on(self, done: int, of: int) -> None:
-        """See `steerclear.shield.compiling.Listener`."""
+        """See `steerclear.shield.compiled.compiling.Listener`."""
         self._bar.update(self._task, completed=done, total=of, refresh=True)
 
     def ends(self) -> None:
-        """See `steerclear.shield.compiling.Listener`."""
+        """See `steerclear.shield.compiled.compiling.Listener`."""

@@ -16,7 +16,7 @@ from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import LogError
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import fill_memory
+from steerclear.shield.tracking.tracks import fill_memory
 
 Array = NDArray[np.float64]
 GONE_S = 1.5

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
-from steerclear.shield.tracks import whole_steps
+from steerclear.shield.tracking.tracks import whole_steps
 
 from .replaying_tracks import Array, Tracks
 

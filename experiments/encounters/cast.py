@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import fresh_state, get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import thrust_at
+from steerclear.shield.tracking.tracks import thrust_at
 
 from ..conditions import draw
 from . import script as S

@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import FleetError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import whole_steps
+from steerclear.shield.tracking.tracks import whole_steps
 
 from .guards import Guard, GuardMaker, build_guard
 from .motion import move, observe, reach_goals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L

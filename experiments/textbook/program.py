@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 
 from ..jit import kernel

@@ -16,7 +16,7 @@ from ..config import ShieldConfig
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
-from ..tracks import thrust_at
+from ..tracking.tracks import thrust_at
 from .link import BoatReading, Sent
 from .tick import Action
 

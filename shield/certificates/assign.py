@@ -107,8 +107,7 @@ def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: S
 @lean_kernel
 def refresh(i: int, scene: Scene) -> None:
     """Rate boat i's plan again against the others' present plans."""
-    work = scene.work
-    work.merit[i] = rate_path(i, i, -1e9, scene)
+    scene.work.merit[i] = rate_path(i, i, -1e9, scene)
 
 
 @lean_kernel

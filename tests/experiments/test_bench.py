@@ -15,7 +15,7 @@ from steerclear.experiments.keys import BENCH, KEYS, undocumented
 from steerclear.experiments.store import finite, write_json
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.program import Program
+from steerclear.shield.filter.program import Program
 
 TINY = replace(
     BenchSettings(),

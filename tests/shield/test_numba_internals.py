@@ -7,8 +7,8 @@ from numba import njit
 from numba.core import caching, cgutils, config, imputils
 from numba.core.registry import cpu_target
 from numba.core.typing import templates
+from steerclear.shield.compiled.kept_code import KeptCode, SealedFile
 from steerclear.shield.jit import copy_row, lean_kernel
-from steerclear.shield.kept_code import KeptCode, SealedFile
 
 
 def parameters(function):

@@ -8,8 +8,8 @@ from shield_loops import packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
+from steerclear.shield.filter.screening import set_targets
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.screening import set_targets
 
 CAP_M = ShieldConfig().margin_cap_m
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from steerclear.shield.active_set import OPTIMAL, project
+from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 
 ROW_TOLERANCE = 1e-4

@@ -17,7 +17,7 @@ ROOTS = (f"{SHIELD}.shield", f"{SHIELD}.actions", f"{SHIELD}.wrappers.driving")
 STAND_INS = {
     f"{SHIELD}.jit": "jit",
     f"{SHIELD}.shared": "shared",
-    f"{SHIELD}.program": "program",
+    f"{SHIELD}.filter.program": "program",
     f"{SHIELD}.platforms.registry": "registry",
 }
 """Modules that need a compiler or packages which may not be there, and those of `onboard` in their places."""

@@ -24,7 +24,7 @@ from .inline import GREATER, LESSER, Inliner, Small, small
 from .sources import SHIELD, STAND_INS, Source
 
 DECORATORS = {"kernel", "lean_kernel"}
-ON_ARRAYS = {f"{SHIELD}.active_set"}
+ON_ARRAYS = {f"{SHIELD}.filter.active_set"}
 """Modules whose compiled functions are given arrays, and run on them as they are."""
 PLAIN = "plain_"
 HELPERS = ("fill", "put", "by_zero", "entered")

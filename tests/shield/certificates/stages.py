@@ -3,12 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield import Surroundings, flow, linearised, plan, screening
+from steerclear.shield import Surroundings, plan
 from steerclear.shield.certificates.assign import assign_plans
 from steerclear.shield.certificates.manoeuvre import look_around
+from steerclear.shield.filter import flow, linearised, screening
+from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.program import Program, solve
 from steerclear.shield.scene import Scene, path_samples
 from steerclear.shield.setup import boats_of, plans_of, tuning_of
 from steerclear.shield.shared import share

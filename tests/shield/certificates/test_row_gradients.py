@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed
 from stages import built, screened, stages_of
-from steerclear.shield import ShieldConfig, Surroundings, rows, screening
+from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.certificates.clearance import FAR, MARGIN
 from steerclear.shield.certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
 from steerclear.shield.certificates.laying import lay_path
 from steerclear.shield.certificates.manoeuvre import clear_of_boat
 from steerclear.shield.certificates.values import WAYS, set_place, table_margin
+from steerclear.shield.filter import rows, screening
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn

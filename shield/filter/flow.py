@@ -10,17 +10,17 @@ import math
 
 import numpy as np
 
+from ..certificates.clearance import MARGIN
+from ..certificates.effort import all_spent
+from ..certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
+from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..liveness.right_of_way import forget_pressing, note_pressing
+from ..plan import BEST_EFFORT, ESCAPE, QP, unchanged
+from ..platforms import layout as L
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 from .backup import back_up, mark_answer, opposed
-from .certificates.clearance import MARGIN
-from .certificates.effort import all_spent
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
-from .jit import Array, BoolArray, copy_row, lean_kernel
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
-from .plan import BEST_EFFORT, ESCAPE, QP, unchanged
-from .platforms import layout as L
-from .platforms.usv import wrap_degrees
-from .right_of_way import forget_pressing, note_pressing
-from .scene import Scene
 from .screening import screen
 
 ROUNDS = 2

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from .config import ShieldConfig
-from .exceptions import FleetError
-from .fleet import Fleet
-from .jit import Array, BoolArray, kernel
-from .plan import LARGEST_COMMAND
-from .platforms import layout as L
-from .platforms.step import step_boat
+from ..config import ShieldConfig
+from ..exceptions import FleetError
+from ..fleet import Fleet
+from ..jit import Array, BoolArray, kernel
+from ..plan import LARGEST_COMMAND
+from ..platforms import layout as L
+from ..platforms.step import step_boat
 
 
 @kernel

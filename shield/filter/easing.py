@@ -6,15 +6,15 @@ the program, which are linear, then find no answer, and a boat that wants throug
 
 from __future__ import annotations
 
-from .certificates.effort import all_spent
-from .certificates.rating import PAIR_SAFE, worst_merit
-from .jit import lean_kernel
+from ..certificates.effort import all_spent
+from ..certificates.rating import PAIR_SAFE, worst_merit
+from ..jit import lean_kernel
+from ..plan import Plan
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 from .linearised import check
-from .plan import Plan
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn
-from .platforms.usv import wrap_degrees
-from .scene import Scene
 from .screening import set_targets
 
 LOOKS = 6

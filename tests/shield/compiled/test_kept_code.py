@@ -10,8 +10,8 @@ import threading
 import pytest
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl
-from steerclear.shield import code_places, kept_code
-from steerclear.shield.compiling import PATIENCE_S, Compiling
+from steerclear.shield.compiled import code_places, kept_code
+from steerclear.shield.compiled.compiling import PATIENCE_S, Compiling
 from steerclear.shield.jit import kernel
 
 
@@ -228,7 +228,7 @@ def test_a_private_folder_is_ones_own(tmp_path, monkeypatch):
 def compiling(monkeypatch):
     """What is told, on a clock that is set by hand."""
     now = [0.0]
-    monkeypatch.setattr("steerclear.shield.compiling.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("steerclear.shield.compiled.compiling.time.monotonic", lambda: now[0])
     return Compiling(), now
 
 

@@ -6,12 +6,12 @@ import textwrap
 import time
 from contextlib import contextmanager
 
-from steerclear.shield import compile_turns
-from steerclear.shield.compile_turns import Turns
+from steerclear.shield.compiled import compile_turns
+from steerclear.shield.compiled.compile_turns import Turns
 
 HOLD = """
 import sys, time
-from steerclear.shield.compile_turns import Turns
+from steerclear.shield.compiled.compile_turns import Turns
 turns = Turns(sys.argv[1])
 turns.take("sig")
 print("held", flush=True)
@@ -87,7 +87,7 @@ def test_two_processes_compile_a_function_once(tmp_path):
         import sys
         sys.path.insert(0, sys.argv[1])
         from slow import slow
-        from steerclear.shield.compiling import COMPILING
+        from steerclear.shield.compiled.compiling import COMPILING
         from steerclear.shield.jit import kernel
         compiled = kernel(slow)
         sys.stdin.readline()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .certificates.manoeuvre import told_margin
-from .certificates.rating import FIXED_THING
-from .commands import Commands
-from .fleet import Fleet
-from .jit import Array, BoolArray, IntArray, lean_kernel
-from .plan import HELD, NOT_COVERED, PASSED, Plan
-from .platforms import layout as L
-from .work import Work
+from ..certificates.manoeuvre import told_margin
+from ..certificates.rating import FIXED_THING
+from ..commands import Commands
+from ..fleet import Fleet
+from ..jit import Array, BoolArray, IntArray, lean_kernel
+from ..plan import HELD, NOT_COVERED, PASSED, Plan
+from ..platforms import layout as L
+from ..work import Work
 
 
 @lean_kernel

@@ -18,8 +18,8 @@ import numpy as np
 import qpsolvers
 from scipy.sparse import csc_matrix, identity
 
-from .exceptions import SolverError
-from .jit import Array, kernel
+from ..exceptions import SolverError
+from ..jit import Array, kernel
 
 logger = logging.getLogger(__name__)
 

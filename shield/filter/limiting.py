@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..commands import Commands
+from ..fleet import Fleet
+from ..hints import look_at_speed
+from ..jit import Array, BoolArray
+from ..plan import LARGEST_COMMAND, LIMITED, PASSED
+from ..platforms import layout as L
 from .answer import Answer
-from .commands import Commands
-from .fleet import Fleet
-from .hints import look_at_speed
-from .jit import Array, BoolArray
-from .plan import LARGEST_COMMAND, LIMITED, PASSED
-from .platforms import layout as L
 
 ROUNDING_MPS = 1e-6
 """A speed beyond the limit by less is that limit, rounded: it passes as it is."""

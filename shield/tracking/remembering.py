@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .fleet import Fleet
-from .jit import Array, BoolArray, IntArray
-from .memory import Memory
-from .platforms import Platform
-from .scene import Boats, Tuning
+from ..fleet import Fleet
+from ..jit import Array, BoolArray, IntArray
+from ..memory import Memory
+from ..platforms import Platform
+from ..scene import Boats, Tuning
 
 _OWN = (
     "kept",

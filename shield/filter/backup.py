@@ -14,22 +14,22 @@ import math
 
 import numpy as np
 
-from .certificates.assign import assign_plans
-from .certificates.candidates import candidate, remembered
-from .certificates.clearance import MARGIN
-from .certificates.effort import all_spent
-from .certificates.fixed_things import clear_of_near_obstacles
-from .certificates.laying import lay_path
-from .certificates.manoeuvre import could_meet, told_margin
-from .certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, rate_path, worst_merit
-from .certificates.values import run_opponents
+from ..certificates.assign import assign_plans
+from ..certificates.candidates import candidate, remembered
+from ..certificates.clearance import MARGIN
+from ..certificates.effort import all_spent
+from ..certificates.fixed_things import clear_of_near_obstacles
+from ..certificates.laying import lay_path
+from ..certificates.manoeuvre import could_meet, told_margin
+from ..certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE, rate_path, worst_merit
+from ..certificates.values import run_opponents
+from ..jit import BoolArray, lean_kernel
+from ..plan import BEST_EFFORT, ESCAPE, Plan, unchanged
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn, full_turn
+from ..scene import Scene
 from .easing import ease
-from .jit import BoolArray, lean_kernel
 from .linearised import check, list_movers
-from .plan import BEST_EFFORT, ESCAPE, Plan, unchanged
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn, full_turn
-from .scene import Scene
 
 
 @lean_kernel

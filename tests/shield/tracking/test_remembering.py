@@ -10,7 +10,7 @@ from shield_scenes import bits, fleet_of, head_on, relative
 from steerclear.shield import Fleet, Shield
 from steerclear.shield.memory import Memory, new_memory, put_memory, take_memory
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.remembering import Known, Stayed, carry_over, meets_new
+from steerclear.shield.tracking.remembering import Known, Stayed, carry_over, meets_new
 
 FAR_AWAY = (1300.0, 0.0, 0.0, 0.0)
 STEPS = 120

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .jit import Array, IntArray, kernel
+from ..jit import Array, IntArray, kernel
 
 OPTIMAL = 0
 INFEASIBLE = 1

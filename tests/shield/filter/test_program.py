@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import SolverError
-from steerclear.shield.program import ROW_TOLERANCE, Program, check_solver, holds, solve
+from steerclear.shield.filter.program import ROW_TOLERANCE, Program, check_solver, holds, solve
 
 SOLVERS = sorted(qpsolvers.available_solvers)
 GIVES_UP = {"proxqp": "takes a feasible program in some hundreds for infeasible; no answer is a safe one"}

@@ -8,10 +8,10 @@ import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Commands, Fleet, Shield
-from steerclear.shield.autopilots import SURPRISE, Autopilots
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.remembering import Stayed
+from steerclear.shield.tracking.autopilots import SURPRISE, Autopilots
+from steerclear.shield.tracking.remembering import Stayed
 
 STEPS = 150
 CROWD = [(0, 0, 0, 1.0), (4.0, 14.0, 180.0, 1.0), (-9.0, 5.0, 90.0, 1.2), (9.0, 6.0, -90.0, 1.4)]

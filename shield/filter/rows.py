@@ -18,18 +18,18 @@ from __future__ import annotations
 
 import math
 
-from .certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
-from .certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
-from .certificates.hunters import clear_of_hunter, hunts
-from .certificates.manoeuvre import clear_of_boat, must_keep
-from .certificates.values import WAYS, looked_up, table_slope
-from .jit import Array, copy_row, lean_kernel
-from .plan import Plan
-from .platforms import layout as L
-from .platforms.actuator import full_turn
-from .platforms.step import step_boat
-from .scene import Scene, Tuning
-from .work import Work
+from ..certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from ..certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
+from ..certificates.hunters import clear_of_hunter, hunts
+from ..certificates.manoeuvre import clear_of_boat, must_keep
+from ..certificates.values import WAYS, looked_up, table_slope
+from ..jit import Array, copy_row, lean_kernel
+from ..plan import Plan
+from ..platforms import layout as L
+from ..platforms.actuator import full_turn
+from ..platforms.step import step_boat
+from ..scene import Scene, Tuning
+from ..work import Work
 
 AIM_M = 0.02
 """Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""

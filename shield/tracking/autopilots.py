@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .jit import Array, BoolArray, kernel
-from .plan import LARGEST_COMMAND
-from .platforms import layout as L
-from .platforms.step import step_boat
+from ..jit import Array, BoolArray, kernel
+from ..plan import LARGEST_COMMAND
+from ..platforms import layout as L
+from ..platforms.step import step_boat
 from .remembering import Stayed
 from .tracks import fill_memory
 

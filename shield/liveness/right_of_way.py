@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import math
 
-from .jit import Array, lean_kernel
-from .memory import Memory
-from .plan import BEST_EFFORT, QP, RIGHT_OF_WAY, unchanged
-from .platforms import layout as L
-from .platforms.usv import wrap_degrees
-from .scene import Scene
+from ..jit import Array, lean_kernel
+from ..memory import Memory
+from ..plan import BEST_EFFORT, QP, RIGHT_OF_WAY, unchanged
+from ..platforms import layout as L
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
 
 NEAR_M = 2.0
 """Distance beyond what is to be kept within which a boat is alongside, m."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
+from ..certificates.assign import hold, recheck
+from ..certificates.effort import ROW_COST, spend
+from ..certificates.rating import PAIR_SAFE
+from ..jit import Array, copy_row, lean_kernel
+from ..plan import Plan
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn
+from ..scene import Scene
 from .active_set import OPTIMAL, project
-from .certificates.assign import hold, recheck
-from .certificates.effort import ROW_COST, spend
-from .certificates.rating import PAIR_SAFE
-from .jit import Array, copy_row, lean_kernel
-from .plan import Plan
-from .platforms import layout as L
-from .platforms.actuator import command_for_turn
 from .rows import build_rows, inputs_of
-from .scene import Scene
 from .screening import predict
 
 SAME = 1e-6

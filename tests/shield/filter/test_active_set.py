@@ -5,7 +5,7 @@ import pytest
 import qpsolvers
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from steerclear.shield.active_set import INFEASIBLE, OPTIMAL, STALLED, project
+from steerclear.shield.filter.active_set import INFEASIBLE, OPTIMAL, STALLED, project
 
 many = settings(max_examples=250, deadline=None, derandomize=True)
 SLACK = 1e-6

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from .certificates.assign import assign_plans
-from .certificates.clearance import FAR
-from .certificates.manoeuvre import look_around
-from .jit import Array, copy_row, lean_kernel
-from .plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
-from .platforms import layout as L
-from .platforms.step import step_boat
-from .platforms.usv import wrap_degrees
-from .right_of_way import apply_right_of_way
-from .scene import Boats, Scene
-from .tables.grid import CAP
-from .work import Work
+from ..certificates.assign import assign_plans
+from ..certificates.clearance import FAR
+from ..certificates.manoeuvre import look_around
+from ..jit import Array, copy_row, lean_kernel
+from ..liveness.right_of_way import apply_right_of_way
+from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..platforms.usv import wrap_degrees
+from ..scene import Boats, Scene
+from ..tables.grid import CAP
+from ..work import Work
 
 
 @lean_kernel

@@ -1,0 +1,1 @@
+"""Where machine code is kept, and who compiles it."""

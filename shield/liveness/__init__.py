@@ -1,0 +1,1 @@
+"""What keeps safe boats from standing still for ever."""
