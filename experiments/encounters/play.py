@@ -16,7 +16,7 @@ from steerclear.shield.tracking.tracks import whole_steps
 from .guards import Guard, GuardMaker, build_guard
 from .motion import move, observe, reach_goals
 from .scenes import DT_S, Conditions, Scenes
-from .steering import Cast, want
+from .steering import Roles, want
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ class _Stage:
         """One step of all games."""
         scenes, wanted = self.scenes, film.wanted[step]
         observe(self.state, self.error, self.seeds, self.conditions.noise_m, step == 0, DT_S, self.seen)
-        cast = Cast(self.params, scenes.team, scenes.script, scenes.goals)
-        want(self.state, self.seen, cast, self.goal_at, self.phase_at, step * DT_S, DT_S, wanted)
+        roles = Roles(self.params, scenes.team, scenes.script, scenes.goals)
+        want(self.state, self.seen, roles, self.goal_at, self.phase_at, step * DT_S, DT_S, wanted)
         started = time.perf_counter()
         sent = keeper.decide(self.seen, wanted, self.ours)
         film.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6

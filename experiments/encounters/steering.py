@@ -17,7 +17,7 @@ LONGEST_LEAD_S = 20.0
 """A hunter looks no further ahead than this, s."""
 
 
-class Cast(NamedTuple):
+class Roles(NamedTuple):
     """The boats of B encounters of n boats, and what they are to do.
 
     ``params`` (n, N_PARAM), ``team`` (n,), ``scripts`` (B, n, N_SCRIPT), ``goals`` (B, n, G, 2) m.
@@ -116,7 +116,7 @@ def steer(
 def want(
     state: Array,
     seen: Array,
-    cast: Cast,
+    roles: Roles,
     goal_at: IntArray,
     phase_at: IntArray,
     time_s: float,
@@ -128,7 +128,7 @@ def want(
     Args:
         state: (B, n, N_STATE) true states.
         seen: (B, n, N_STATE) states as the own team knows them.
-        cast: the boats.
+        roles: the boats.
         goal_at: (B, n) number of the goal made for.
         phase_at: (B, n) phase of the script, moved on here.
         time_s: time since the start.
@@ -137,15 +137,15 @@ def want(
     """
     for b in range(state.shape[0]):
         for i in range(state.shape[1]):
-            row, known = cast.scripts[b, i], state[b]
-            if cast.team[i] == 0:
+            row, known = roles.scripts[b, i], state[b]
+            if roles.team[i] == 0:
                 known = seen[b]
             foe = int(row[S.TARGET])
             if foe < 0:
-                foe = nearest_foe(known, cast.team, i)
+                foe = nearest_foe(known, roles.team, i)
             gap = math.inf
             if foe >= 0:
                 gap = math.hypot(known[foe, L.X] - known[i, L.X], known[foe, L.Y] - known[i, L.Y])
             phase_at[b, i] = next_phase(row, phase_at[b, i], time_s, gap)
-            goal = cast.goals[b, i, goal_at[b, i]]
-            steer(cast.params[i], row, phase_at[b, i], known[i], known, foe, goal, dt_s, wanted[b, i])
+            goal = roles.goals[b, i, goal_at[b, i]]
+            steer(roles.params[i], row, phase_at[b, i], known[i], known, foe, goal, dt_s, wanted[b, i])

@@ -126,14 +126,3 @@ def decide_game(
     for i in range(n):
         if ours[i] and plan[i, 0] >= 1.0:
             plan[i, 0] -= 1.0
-
-
-@kernel
-def decide_games(
-    setup: Setup, state: Array, wanted: Array, ours: BoolArray, plan: Array, sent: Array, reason: IntArray,
-    clear_m: Array,
-) -> None:  # fmt: skip
-    """`decide_game` for every game; arrays carry a leading games axis."""
-    sent[:], reason[:], clear_m[:] = wanted, PASSED, np.inf
-    for b in range(state.shape[0]):
-        decide_game(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])

@@ -14,9 +14,8 @@ from steerclear.shield.platforms import Platform
 
 from ..batch_guard import BatchGuard
 from ..textbook.inputs import input_limits
-from .gatekeeper import decide_games as decide_gatekeeper
+from .games import decide_games
 from .paths import N_PLAN, NO_PLAN, Setup
-from .plcbf import decide_games as decide_library
 from .settings import PICKS, GatekeeperSettings, LibrarySettings, Settings, library, read_settings, switch_steps
 
 GATEKEEPER, GATEKEEPER_WORST, PL_CBF = "gatekeeper", "gatekeeper-worst", "pl-cbf"
@@ -87,8 +86,8 @@ class RolloutGuard(BatchGuard):
             raise FleetError(f"a wanted command is not finite or beyond {LARGEST:g}; give a speed and a heading")
 
     def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
-        decide = decide_library if self.name == PL_CBF else decide_gatekeeper
-        decide(self._setup, state, wanted, ours, self._plan, self.sent, self.reason, self.certificate_m)
+        kept = self._plan, self.sent, self.reason, self.certificate_m
+        decide_games(self._setup, self.name == PL_CBF, state, wanted, ours, *kept)
 
 
 def _setup(name: str, config: ShieldConfig, platforms: list[Platform], team: tuple[int, ...], read: Settings) -> Setup:

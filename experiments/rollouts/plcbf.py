@@ -237,14 +237,3 @@ def decide_game(
         plan[i, 0], plan[i, 3] = 0.0, sent[i, 0]
         plan[i, 4] = wrap_degrees(state[i, L.HEADING] + sent[i, 1])
         roll_plan(setup, i, state[i], plan[i], path[i])
-
-
-@kernel
-def decide_games(
-    setup: Setup, state: Array, wanted: Array, ours: BoolArray, plan: Array, sent: Array, reason: IntArray,
-    clear_m: Array,
-) -> None:  # fmt: skip
-    """`decide_game` for every game; arrays carry a leading games axis."""
-    sent[:], reason[:], clear_m[:] = wanted, PASSED, np.inf
-    for b in range(state.shape[0]):
-        decide_game(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])

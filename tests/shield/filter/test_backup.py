@@ -9,7 +9,7 @@ from shield_scenes import distances
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 
-DOORWAY = Path(__file__).parents[1] / "data" / "doorway.json"
+DOORWAY = Path(__file__).parents[2] / "data" / "doorway.json"
 """Twelve herons of ours in a doorway, one of them inside a circle kept by rule: states, the shield's memory, wishes."""
 
 
