@@ -30,23 +30,25 @@ def games(preset):
 def test_a_batch_foresees_driven_boats_as_single_shields_do(preset):
     core, random = games(preset), np.random.default_rng(0)
     shield, home = games_shield(core), core.state.copy()
-    singles, around = [Shield(shield.config) for _ in range(GAMES)], surroundings_of(core, 0)
+    around = surroundings_of(core, 0)
     for _ in range(4):
         core.state[...] = home
         core.state[:, :, : L.Y + 1] += random.uniform(-3.0, 3.0, (GAMES, core.n_boats, 2))
         wanted = np.stack([np.full(core.state.shape[:2], 1.0), random.uniform(-90, 90, core.state.shape[:2])], -1)
         rows, ours = driven_boats(core), (core.team == 0) & ~core.is_disabled
+        shield.reset()  # boats are put elsewhere: nothing that is remembered holds
         sent = shield.decide(core.state, wanted, ours, ~core.on_side, rows).copy()
-        for b, single in enumerate(singles):
+        for b in range(GAMES):
             fleet = Fleet(
                 core.state[b].copy(),
                 core.team,
                 shield.platforms,
                 ours[b],
+                tuple("abcdef"),
                 driven=rows[b],
                 visiting=~core.on_side[b],
             )
-            told = single.decide(fleet, Commands.game_deg(wanted[b]), around)
+            told = Shield(shield.config).decide(fleet, Commands.game_deg(wanted[b]), around)
             assert np.allclose(told.sent.values, sent[b], atol=1e-6)  # the program is solved otherwise
             assert np.array_equal(told.reason, shield.reason[b])
             assert np.allclose(told.certificate_m[ours[b]], shield.certificate_m[b, ours[b]], atol=1e-6)
