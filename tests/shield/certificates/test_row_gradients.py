@@ -118,7 +118,6 @@ def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
 def table_row_gradients(task, way):
     """As `Linearised.gradients`, of the row about an opponent that is looked up and moves on in one way, or None."""
     at, n = task.at, 2 * task.count
-    C, d = np.zeros((1, n)), np.zeros(1)
 
     def margin(z):
         task.move(z)
@@ -126,13 +125,12 @@ def table_row_gradients(task, way):
         return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
 
     now = margin(task.z)
-    if now >= FAR or not rows._table_row(
-        0, 1, way, 0, at.boats, at.tuning, at.work, at.plan.gain, at.plan.z_now, C, d, 0
-    ):
+    if now >= FAR or not rows._table_row(0, 0, 1, way, task.count, at.scene):
         return None
-    scale = (at.work.threat_target_m[0, 1] + rows.AIM_M - now) / (d[0] - C[0] @ task.z)
+    C, d = at.plan.C[0, :n].copy(), at.plan.d[0]
+    scale = (at.work.threat_target_m[0, 1] + rows.AIM_M - now) / (d - C @ task.z)
     steps = STEP * np.eye(n)
-    return scale * C[0], np.array([(margin(task.z + step) - margin(task.z - step)) / (2.0 * STEP) for step in steps])
+    return scale * C, np.array([(margin(task.z + step) - margin(task.z - step)) / (2.0 * STEP) for step in steps])
 
 
 def test_turn_and_speed_do_to_the_margin_by_table_what_its_row_says():
