@@ -155,15 +155,31 @@ class Learner:
                 )
         self.model.policy.load_state_dict({name: torch.as_tensor(arrays[f"policy/{name}"]) for name in values})
         optimizer = self.model.policy.optimizer
-        state: dict[int, dict[str, torch.Tensor]] = {}
-        for name, value in arrays.items():
-            if name.startswith("adam/"):
-                _, k, key = name.split("/")
-                state.setdefault(int(k), {})[key] = torch.as_tensor(value)
-        optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
+        optimizer.load_state_dict({**optimizer.state_dict(), "state": self._moments(arrays)})
         torch.set_rng_state(torch.as_tensor(arrays["torch"]))
         self.model._n_updates, self.model.num_timesteps = (int(count) for count in arrays["counts"])
-        self.model._last_obs, self.model._last_episode_starts = arrays["last_obs"], arrays["starts"]
+        for key, name in (("last_obs", "_last_obs"), ("starts", "_last_episode_starts")):
+            if arrays[key].shape != getattr(self.model, name).shape:
+                raise ValueError(f"{key} has another shape")
+            setattr(self.model, name, arrays[key])
+
+    def _moments(self, arrays: dict[str, np.ndarray]) -> dict[int, dict[str, torch.Tensor]]:
+        """The optimiser's state, by number of parameter.
+
+        Raises:
+            ValueError: it is not that of these parameters.
+        """
+        state: dict[int, dict[str, torch.Tensor]] = {}
+        for name in (name for name in arrays if name.startswith("adam/")):
+            _, k, key = name.split("/")
+            state.setdefault(int(k), {})[key] = torch.as_tensor(arrays[name])
+        sizes = [value.shape for value in self.model.policy.parameters()]
+        for k, parts in state.items():
+            if not 0 <= k < len(sizes) or any(parts[key].shape != sizes[k] for key in ("exp_avg", "exp_avg_sq")):
+                raise ValueError(f"the optimiser's state {k} has another shape")
+        if state and len(state) != len(sizes):
+            raise ValueError("part of the optimiser's state is missing")
+        return state
 
     def _values(self) -> dict[str, Any]:
         return dict(self.model.policy.state_dict())

@@ -157,6 +157,8 @@ class TrainingSettings:
         shield_settings: of its `ShieldConfig`.
         seed: of everything.
         device: where the network learns; "auto" takes a GPU where there is one.
+        threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, and the more
+            so where other programs run.
         checkpoint_every: rollouts between checkpoints.
         start: exported weights to begin with; empty: none.
     """
@@ -180,6 +182,7 @@ class TrainingSettings:
     options: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     device: str = "auto"
+    threads: int = 1
     checkpoint_every: int = 10
     start: str = ""
 
@@ -191,6 +194,7 @@ class TrainingSettings:
         count("decisions", self.decisions, 1, 10**12)
         count("interval", self.interval, 1, 1000)
         count("seed", self.seed, 0, 2**40)
+        count("threads", self.threads, 1, 1024)
         count("checkpoint_every", self.checkpoint_every, 1, 10**6)
         if not self.stages:
             raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")

@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,12 +10,14 @@ import numpy as np
 import pytest
 import yaml
 from steerclear import policies
-from steerclear.experiments.training.checkpoints import checkpoints_in, read_checkpoint
+from steerclear.experiments.cli import app
+from steerclear.experiments.training.checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from steerclear.experiments.training.config_file import read_config
 from steerclear.experiments.training.learner import DivergedError
 from steerclear.experiments.training.training import Training
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
 
 
 def without_time(curve):
@@ -41,6 +44,15 @@ def whole(tmp_path_factory, tiny_content):
     config = folder / "c.yaml"
     config.write_text(yaml.safe_dump(tiny_content))
     return trained(config, folder / "run"), folder / "run"
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory, tiny_content):
+    folder = tmp_path_factory.mktemp("begun")
+    config = folder / "c.yaml"
+    config.write_text(yaml.safe_dump({**tiny_content, "decisions": 36}))
+    trained(config, folder / "run")
+    return folder / "run"
 
 
 def test_a_training_leaves_weights_curve_model_and_checkpoints(whole):
@@ -104,6 +116,44 @@ def test_a_damaged_or_foreign_checkpoint_is_refused_in_one_line(tiny, tmp_path, 
     newest.write_bytes(newest.read_bytes()[:500])
     with pytest.raises(ConfigError, match=r"no whole checkpoint.*delete it"):
         Training(read_config(tiny(decisions=36)), folder, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda facts, arrays: arrays.pop("counts"), "'counts' is missing"),
+        (lambda facts, arrays: facts.pop("pool"), "'pool' is missing"),
+        (lambda facts, arrays: facts.pop("settings"), "'settings' is missing"),
+        (lambda facts, arrays: arrays.update(last_obs=arrays["last_obs"][:, :5]), "last_obs has another shape"),
+        (lambda facts, arrays: arrays.pop("adam/1/exp_avg"), "'exp_avg' is missing"),
+        (lambda facts, arrays: arrays.update({"adam/0/exp_avg": np.zeros(3, np.float32)}), "another shape"),
+        (lambda facts, arrays: facts.update(rng={"kind": "MT19937"}), "'keys' is missing"),
+        (lambda facts, arrays: facts.update(stage=99), "out of range"),
+        (lambda facts, arrays: arrays.update(torch=np.zeros(7, np.uint8)), "RNG state size"),
+    ],
+)
+def test_a_checkpoint_of_another_version_is_refused_and_kept(tiny, tmp_path, begun, change, words):
+    folder = tmp_path / "run"
+    shutil.copytree(begun, folder)
+    newest = checkpoints_in(folder)[-1]
+    facts, arrays = read_checkpoint(newest)
+    change(facts, arrays)
+    write_checkpoint(folder, int(newest.stem), facts, arrays)
+    before = newest.read_bytes()
+    with pytest.raises(ConfigError, match=rf"damaged or of another version.*{words}.*delete it") as caught:
+        Training(read_config(tiny(decisions=36)), folder, resume=True)
+    assert "\n" not in str(caught.value)
+    assert newest.read_bytes() == before
+
+
+def test_the_config_of_a_training_is_kept_where_another_is_refused(tiny, tmp_path, begun):
+    folder = tmp_path / "run"
+    shutil.copytree(begun, folder)
+    (folder / "config.yaml").write_text("seed: 0\n")
+    result = CliRunner().invoke(app, ["train", str(tiny(seed=5)), "--out", str(folder), "--resume"])
+    assert result.exit_code == 2
+    assert "another seed" in result.output
+    assert (folder / "config.yaml").read_text() == "seed: 0\n"
 
 
 def test_the_exported_model_plays_as_the_trained_one(whole, tmp_path):
