@@ -41,8 +41,7 @@ class Learner:
 
     def __init__(self, settings: TrainingSettings, batch: TeamBatch, card: dict[str, Any]) -> None:
         self.settings, self.card = settings, card
-        each = settings.net.roles == "each"
-        self.env = PlacedVecEnv(batch) if each else MctfVecEnv(batch)
+        self.env = MctfVecEnv(batch) if settings.net.roles == "shared" else PlacedVecEnv(batch)
         ppo = settings.ppo
         self.model = PPO(
             BoatPolicy,
@@ -76,6 +75,7 @@ class Learner:
             "features": features_of(batch.core, net.features),
             "n_obs": batch.core.n_obs,
             "interval": batch.interval,
+            "places": len(batch.boats) if net.roles == "placed" else 0,
         }
         return {
             "net_arch": {"pi": list(net.hidden), "vf": list(net.hidden)},

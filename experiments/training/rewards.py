@@ -110,9 +110,11 @@ class Progress:
     """Metres gained per field width: towards the other flag for boats without one, towards the own side with it.
 
     The way to the flag counts while it is home and the boat free; a change of what is sought earns nothing by itself.
-    A boat that is tagged gives back all it gained since it last set out, so that running into tags again and again
-    earns nothing; what led to a capture it keeps.
+    What a tag ends is kept: it leads boats to the flag who know nothing yet, at the price that running into tags again
+    and again earns a little. See `Advance`.
     """
+
+    share_back = 0.0
 
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember ways."""
@@ -126,9 +128,9 @@ class Progress:
         way, goal = self._ways(batch)
         tagged = batch.core.is_tagged[:, batch.boats]
         same = (goal == self.goal) & (goal > 0)
-        earned = np.where(tagged, -self.gained, np.where(same, self.way - way, 0.0))
+        earned = np.where(tagged, -self.share_back * self.gained, np.where(same, self.way - way, 0.0))
         self.gained += earned
-        self.gained[(self.goal == 2) & (goal != 2)] = 0.0
+        self.gained[tagged | ((self.goal == 2) & (goal != 2))] = 0.0
         self.way[:], self.goal[:] = way, goal
         return earned / float(batch.core.config.env_bounds_m[0])
 
@@ -147,10 +149,21 @@ class Progress:
         return np.where(carries, home, np.hypot(x - flag[0], y - flag[1])), goal
 
 
+class Advance(Progress):
+    """`Progress` of which a boat gives back all since it last set out when it is tagged; a capture keeps it.
+
+    Nothing is earned without captures, so what is best stays best (potential-based: Ng, Harada and Russell 1999); boats
+    that know nothing yet learn from it to keep away from tags first.
+    """
+
+    share_back = 1.0
+
+
 TERMS: dict[str, Callable[[], Any]] = {
     "sparse": Sparse,
     "captures": Captures,
     "progress": Progress,
+    "advance": Advance,
     "own": Own,
     "tags": Tags,
     "tagged": Tagged,

@@ -78,7 +78,11 @@ class Ppo:
 
 @dataclass(frozen=True)
 class Net:
-    """The network: widths of its hidden layers, activation, one for all boats or one per role, features or raw."""
+    """The network: widths of its hidden layers, activation, who has it, features or raw observations.
+
+    ``roles``: "shared": one for all boats; "placed": one for all, told a boat's place in the team, which the rules can
+    hang on (of boats in reach of a tag, the first in order is tagged); "each": one per place.
+    """
 
     hidden: tuple[int, ...] = (128, 128)
     activation: str = "tanh"
@@ -90,7 +94,7 @@ class Net:
             raise ConfigError(f"hidden is {self.hidden!r}; give a list of widths, such as [128, 128]")
         object.__setattr__(self, "hidden", tuple(count("hidden", width, 1, 4096) for width in self.hidden))
         choice("activation", self.activation, ("tanh", "relu"))
-        choice("roles", self.roles, ("shared", "each"))
+        choice("roles", self.roles, ("shared", "placed", "each"))
         if not isinstance(self.features, bool):
             raise ConfigError(f"features is {self.features!r}; give true or false")
 
@@ -157,8 +161,8 @@ class TrainingSettings:
         shield_settings: of its `ShieldConfig`.
         seed: of everything.
         device: where the network learns; "auto" takes a GPU where there is one.
-        threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, and the more
-            so where other programs run.
+        threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, the more so
+            where other programs run.
         checkpoint_every: rollouts between checkpoints.
         start: exported weights to begin with; empty: none.
     """

@@ -66,7 +66,7 @@ def test_a_training_leaves_weights_curve_model_and_checkpoints(whole):
         assert (folder / name).stat().st_size > 0
 
 
-@pytest.mark.parametrize("roles", ["shared", "each"])
+@pytest.mark.parametrize("roles", ["shared", "placed", "each"])
 def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, roles, whole):
     changes = {"net": {"hidden": [16], "roles": roles}}
     reference = whole[0] if roles == "shared" else trained(tiny(**changes), tmp_path / "whole")
@@ -170,6 +170,24 @@ def test_the_exported_model_plays_as_the_trained_one(whole, tmp_path):
     assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
     assert (np.argmax(ours, 1) == np.argmax(logits, 1)).all()
     assert batch.network.interval == network.interval == 10
+
+
+def test_a_network_told_its_place_plays_as_it_learned_and_begins_another_training(tiny, tmp_path):
+    import torch
+
+    net = {"hidden": [16, 8], "roles": "placed"}
+    training = trained(tiny(net=net, decisions=36), tmp_path / "placed")
+    network = read_weights(tmp_path / "placed" / "final.npz")
+    seen = np.random.default_rng(0).uniform(-1, 1, (300, network.n_obs)).astype(np.float32)
+    roles = np.arange(300) % 3
+    policy = training.learner.model.policy
+    placed = torch.as_tensor(np.concatenate([seen, np.eye(3, dtype=np.float32)[roles]], axis=1))
+    with torch.no_grad():
+        logits = policy.get_distribution(placed).distribution.logits.numpy()
+    ours = network.outputs(seen, roles)
+    assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
+    again = Training(read_config(tiny(net=net, start=str(tmp_path / "placed" / "final.npz"))), tmp_path / "again")
+    assert np.abs(again.learner.network().outputs(seen, roles) - ours).max() < 1e-5
 
 
 @pytest.mark.study
