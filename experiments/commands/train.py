@@ -30,7 +30,7 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     """
     settings = read_config(config)
     folder = out_folder or Path("trainings") / config.stem
-    if settings.algorithm == "ppo" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
+    if settings.algorithm != "cloning" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
         raise ConfigError(EXTRA)
     kept = folder / CONFIG
     if not resume and (folder / "checkpoints").exists():

@@ -19,6 +19,7 @@ from torch import nn
 from .games import PlacedVecEnv
 from .networks import BoatPolicy, TeamFeatures, features_of, load_actor, network_of
 from .settings import TrainingSettings
+from .taking_over import FirstPart, first_of, pair_of
 
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
@@ -41,6 +42,10 @@ class Learner:
 
     def __init__(self, settings: TrainingSettings, batch: TeamBatch, card: dict[str, Any]) -> None:
         self.settings, self.card = settings, card
+        self.core = batch.core
+        self.first = first_of(settings, batch.core)
+        if self.first is not None:
+            batch.step = FirstPart(batch, self.first)
         self.env = MctfVecEnv(batch) if settings.net.roles == "shared" else PlacedVecEnv(batch)
         ppo = settings.ppo
         self.model = PPO(
@@ -126,8 +131,9 @@ class Learner:
         return "the loss is no longer finite; lower ppo.learning_rate or the reward weights, earlier work is kept"
 
     def network(self) -> Network:
-        """The actor as it is now."""
-        return network_of(self.model.policy, self.settings.net.activation, self.card)
+        """The actor as it is now, behind the network that plays until the flag is held, where there is one."""
+        own = network_of(self.model.policy, self.settings.net.activation, self.card)
+        return own if self.first is None else pair_of(self.first, own, self.core)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Network, optimiser, torch's random state, last observations."""

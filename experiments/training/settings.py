@@ -12,7 +12,7 @@ from ..spec import near
 from .checks import choice, count, number, texts
 
 SHIELDS = ("none", "deployment", "training", "training+intervention")
-ALGORITHMS = ("ppo", "qmix", "cloning")
+ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning")
 DEVICES = ("auto", "cpu", "cuda")
 INTERVENTION_WEIGHT = 0.02
 """Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""
@@ -32,18 +32,23 @@ class Stage:
         net: captures for less against, a game.
         games: games that the mean is over.
         most: decisions.
+        tag_probability: chance that a tag of either team succeeds in this stage, so that boats learn to bring flags
+            home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
     """
 
     opponents: tuple[str, ...] = ("medium",)
     net: float = 2.0
     games: int = 30
     most: int = 0
+    tag_probability: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
         number("net", self.net, -100.0, 100.0)
         count("games", self.games, 1, 100_000)
         count("most", self.most, 0, 10**12)
+        if self.tag_probability is not None:
+            number("tag_probability", self.tag_probability, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

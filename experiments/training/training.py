@@ -17,7 +17,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
-from .games import Timed, learners_of, stagger
+from .games import Timed, learners_of, set_tag_probability, stagger
 from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
@@ -158,6 +158,7 @@ class Training:
     def _begin_games(self, more: int = 0) -> None:
         if self.batch.opponent.learns and not self.batch.opponent.members:
             self._add_snapshot()
+        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
         self.batch._seed = self.settings.seed + more
         self.learner.begin()
         stagger(self.batch, self.settings.seed + more)
@@ -215,6 +216,7 @@ class Training:
         self._best = -np.inf if facts["best"] is None else facts["best"]
         self._wall_s = facts["wall_s"]
         self._recent = deque(facts["recent"], maxlen=self.settings.stages[self.stage].games)
+        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
         pool = self._pool()
         pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
         for name in facts["pool"]["members"]:

@@ -8,7 +8,7 @@ from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.network import Features, Network
-from steerclear.policies.entrants.learned.weights_file import write_weights
+from steerclear.policies.entrants.learned.weights_file import joined, write_weights
 from steerclear.shield.exceptions import PolicyError
 
 
@@ -71,3 +71,20 @@ def test_a_network_for_other_games_is_refused(tmp_path):
     path = write_weights(network(n_obs=30), tmp_path / "w.npz")
     with pytest.raises(PolicyError, match="takes observations of 30 numbers, this game makes 61"):
         policies.make_batch(f"weights:{path}").reset(BatchedMctf("aamas2024", 1), 0, 0)
+
+
+def test_a_second_network_takes_over_where_the_flag_is_held(tmp_path):
+    one, two = network(3, seed=1), network(1, seed=2)
+    pair = read_weights(write_weights(joined(one, two, np.array([8, 9])), tmp_path / "pair.npz"))
+    seen = np.random.default_rng(1).uniform(-1, 1, (50, 61)).astype(np.float32)
+    roles = np.arange(50) % 3
+    held = (seen[:, 8] > 0) | (seen[:, 9] > 0)
+    assert 0 < held.sum() < 50
+    expected = np.where(held[:, None], two.outputs(seen, roles), one.outputs(seen, roles))
+    np.testing.assert_allclose(pair.outputs(seen, roles), expected, atol=1e-5)  # sums in another order
+    with pytest.raises(ValueError, match="interval 4, not 5"):
+        joined(one, network(interval=4), np.array([8]))
+    with pytest.raises(ValueError, match="no numbers of the observation"):
+        joined(one, two, np.array([61]))
+    with pytest.raises(ValueError, match="a pair already"):
+        joined(pair, two, np.array([8]))
