@@ -16,6 +16,7 @@ from steerclear.shield.shared import share
 from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
 
 from .rewards import WeightedSum
+from .seldom_asked import SeldomAsked
 from .settings import Stage, TrainingSettings
 
 
@@ -40,7 +41,7 @@ def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue")
 def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
     """The learners, blue, in games against an opponent."""
     core = core_of(settings, settings.games, settings.seed)
-    return TeamBatch(
+    batch = TeamBatch(
         core,
         opponent,
         "blue",
@@ -50,6 +51,9 @@ def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
         interval=settings.interval,
         reward=WeightedSum(settings.reward_weights()),
     )
+    if settings.shielded_training and settings.shield_every > 1:
+        SeldomAsked(batch, settings.shield_every)
+    return batch
 
 
 def set_tag_probability(core: BatchedMctf, stage: Stage) -> None:

@@ -164,6 +164,8 @@ class TrainingSettings:
         rewards: weights of reward terms by name, see `rewards.TERMS`.
         shield: one of `SHIELDS`.
         shield_settings: of its `ShieldConfig`.
+        shield_every: game steps between two questions to the shield in the games learned in; with more than 1 it
+            guarantees nothing there. Evaluations ask it in every game step.
         seed: of everything.
         device: where the network learns; "auto" takes a GPU where there is one.
         threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, the more so
@@ -184,6 +186,7 @@ class TrainingSettings:
     rewards: Mapping[str, float] = field(default_factory=lambda: {"sparse": 1.0, "progress": 1.0})
     shield: str = "none"
     shield_settings: Mapping[str, Any] = field(default_factory=dict)
+    shield_every: int = 1
     ppo: Ppo = field(default_factory=Ppo)
     net: Net = field(default_factory=Net)
     evaluation: Evaluation = field(default_factory=Evaluation)
@@ -203,6 +206,7 @@ class TrainingSettings:
         count("decisions", self.decisions, 1, 10**12)
         count("interval", self.interval, 1, 1000)
         count("seed", self.seed, 0, 2**40)
+        count("shield_every", self.shield_every, 1, 1000)
         count("threads", self.threads, 1, 1024)
         count("checkpoint_every", self.checkpoint_every, 1, 10**6)
         if not self.stages:
