@@ -84,14 +84,15 @@ class LearnedBatch:
     def answer(self, observations: Any, heading_deg: Array) -> Array:
         """Commands from observations (B, n_team, n_obs) and headings (B, n_team) deg."""
         due = np.flatnonzero(self._left == 0)
-        if due.size:
-            self._decide(due, observations[due], heading_deg[due])
+        self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
+        if due.size:  # a turn that is fresh is sent as it is, as it was learned: 180 and -180 deg are different turns
+            self._out[due, :, 1] = self._decide(due, observations[due], heading_deg[due])
         self._left -= 1
         self._out[..., 0] = self._speed_mps
-        self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
         return self._out
 
-    def _decide(self, due: Any, observations: Any, heading_deg: Array) -> None:
+    def _decide(self, due: Any, observations: Any, heading_deg: Array) -> Any:
+        """Choose for the games that are due; the turns (due, n_team) deg."""
         games, boats = heading_deg.shape
         outputs = self.network.outputs(observations.reshape(games * boats, -1), np.tile(self._roles, games))
         if self.sample:
@@ -100,6 +101,7 @@ class LearnedBatch:
         self._speed_mps[due] = commands[..., 0]
         self._heading_deg[due] = heading_deg + commands[..., 1]
         self._left[due] = self.network.interval
+        return commands[..., 1]
 
     def _gumbel(self, due: Any, boats: int, actions: int) -> Any:
         """Noise whose argmax with logits is a draw by their probabilities; each game has numbers of its own."""

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -6,10 +7,11 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned import LearnedBatch, read_weights
 from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.policies.entrants.learned.weights_file import joined, write_weights
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.wrappers import TeamBatch
 
 
 def network(roles=1, interval=5, kind="discrete", n_obs=61, seed=0):
@@ -88,3 +90,28 @@ def test_a_second_network_takes_over_where_the_flag_is_held(tmp_path):
         joined(one, two, np.array([61]))
     with pytest.raises(ValueError, match="a pair already"):
         joined(pair, two, np.array([8]))
+
+
+def test_a_team_plays_as_it_learned(tmp_path):
+    """Also where a decision asks for straight astern: 180 deg, not -180, which turns the other way."""
+    config = GameConfig.preset("aamas2024", max_time_s=30.0, default_start=False)
+    learned, played = BatchedMctf(config, n_games=2, seed=4), BatchedMctf(config, n_games=2, seed=4)
+    one = network(3, interval=10)
+    astern = np.zeros(17, np.float32)
+    astern[0] = 20.0  # the first action: full speed, 180 deg
+    one = replace(one, biases=[one.biases[0], one.biases[1] + astern])
+    batch = TeamBatch(learned, interval=10, seed=4)
+    seen = batch.reset(4)
+    played.reset(seed=4)
+    team = LearnedBatch(one)
+    team.reset(played, 0, 4)
+    commands, asked = np.zeros((2, 6, 2)), 0
+    for _ in range(6):
+        actions = np.argmax(one.outputs(seen, np.tile(np.arange(3), 2)), axis=1)
+        asked += int((actions == 0).sum())
+        seen = batch.step(actions).observations
+        for _ in range(10):
+            commands[:, :3] = team.act(played, 0)
+            played.step(commands)
+    assert asked
+    np.testing.assert_allclose(played.state, learned.state, atol=1e-9)
