@@ -36,11 +36,12 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     if not resume and (folder / "checkpoints").exists():
         raise ConfigError(f"{folder} holds a training already; add --resume to go on with it, or name another --out")
     _make(folder)
-    lock_folder(folder)  # until this process ends: no other may write here
+    lock = lock_folder(folder)  # held while this function runs: no other may write here
     training = _training_of(settings, folder, resume)
     if not (kept.exists() and kept.samefile(config)):
         copyfile(config, kept)
     _run(training, folder)
+    del lock
     for name in ("curve.json", "best.npz", "final.npz", "model.zip"):
         if (folder / name).exists():
             out().print(f"{folder / name}", soft_wrap=True)
