@@ -14,6 +14,8 @@ from steerclear.shield.platforms import layout as L
 from ...scripted.team import boat_numbers, game_core
 from .network import Network
 
+DISABLED = "is_disabled"
+"""The observation's key of a boat in a power play."""
 _SEED_MASK = (1 << 64) - 1
 
 
@@ -44,7 +46,8 @@ class LearnedBatch:
         own = np.flatnonzero(core.team == team)
         self._team, self._boats = team, own if boats is None else np.asarray(boats, np.int64)
         self._roles = np.searchsorted(own, self._boats)
-        self._check(core.n_obs, own.size)
+        self._seen = self._known(core)
+        self._check(core.n_obs if self._seen is None else self._seen.size, own.size)
         shape = (core.n_games, self._boats.size)
         self._top_mps = core.max_speed_mps[self._boats]
         self._left = np.zeros(core.n_games, np.int64)
@@ -53,6 +56,14 @@ class LearnedBatch:
         self._streams = np.zeros(core.n_games, np.uint64)
         self._drawn = np.zeros(core.n_games, np.int64)
         self.restart(np.ones(core.n_games, np.bool_), seed)
+
+    def _known(self, core: Any) -> Any:
+        """Numbers of the observation without who is disabled, where a game tells that and the network never saw it."""
+        if core.n_obs == self.network.n_obs:
+            return None
+        last = [key if isinstance(key, str) else key[1] for key in core.observation_keys]
+        known = np.array([k for k, name in enumerate(last) if name != DISABLED], np.int64)
+        return known if known.size == self.network.n_obs else None
 
     def _check(self, n_obs: int, team_size: int) -> None:
         net = self.network
@@ -94,6 +105,7 @@ class LearnedBatch:
     def _decide(self, due: Any, observations: Any, heading_deg: Array) -> Any:
         """Choose for the games that are due; the turns (due, n_team) deg."""
         games, boats = heading_deg.shape
+        observations = observations if self._seen is None else observations[..., self._seen]
         outputs = self.network.outputs(observations.reshape(games * boats, -1), np.tile(self._roles, games))
         if self.sample:
             outputs = outputs + self._gumbel(due, boats, outputs.shape[1])
