@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.entrants.learned.weights_file import joined
+from steerclear.policies.entrants.learned.weights_file import joined, read_weights
 from steerclear.shield.exceptions import ConfigError
 
 from .settings import TrainingSettings
