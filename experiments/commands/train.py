@@ -30,32 +30,37 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     """
     settings = read_config(config)
     folder = out_folder or Path("trainings") / config.stem
-    if settings.algorithm == "ppo" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
+    if settings.algorithm != "cloning" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
         raise ConfigError(EXTRA)
     kept = folder / CONFIG
     if not resume and (folder / "checkpoints").exists():
         raise ConfigError(f"{folder} holds a training already; add --resume to go on with it, or name another --out")
     _make(folder)
-    lock_folder(folder)  # until this process ends: no other may write here
+    lock = lock_folder(folder)  # held while this function runs: no other may write here
+    training = _training_of(settings, folder, resume)
     if not (kept.exists() and kept.samefile(config)):
         copyfile(config, kept)
-    _run(settings, folder, resume)
+    _run(training, folder)
+    del lock
     for name in ("curve.json", "best.npz", "final.npz", "model.zip"):
         if (folder / name).exists():
             out().print(f"{folder / name}", soft_wrap=True)
 
 
-def _run(settings: Any, folder: Path, resume: bool) -> None:
+def _training_of(settings: Any, folder: Path, resume: bool) -> Any:
     from ..training.algorithms import training_of
 
-    training = training_of(settings, folder, resume)
+    return training_of(settings, folder, resume)
+
+
+def _run(training: Any, folder: Path) -> None:
     console = err()
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn(), TextColumn("left"))
     try:
         with Progress(
             *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
         ) as bar:
-            task = bar.add_task("training", total=settings.decisions, completed=training.decisions)
+            task = bar.add_task("training", total=training.settings.decisions, completed=training.decisions)
             training.run(lambda done, words: bar.update(task, completed=done, description=words, refresh=True))
     except KeyboardInterrupt:
         raise Interrupted(

@@ -33,7 +33,7 @@ def train_study(
     settings = read_config(config)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock_folder(folder)
+        lock = lock_folder(folder)
     except OSError as error:
         raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
     try:
@@ -43,4 +43,5 @@ def train_study(
         raise Interrupted(
             f"interrupted: what is done is kept in {folder}; the same command goes on from there"
         ) from None
+    del lock
     out().print(f"{folder / RESULTS}", soft_wrap=True)

@@ -18,6 +18,10 @@ def training_of(settings: TrainingSettings, folder: Path, resume: bool) -> Any:
         from .qmix_training import QmixTraining
 
         return QmixTraining(settings, folder, resume)
+    if settings.algorithm == "qmix+ppo":
+        from .two_part import TwoPartTraining
+
+        return TwoPartTraining(settings, folder, resume)
     if settings.algorithm == "cloning":
         from .cloning import CloningTraining
 

@@ -12,10 +12,12 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.game_facts import facts_of_games
+from steerclear.shield.shared import share
 from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
 
 from .rewards import WeightedSum
-from .settings import TrainingSettings
+from .seldom_asked import SeldomAsked
+from .settings import Stage, TrainingSettings
 
 
 def core_of(settings: TrainingSettings, games: int, seed: int) -> BatchedMctf:
@@ -39,7 +41,7 @@ def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue")
 def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
     """The learners, blue, in games against an opponent."""
     core = core_of(settings, settings.games, settings.seed)
-    return TeamBatch(
+    batch = TeamBatch(
         core,
         opponent,
         "blue",
@@ -49,6 +51,15 @@ def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
         interval=settings.interval,
         reward=WeightedSum(settings.reward_weights()),
     )
+    if settings.shielded_training and settings.shield_every > 1:
+        SeldomAsked(batch, settings.shield_every)
+    return batch
+
+
+def set_tag_probability(core: BatchedMctf, stage: Stage) -> None:
+    """Tags succeed as often as a stage says from now on, or the rules where it says nothing."""
+    wanted = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
+    core.rules = share(core.rules._replace(tag_probability=float(wanted)))
 
 
 def stagger(batch: TeamBatch, seed: int) -> None:

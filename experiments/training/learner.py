@@ -19,6 +19,7 @@ from torch import nn
 from .games import PlacedVecEnv
 from .networks import BoatPolicy, TeamFeatures, features_of, load_actor, network_of
 from .settings import TrainingSettings
+from .taking_over import FirstPart, first_of, pair_of
 
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
@@ -41,8 +42,11 @@ class Learner:
 
     def __init__(self, settings: TrainingSettings, batch: TeamBatch, card: dict[str, Any]) -> None:
         self.settings, self.card = settings, card
-        each = settings.net.roles == "each"
-        self.env = PlacedVecEnv(batch) if each else MctfVecEnv(batch)
+        self.core = batch.core
+        self.first = first_of(settings, batch.core)
+        if self.first is not None:
+            batch.step = FirstPart(batch, self.first)
+        self.env = MctfVecEnv(batch) if settings.net.roles == "shared" else PlacedVecEnv(batch)
         ppo = settings.ppo
         self.model = PPO(
             BoatPolicy,
@@ -76,6 +80,7 @@ class Learner:
             "features": features_of(batch.core, net.features),
             "n_obs": batch.core.n_obs,
             "interval": batch.interval,
+            "places": len(batch.boats) if net.roles == "placed" else 0,
         }
         return {
             "net_arch": {"pi": list(net.hidden), "vf": list(net.hidden)},
@@ -126,8 +131,9 @@ class Learner:
         return "the loss is no longer finite; lower ppo.learning_rate or the reward weights, earlier work is kept"
 
     def network(self) -> Network:
-        """The actor as it is now."""
-        return network_of(self.model.policy, self.settings.net.activation, self.card)
+        """The actor as it is now, behind the network that plays until the flag is held, where there is one."""
+        own = network_of(self.model.policy, self.settings.net.activation, self.card)
+        return own if self.first is None else pair_of(self.first, own, self.core)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Network, optimiser, torch's random state, last observations."""
@@ -155,15 +161,31 @@ class Learner:
                 )
         self.model.policy.load_state_dict({name: torch.as_tensor(arrays[f"policy/{name}"]) for name in values})
         optimizer = self.model.policy.optimizer
-        state: dict[int, dict[str, torch.Tensor]] = {}
-        for name, value in arrays.items():
-            if name.startswith("adam/"):
-                _, k, key = name.split("/")
-                state.setdefault(int(k), {})[key] = torch.as_tensor(value)
-        optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
+        optimizer.load_state_dict({**optimizer.state_dict(), "state": self._moments(arrays)})
         torch.set_rng_state(torch.as_tensor(arrays["torch"]))
         self.model._n_updates, self.model.num_timesteps = (int(count) for count in arrays["counts"])
-        self.model._last_obs, self.model._last_episode_starts = arrays["last_obs"], arrays["starts"]
+        for key, name in (("last_obs", "_last_obs"), ("starts", "_last_episode_starts")):
+            if arrays[key].shape != getattr(self.model, name).shape:
+                raise ValueError(f"{key} has another shape")
+            setattr(self.model, name, arrays[key])
+
+    def _moments(self, arrays: dict[str, np.ndarray]) -> dict[int, dict[str, torch.Tensor]]:
+        """The optimiser's state, by number of parameter.
+
+        Raises:
+            ValueError: it is not that of these parameters.
+        """
+        state: dict[int, dict[str, torch.Tensor]] = {}
+        for name in (name for name in arrays if name.startswith("adam/")):
+            _, k, key = name.split("/")
+            state.setdefault(int(k), {})[key] = torch.as_tensor(arrays[name])
+        sizes = [value.shape for value in self.model.policy.parameters()]
+        for k, parts in state.items():
+            if not 0 <= k < len(sizes) or any(parts[key].shape != sizes[k] for key in ("exp_avg", "exp_avg_sq")):
+                raise ValueError(f"the optimiser's state {k} has another shape")
+        if state and len(state) != len(sizes):
+            raise ValueError("part of the optimiser's state is missing")
+        return state
 
     def _values(self) -> dict[str, Any]:
         return dict(self.model.policy.state_dict())

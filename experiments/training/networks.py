@@ -36,9 +36,10 @@ class TeamFeatures(BaseFeaturesExtractor):
         features: what to make of them.
         n_obs: length of an observation, without the place.
         interval: game steps for which decisions are held; kept with the weights.
+        places: boats of a team, where one network is given their places; 0: each has its own, or none is told.
     """
 
-    def __init__(self, space: Any, features: Features, n_obs: int, interval: int) -> None:
+    def __init__(self, space: Any, features: Features, n_obs: int, interval: int, places: int = 0) -> None:
         self._n_obs = n_obs
         super().__init__(space, features.size(n_obs) + space.shape[0] - n_obs)
         for name, values in (
@@ -46,6 +47,7 @@ class TeamFeatures(BaseFeaturesExtractor):
             ("distances", features.distances),
             ("plain", features.plain(n_obs)),
             ("interval", np.array(interval)),
+            ("places", np.array(places)),
         ):
             self.register_buffer(name, torch.as_tensor(values))
         self.register_buffer("gain", torch.tensor(features.gain, dtype=torch.float32))
@@ -135,7 +137,7 @@ def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
 
 
 def load_actor(policy: Any, network: Network) -> None:
-    """Put a shared network's weights into a policy's actor of the same shape.
+    """Put the weights of a network for all boats into a policy's actor of the same shape.
 
     Raises:
         ValueError: of another shape.
@@ -144,10 +146,32 @@ def load_actor(policy: Any, network: Network) -> None:
     keys = sorted({name.rsplit(".", 1)[0] for name in names}, key=lambda name: int(name.rsplit(".", 1)[1]))
     values = policy.state_dict()
     layers = [*keys, "action_net"]
-    if len(layers) != len(network.weights) or network.roles != 1:
-        raise ValueError(f"{len(network.weights)} layers of {network.roles} roles, wanted {len(layers)} of 1")
-    for key, weight, bias in zip(layers, network.weights, network.biases, strict=True):
-        if values[f"{key}.weight"].shape != weight[0].T.shape:
-            raise ValueError(f"a layer of shape {weight[0].T.shape}, wanted {tuple(values[f'{key}.weight'].shape)}")
-        values[f"{key}.weight"].copy_(torch.as_tensor(weight[0].T))
-        values[f"{key}.bias"].copy_(torch.as_tensor(bias[0]))
+    given = _one_network(network, int(values["features_extractor.places"]))
+    if len(layers) != len(given):
+        raise ValueError(f"{len(given)} layers, wanted {len(layers)}")
+    for key, (weight, bias) in zip(layers, given, strict=True):
+        if values[f"{key}.weight"].shape != weight.T.shape:
+            raise ValueError(f"a layer of shape {weight.T.shape}, wanted {tuple(values[f'{key}.weight'].shape)}")
+        values[f"{key}.weight"].copy_(torch.as_tensor(weight.T))
+        values[f"{key}.bias"].copy_(torch.as_tensor(bias))
+
+
+def _one_network(network: Network, places: int) -> list[tuple[Any, Any]]:
+    """Weights (in, out) and bias (out,) of each layer; places, where told, are the first layer's last inputs.
+
+    Raises:
+        ValueError: it is a network per role.
+    """
+    shared = [(w, b) for w, b in zip(network.weights, network.biases, strict=True)]
+    same = all((w == w[:1]).all() and (k == 0 or (b == b[:1]).all()) for k, (w, b) in enumerate(shared))
+    if network.roles not in (1, places) or not same:
+        raise ValueError(
+            f"it has {network.roles} networks, one per role; give net: {{roles: each}} nothing to start with"
+        )
+    first_w, first_b = shared[0]
+    if places:
+        rows = np.broadcast_to(first_b, (places, first_b.shape[1]))
+        first = np.concatenate([first_w[0], rows]), np.zeros_like(first_b[0])
+    else:
+        first = first_w[0], first_b[0]
+    return [first, *((w[0], b[0]) for w, b in shared[1:])]

@@ -71,8 +71,22 @@ class Tagged:
         return -fresh.astype(float)
 
 
+class Captures(Sparse):
+    """Captures +-1 of both teams, shared by the team: what the game is won by, without a prize for grabs alone."""
+
+    def reward(self, batch: Any, changed: BoolArray) -> Array:
+        """(B, n) of the last game step."""
+        events = batch.core.events
+        net = (events[:, batch.team, 0] - events[:, 1 - batch.team, 0]).astype(float)
+        return np.repeat(net[:, None], len(batch.boats), axis=1)
+
+
 class Own:
-    """+1 to the boat that grabs, +2 to the one that brings the flag home: credit for who did it."""
+    """+1 to the boat that grabs, +2 to the one that brings the flag home, -1 to the one that loses it.
+
+    Credit for who did it. A lost flag costs the grab's prize: else boats that grab in turn and never come home earn
+    more than those that do.
+    """
 
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember who carries."""
@@ -86,31 +100,39 @@ class Own:
         core = batch.core
         now = core.has_flag[:, batch.boats]
         grabbed = now & ~self.before
-        home = self.before & ~now & (core.events[:, batch.team, 0] > 0)[:, None]
+        given = self.before & ~now
+        home = given & (core.events[:, batch.team, 0] > 0)[:, None]
         self.before[:] = now
-        return grabbed + 2.0 * home
+        return grabbed + 2.0 * home - (given & ~home)
 
 
 class Progress:
     """Metres gained per field width: towards the other flag for boats without one, towards the own side with it.
 
     The way to the flag counts while it is home and the boat free; a change of what is sought earns nothing by itself.
+    What a tag ends is kept: it leads boats to the flag who know nothing yet, at the price that running into tags again
+    and again earns a little. See `Advance`.
     """
+
+    share_back = 0.0
 
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember ways."""
         way, goal = self._ways(batch)
         if not hasattr(self, "way") or self.way.shape != way.shape:
-            self.way, self.goal = way.copy(), goal.copy()
-        self.way[games], self.goal[games] = way[games], goal[games]
+            self.way, self.goal, self.gained = way.copy(), goal.copy(), np.zeros(way.shape)
+        self.way[games], self.goal[games], self.gained[games] = way[games], goal[games], 0.0
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
         way, goal = self._ways(batch)
+        tagged = batch.core.is_tagged[:, batch.boats]
         same = (goal == self.goal) & (goal > 0)
-        gained = np.where(same, self.way - way, 0.0)
+        earned = np.where(tagged, -self.share_back * self.gained, np.where(same, self.way - way, 0.0))
+        self.gained += earned
+        self.gained[tagged | ((self.goal == 2) & (goal != 2))] = 0.0
         self.way[:], self.goal[:] = way, goal
-        return gained / float(batch.core.config.env_bounds_m[0])
+        return earned / float(batch.core.config.env_bounds_m[0])
 
     @staticmethod
     def _ways(batch: Any) -> tuple[Array, Array]:
@@ -127,9 +149,21 @@ class Progress:
         return np.where(carries, home, np.hypot(x - flag[0], y - flag[1])), goal
 
 
+class Advance(Progress):
+    """`Progress` of which a boat gives back all since it last set out when it is tagged; a capture keeps it.
+
+    Nothing is earned without captures, so what is best stays best (potential-based: Ng, Harada and Russell 1999); boats
+    that know nothing yet learn from it to keep away from tags first.
+    """
+
+    share_back = 1.0
+
+
 TERMS: dict[str, Callable[[], Any]] = {
     "sparse": Sparse,
+    "captures": Captures,
     "progress": Progress,
+    "advance": Advance,
     "own": Own,
     "tags": Tags,
     "tagged": Tagged,

@@ -12,7 +12,7 @@ from ..spec import near
 from .checks import choice, count, number, texts
 
 SHIELDS = ("none", "deployment", "training", "training+intervention")
-ALGORITHMS = ("ppo", "qmix", "cloning")
+ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning")
 DEVICES = ("auto", "cpu", "cuda")
 INTERVENTION_WEIGHT = 0.02
 """Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""
@@ -32,18 +32,23 @@ class Stage:
         net: captures for less against, a game.
         games: games that the mean is over.
         most: decisions.
+        tag_probability: chance that a tag of either team succeeds in this stage, so that boats learn to bring flags
+            home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
     """
 
     opponents: tuple[str, ...] = ("medium",)
     net: float = 2.0
     games: int = 30
     most: int = 0
+    tag_probability: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
         number("net", self.net, -100.0, 100.0)
         count("games", self.games, 1, 100_000)
         count("most", self.most, 0, 10**12)
+        if self.tag_probability is not None:
+            number("tag_probability", self.tag_probability, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,11 @@ class Ppo:
 
 @dataclass(frozen=True)
 class Net:
-    """The network: widths of its hidden layers, activation, one for all boats or one per role, features or raw."""
+    """The network: widths of its hidden layers, activation, who has it, features or raw observations.
+
+    ``roles``: "shared": one for all boats; "placed": one for all, told a boat's place in the team, which the rules can
+    hang on (of boats in reach of a tag, the first in order is tagged); "each": one per place.
+    """
 
     hidden: tuple[int, ...] = (128, 128)
     activation: str = "tanh"
@@ -90,7 +99,7 @@ class Net:
             raise ConfigError(f"hidden is {self.hidden!r}; give a list of widths, such as [128, 128]")
         object.__setattr__(self, "hidden", tuple(count("hidden", width, 1, 4096) for width in self.hidden))
         choice("activation", self.activation, ("tanh", "relu"))
-        choice("roles", self.roles, ("shared", "each"))
+        choice("roles", self.roles, ("shared", "placed", "each"))
         if not isinstance(self.features, bool):
             raise ConfigError(f"features is {self.features!r}; give true or false")
 
@@ -155,8 +164,12 @@ class TrainingSettings:
         rewards: weights of reward terms by name, see `rewards.TERMS`.
         shield: one of `SHIELDS`.
         shield_settings: of its `ShieldConfig`.
+        shield_every: game steps between two questions to the shield in the games learned in; with more than 1 it
+            guarantees nothing there. Evaluations ask it in every game step.
         seed: of everything.
         device: where the network learns; "auto" takes a GPU where there is one.
+        threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, the more so
+            where other programs run.
         checkpoint_every: rollouts between checkpoints.
         start: exported weights to begin with; empty: none.
     """
@@ -173,6 +186,7 @@ class TrainingSettings:
     rewards: Mapping[str, float] = field(default_factory=lambda: {"sparse": 1.0, "progress": 1.0})
     shield: str = "none"
     shield_settings: Mapping[str, Any] = field(default_factory=dict)
+    shield_every: int = 1
     ppo: Ppo = field(default_factory=Ppo)
     net: Net = field(default_factory=Net)
     evaluation: Evaluation = field(default_factory=Evaluation)
@@ -180,6 +194,7 @@ class TrainingSettings:
     options: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     device: str = "auto"
+    threads: int = 1
     checkpoint_every: int = 10
     start: str = ""
 
@@ -191,6 +206,8 @@ class TrainingSettings:
         count("decisions", self.decisions, 1, 10**12)
         count("interval", self.interval, 1, 1000)
         count("seed", self.seed, 0, 2**40)
+        count("shield_every", self.shield_every, 1, 1000)
+        count("threads", self.threads, 1, 1024)
         count("checkpoint_every", self.checkpoint_every, 1, 10**6)
         if not self.stages:
             raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 
 from ..provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
-from .games import Timed, learners_of, stagger
+from .games import Timed, learners_of, set_tag_probability, stagger
 from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
@@ -25,6 +26,8 @@ from .state import live_arrays, pool_facts, put_arrays, put_pool, put_rng, rng_f
 
 BEST, FINAL, MODEL, SNAPSHOTS = "best.npz", "final.npz", "model.zip", "snapshots"
 Notice = Callable[[int, str], None]
+_NOT_OURS = (KeyError, ValueError, TypeError, IndexError, AttributeError, RuntimeError, OverflowError)
+"""What putting back parts that are missing or of another kind raises."""
 
 
 class Training:
@@ -60,6 +63,8 @@ class Training:
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
         """Train to the end; what is interrupted keeps all up to the last whole rollout."""
+        before = torch.get_num_threads()
+        torch.set_num_threads(self.settings.threads)
         try:
             while self.decisions < self.settings.decisions:
                 self._iterate()
@@ -67,6 +72,7 @@ class Training:
         finally:
             write_checkpoint(self.folder, self._last[0]["rollouts"], *self._last)
             write_curve(self.folder, self._last[0]["curve"], self.settings)
+            torch.set_num_threads(before)
         write_weights(self.learner.network(), self.folder / FINAL)
         if not (self.folder / BEST).exists():
             write_weights(self.learner.network(), self.folder / BEST)
@@ -152,6 +158,7 @@ class Training:
     def _begin_games(self, more: int = 0) -> None:
         if self.batch.opponent.learns and not self.batch.opponent.members:
             self._add_snapshot()
+        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
         self.batch._seed = self.settings.seed + more
         self.learner.begin()
         stagger(self.batch, self.settings.seed + more)
@@ -193,13 +200,23 @@ class Training:
         found = checkpoints_in(self.folder)
         if not found:
             return
-        facts, arrays = _newest(found)
-        self._check_same(facts["settings"])
+        facts, arrays = read_checkpoint(found[-1])
+        try:
+            self._check_same(facts["settings"])
+            self._put_back(facts, arrays)
+        except ConfigError:
+            raise  # a kind of ValueError; says already what to do
+        except _NOT_OURS as error:
+            raise ConfigError(_not_ours(found[-1], error)) from error
+
+    def _put_back(self, facts: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what `_packed` told."""
         self.rollouts, self.decisions, self.curve = facts["rollouts"], facts["decisions"], facts["curve"]
         self.stage, self.stage_began = facts["stage"], facts["stage_began"]
         self._best = -np.inf if facts["best"] is None else facts["best"]
         self._wall_s = facts["wall_s"]
         self._recent = deque(facts["recent"], maxlen=self.settings.stages[self.stage].games)
+        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
         pool = self._pool()
         pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
         for name in facts["pool"]["members"]:
@@ -245,8 +262,13 @@ class Training:
         return f"stage {self.stage + 1}/{len(self.settings.stages)}, net {net:+.1f} a game, {rate:,.0f} decisions/s"
 
 
-def _newest(found: list[Path]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    return read_checkpoint(found[-1])
+def _not_ours(path: Path, error: Exception) -> str:
+    """What to do about a checkpoint that holds other things than this version writes."""
+    why = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
+    return (
+        f"{path} is damaged or of another version ({why or type(error).__name__}); delete it to go on from the one "
+        "before, or begin anew in another --out"
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -62,6 +62,8 @@ class Network:
         interval: game steps for which a decision is held.
         n_obs: length of an observation.
         card: where it comes from, for people.
+        carrying: the network that takes over in games where a boat of the team holds the flag; None: this one goes on.
+        carriers: numbers of the observation that tell who of the team holds it; they are above 0 for who does.
     """
 
     weights: Sequence[Floats]
@@ -72,6 +74,8 @@ class Network:
     interval: int
     n_obs: int
     card: Mapping[str, Any] = field(default_factory=dict)
+    carrying: Network | None = None
+    carriers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def roles(self) -> int:
@@ -80,7 +84,19 @@ class Network:
 
     def outputs(self, observations: Floats, roles: NDArray[np.int64]) -> Floats:
         """Last layer's values (N, out) for observations (N, n_obs) of boats with given places in their team (N,)."""
-        x = self.features.of(np.asarray(observations, np.float32))
+        seen = np.asarray(observations, np.float32)
+        out = self._own(seen, roles)
+        if self.carrying is not None and (held := self.held(seen)).any():
+            out[held] = self.carrying.outputs(seen[held], roles[held])
+        return out
+
+    def held(self, observations: Floats) -> NDArray[np.bool_]:
+        """(N,) whether a boat of the team holds the flag."""
+        found: NDArray[np.bool_] = (observations[:, self.carriers] > 0.0).any(axis=1)
+        return found
+
+    def _own(self, observations: Floats, roles: NDArray[np.int64]) -> Floats:
+        x = self.features.of(observations)
         if self.roles == 1:
             return self._through(x, 0)
         out = np.empty((len(x), self.biases[-1].shape[1]), np.float32)

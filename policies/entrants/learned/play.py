@@ -14,6 +14,8 @@ from steerclear.shield.platforms import layout as L
 from ...scripted.team import boat_numbers, game_core
 from .network import Network
 
+DISABLED = "is_disabled"
+"""The observation's key of a boat in a power play."""
 _SEED_MASK = (1 << 64) - 1
 
 
@@ -44,7 +46,8 @@ class LearnedBatch:
         own = np.flatnonzero(core.team == team)
         self._team, self._boats = team, own if boats is None else np.asarray(boats, np.int64)
         self._roles = np.searchsorted(own, self._boats)
-        self._check(core.n_obs, own.size)
+        self._seen = self._known(core)
+        self._check(core.n_obs if self._seen is None else self._seen.size, own.size)
         shape = (core.n_games, self._boats.size)
         self._top_mps = core.max_speed_mps[self._boats]
         self._left = np.zeros(core.n_games, np.int64)
@@ -53,6 +56,14 @@ class LearnedBatch:
         self._streams = np.zeros(core.n_games, np.uint64)
         self._drawn = np.zeros(core.n_games, np.int64)
         self.restart(np.ones(core.n_games, np.bool_), seed)
+
+    def _known(self, core: Any) -> Any:
+        """Numbers of the observation without who is disabled, where a game tells that and the network never saw it."""
+        if core.n_obs == self.network.n_obs:
+            return None
+        last = [key if isinstance(key, str) else key[1] for key in core.observation_keys]
+        known = np.array([k for k, name in enumerate(last) if name != DISABLED], np.int64)
+        return known if known.size == self.network.n_obs else None
 
     def _check(self, n_obs: int, team_size: int) -> None:
         net = self.network
@@ -84,15 +95,17 @@ class LearnedBatch:
     def answer(self, observations: Any, heading_deg: Array) -> Array:
         """Commands from observations (B, n_team, n_obs) and headings (B, n_team) deg."""
         due = np.flatnonzero(self._left == 0)
-        if due.size:
-            self._decide(due, observations[due], heading_deg[due])
+        self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
+        if due.size:  # a turn that is fresh is sent as it is, as it was learned: 180 and -180 deg are different turns
+            self._out[due, :, 1] = self._decide(due, observations[due], heading_deg[due])
         self._left -= 1
         self._out[..., 0] = self._speed_mps
-        self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
         return self._out
 
-    def _decide(self, due: Any, observations: Any, heading_deg: Array) -> None:
+    def _decide(self, due: Any, observations: Any, heading_deg: Array) -> Any:
+        """Choose for the games that are due; the turns (due, n_team) deg."""
         games, boats = heading_deg.shape
+        observations = observations if self._seen is None else observations[..., self._seen]
         outputs = self.network.outputs(observations.reshape(games * boats, -1), np.tile(self._roles, games))
         if self.sample:
             outputs = outputs + self._gumbel(due, boats, outputs.shape[1])
@@ -100,6 +113,7 @@ class LearnedBatch:
         self._speed_mps[due] = commands[..., 0]
         self._heading_deg[due] = heading_deg + commands[..., 1]
         self._left[due] = self.network.interval
+        return commands[..., 1]
 
     def _gumbel(self, due: Any, boats: int, actions: int) -> Any:
         """Noise whose argmax with logits is a draw by their probabilities; each game has numbers of its own."""

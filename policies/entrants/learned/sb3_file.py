@@ -87,6 +87,8 @@ def network_of_tensors(
     offsets = [head_b + (head_w[:, roles * width + r] if roles > 1 else 0.0) for r in range(roles)]
     weights, biases = [*weights, np.stack(blocks)], [*biases, np.stack(offsets)]
     features = _features(numbers) if own else Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
+    if places := int(numbers.get("features_extractor.places", 0)):
+        weights, biases = _placed(weights, biases, places)
     extra = len(features.angles) + len(features.distances)
     held = int(numbers["features_extractor.interval"]) if own else 1
     return Network(
@@ -99,6 +101,13 @@ def network_of_tensors(
         n_obs=weights[0].shape[1] - extra,
         card=card,
     )
+
+
+def _placed(weights: list[Any], biases: list[Any], places: int) -> tuple[list[Any], list[Any]]:
+    """One network given the boat's place one-hot as a network per place: its first layer's last rows become biases."""
+    first = weights[0][0]
+    weights = [np.repeat(w, places, axis=0) for w in (first[None, :-places], *weights[1:])]
+    return weights, [biases[0] + first[-places:], *(np.repeat(b, places, axis=0) for b in biases[1:])]
 
 
 def _features(numbers: Mapping[str, Any]) -> Features:

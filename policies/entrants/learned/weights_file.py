@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from steerclear.shield.exceptions import PolicyError
 
 from .network import ACTIVATIONS, KINDS, Features, Network
 
-FORMAT, VERSION = "steerclear-weights", 1
+FORMAT, VERSION, PAIR_VERSION = "steerclear-weights", 1, 2
+"""A network with one that takes over is of the second version, which readers of the first refuse."""
+TAKES_OVER = "carrying/"
 MAX_BYTES = 64 * 2**20
 """Largest unpacked size of such a file, bytes."""
 MOST_LAYERS, MOST_INTERVAL = 16, 1000
@@ -37,7 +40,7 @@ def arrays_of(network: Network) -> dict[str, Any]:
     """A network's arrays by name, its card among them."""
     about = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if network.carrying is None else PAIR_VERSION,
         "activation": network.activation,
         "kind": network.kind,
         "interval": network.interval,
@@ -49,7 +52,14 @@ def arrays_of(network: Network) -> dict[str, Any]:
     layers = {f"weight_{k}": value for k, value in enumerate(network.weights)}
     layers |= {f"bias_{k}": value for k, value in enumerate(network.biases)}
     looks = {"angles": network.features.angles, "distances": network.features.distances}
-    return {"about": np.array(json.dumps(about)), **looks, **layers}
+    return {"about": np.array(json.dumps(about)), **looks, **layers, **_arrays_of_second(network)}
+
+
+def _arrays_of_second(network: Network) -> dict[str, Any]:
+    if network.carrying is None:
+        return {}
+    second = {f"{TAKES_OVER}{name}": value for name, value in arrays_of(network.carrying).items()}
+    return {"carriers": network.carriers, **second}
 
 
 def read_weights(path: str | Path) -> Network:
@@ -98,14 +108,37 @@ def network_of(arrays: dict[str, Any]) -> Network:
         card=about["card"],
     )
     _check_shapes(network)
-    return network
+    return network if about["version"] == VERSION else _with_second(network, arrays)
+
+
+def _with_second(network: Network, arrays: dict[str, Any]) -> Network:
+    parts = {name.removeprefix(TAKES_OVER): array for name, array in arrays.items() if name.startswith(TAKES_OVER)}
+    return joined(network, network_of(parts), arrays["carriers"].astype(np.int64))
+
+
+def joined(first: Network, second: Network, carriers: Any) -> Network:
+    """A network, and one that takes over where a boat of the team holds the flag.
+
+    Raises:
+        ValueError: they are of different games or decisions, or either is such a pair already.
+    """
+    for name in ("n_obs", "kind", "interval"):
+        if getattr(first, name) != getattr(second, name):
+            raise ValueError(
+                f"the network that takes over has {name} {getattr(second, name)}, not {getattr(first, name)}"
+            )
+    if first.carrying is not None or second.carrying is not None:
+        raise ValueError("one of the two networks is a pair already")
+    if carriers.ndim != 1 or not carriers.size or carriers.min() < 0 or carriers.max() >= first.n_obs:
+        raise ValueError("carriers are no numbers of the observation")
+    return replace(first, carrying=second, carriers=carriers)
 
 
 def _check_about(about: Any) -> None:
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         raise ValueError("another kind of file")
-    if about["version"] != VERSION:
-        raise ValueError(f"format version {about['version']}, known is {VERSION}")
+    if about["version"] not in (VERSION, PAIR_VERSION):
+        raise ValueError(f"format version {about['version']}, known are {VERSION} and {PAIR_VERSION}")
     if about["activation"] not in ACTIVATIONS or about["kind"] not in KINDS:
         raise ValueError(f"unknown activation {about['activation']!r} or kind {about['kind']!r}")
     for name, most in (("layers", MOST_LAYERS), ("interval", MOST_INTERVAL), ("n_obs", 100_000)):

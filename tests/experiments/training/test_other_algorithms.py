@@ -5,9 +5,14 @@ import pytest
 from steerclear.experiments.training.algorithms import training_of
 from steerclear.experiments.training.cloning import fitted
 from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.games import learners_of
+from steerclear.experiments.training.taking_over import FirstPart
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, read_chooser
+from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.shield.exceptions import ConfigError, PolicyError
+
+NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 
 
 def test_a_clone_agrees_with_a_rule_it_was_shown():
@@ -62,6 +67,36 @@ def test_qmix_learns_from_a_replay_and_its_network_plays(tiny, tmp_path):
     network = read_weights(tmp_path / "run" / "final.npz")
     assert network.kind == "discrete"
     assert json.loads((tmp_path / "run" / "curve.json").read_text())["rows"][-1]["evaluation"]["medium"]["games"] == 2
+
+
+def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(tiny, tmp_path):
+    rules = {"max_time_s": 30.0}
+    changes = {"options": {"batch": 8, "updates": 1, "play_share": 0.5}, "decisions": 72, "rules": rules}
+    settings = read_config(tiny(algorithm="qmix+ppo", **changes))
+    training_of(settings, tmp_path / "run", False).run()
+    pair, play = read_weights(tmp_path / "run" / "final.npz"), read_weights(tmp_path / "run" / "play" / "final.npz")
+    assert pair.carrying is not None
+    assert all((one == two).all() for one, two in zip(pair.weights, play.weights, strict=True))
+    assert len(pair.carriers) == 3
+    again = training_of(settings, tmp_path / "run", True)  # the first part is kept
+    again.run()
+    assert again.decisions == 72
+
+
+def test_the_first_part_decides_where_nobody_holds_the_flag(tiny):
+    settings = read_config(tiny())
+    batch = learners_of(settings, None)
+    batch.reset(0)
+    play = Network([np.zeros((1, 61, 17), np.float32)], [np.eye(17, dtype=np.float32)[3][None]], NONE, "tanh",
+                   "discrete", 10, 61)  # fmt: skip
+    asked = []
+    batch.step = lambda actions: asked.append(actions.tolist())
+    step = FirstPart(batch, play)
+    step(np.full(6, 16))
+    batch.core.has_flag[1, 0] = True
+    batch.core.observe()
+    step(np.full(6, 16))
+    assert asked == [[3] * 6, [3, 3, 3, 16, 16, 16]]
 
 
 def test_unknown_options_are_refused(tiny, tmp_path):

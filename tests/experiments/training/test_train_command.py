@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 import yaml
 from steerclear.experiments.cli import app
+from steerclear.experiments.commands import train
+from steerclear.experiments.folder_lock import _HELD
 from steerclear.experiments.training.settings import settings_of
 from typer.testing import CliRunner
 
@@ -27,6 +29,13 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
         played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
         assert played.exit_code == 0, played.output
+
+
+def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
+    held = []
+    monkeypatch.setattr(train, "_run", lambda training, folder: held.append(folder.resolve() in _HELD))
+    assert call("train", tiny(), "--out", tmp_path / "alone").exit_code == 0
+    assert held == [True]
 
 
 def test_bad_input_is_one_line(tiny, tmp_path):

@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,12 +10,14 @@ import numpy as np
 import pytest
 import yaml
 from steerclear import policies
-from steerclear.experiments.training.checkpoints import checkpoints_in, read_checkpoint
+from steerclear.experiments.cli import app
+from steerclear.experiments.training.checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from steerclear.experiments.training.config_file import read_config
 from steerclear.experiments.training.learner import DivergedError
 from steerclear.experiments.training.training import Training
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
 
 
 def without_time(curve):
@@ -43,6 +46,15 @@ def whole(tmp_path_factory, tiny_content):
     return trained(config, folder / "run"), folder / "run"
 
 
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory, tiny_content):
+    folder = tmp_path_factory.mktemp("begun")
+    config = folder / "c.yaml"
+    config.write_text(yaml.safe_dump({**tiny_content, "decisions": 36}))
+    trained(config, folder / "run")
+    return folder / "run"
+
+
 def test_a_training_leaves_weights_curve_model_and_checkpoints(whole):
     training, folder = whole
     content = json.loads((folder / "curve.json").read_text())
@@ -54,7 +66,7 @@ def test_a_training_leaves_weights_curve_model_and_checkpoints(whole):
         assert (folder / name).stat().st_size > 0
 
 
-@pytest.mark.parametrize("roles", ["shared", "each"])
+@pytest.mark.parametrize("roles", ["shared", "placed", "each"])
 def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, roles, whole):
     changes = {"net": {"hidden": [16], "roles": roles}}
     reference = whole[0] if roles == "shared" else trained(tiny(**changes), tmp_path / "whole")
@@ -106,6 +118,44 @@ def test_a_damaged_or_foreign_checkpoint_is_refused_in_one_line(tiny, tmp_path, 
         Training(read_config(tiny(decisions=36)), folder, resume=True)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda facts, arrays: arrays.pop("counts"), "'counts' is missing"),
+        (lambda facts, arrays: facts.pop("pool"), "'pool' is missing"),
+        (lambda facts, arrays: facts.pop("settings"), "'settings' is missing"),
+        (lambda facts, arrays: arrays.update(last_obs=arrays["last_obs"][:, :5]), "last_obs has another shape"),
+        (lambda facts, arrays: arrays.pop("adam/1/exp_avg"), "'exp_avg' is missing"),
+        (lambda facts, arrays: arrays.update({"adam/0/exp_avg": np.zeros(3, np.float32)}), "another shape"),
+        (lambda facts, arrays: facts.update(rng={"kind": "MT19937"}), "'keys' is missing"),
+        (lambda facts, arrays: facts.update(stage=99), "out of range"),
+        (lambda facts, arrays: arrays.update(torch=np.zeros(7, np.uint8)), "RNG state size"),
+    ],
+)
+def test_a_checkpoint_of_another_version_is_refused_and_kept(tiny, tmp_path, begun, change, words):
+    folder = tmp_path / "run"
+    shutil.copytree(begun, folder)
+    newest = checkpoints_in(folder)[-1]
+    facts, arrays = read_checkpoint(newest)
+    change(facts, arrays)
+    write_checkpoint(folder, int(newest.stem), facts, arrays)
+    before = newest.read_bytes()
+    with pytest.raises(ConfigError, match=rf"damaged or of another version.*{words}.*delete it") as caught:
+        Training(read_config(tiny(decisions=36)), folder, resume=True)
+    assert "\n" not in str(caught.value)
+    assert newest.read_bytes() == before
+
+
+def test_the_config_of_a_training_is_kept_where_another_is_refused(tiny, tmp_path, begun):
+    folder = tmp_path / "run"
+    shutil.copytree(begun, folder)
+    (folder / "config.yaml").write_text("seed: 0\n")
+    result = CliRunner().invoke(app, ["train", str(tiny(seed=5)), "--out", str(folder), "--resume"])
+    assert result.exit_code == 2
+    assert "another seed" in result.output
+    assert (folder / "config.yaml").read_text() == "seed: 0\n"
+
+
 def test_the_exported_model_plays_as_the_trained_one(whole, tmp_path):
     training, folder = whole
     import torch
@@ -120,6 +170,24 @@ def test_the_exported_model_plays_as_the_trained_one(whole, tmp_path):
     assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
     assert (np.argmax(ours, 1) == np.argmax(logits, 1)).all()
     assert batch.network.interval == network.interval == 10
+
+
+def test_a_network_told_its_place_plays_as_it_learned_and_begins_another_training(tiny, tmp_path):
+    import torch
+
+    net = {"hidden": [16, 8], "roles": "placed"}
+    training = trained(tiny(net=net, decisions=36), tmp_path / "placed")
+    network = read_weights(tmp_path / "placed" / "final.npz")
+    seen = np.random.default_rng(0).uniform(-1, 1, (300, network.n_obs)).astype(np.float32)
+    roles = np.arange(300) % 3
+    policy = training.learner.model.policy
+    placed = torch.as_tensor(np.concatenate([seen, np.eye(3, dtype=np.float32)[roles]], axis=1))
+    with torch.no_grad():
+        logits = policy.get_distribution(placed).distribution.logits.numpy()
+    ours = network.outputs(seen, roles)
+    assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
+    again = Training(read_config(tiny(net=net, start=str(tmp_path / "placed" / "final.npz"))), tmp_path / "again")
+    assert np.abs(again.learner.network().outputs(seen, roles) - ours).max() < 1e-5
 
 
 @pytest.mark.study

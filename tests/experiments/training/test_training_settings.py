@@ -37,8 +37,8 @@ def test_a_file_that_is_none_or_no_yaml(tmp_path):
 def test_a_missing_opponent_and_an_unknown_reward_are_found_at_once():
     with pytest.raises(PolicyError, match="unknown policy 'mediun'; did you mean medium"):
         Pool(("mediun",), League(), 0)
-    with pytest.raises(ConfigError, match="unknown reward term 'captures'; choose one of sparse"):
-        learners_of(settings_of({"games": 1, "rewards": {"captures": 1.0}}), None)
+    with pytest.raises(ConfigError, match="unknown reward term 'capture'; did you mean captures"):
+        learners_of(settings_of({"games": 1, "rewards": {"capture": 1.0}}), None)
 
 
 def test_the_intervention_term_comes_with_its_shield_mode():

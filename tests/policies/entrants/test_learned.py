@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -6,10 +7,11 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned import LearnedBatch, read_weights
 from steerclear.policies.entrants.learned.network import Features, Network
-from steerclear.policies.entrants.learned.weights_file import write_weights
+from steerclear.policies.entrants.learned.weights_file import joined, write_weights
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.wrappers import TeamBatch
 
 
 def network(roles=1, interval=5, kind="discrete", n_obs=61, seed=0):
@@ -71,3 +73,45 @@ def test_a_network_for_other_games_is_refused(tmp_path):
     path = write_weights(network(n_obs=30), tmp_path / "w.npz")
     with pytest.raises(PolicyError, match="takes observations of 30 numbers, this game makes 61"):
         policies.make_batch(f"weights:{path}").reset(BatchedMctf("aamas2024", 1), 0, 0)
+
+
+def test_a_second_network_takes_over_where_the_flag_is_held(tmp_path):
+    one, two = network(3, seed=1), network(1, seed=2)
+    pair = read_weights(write_weights(joined(one, two, np.array([8, 9])), tmp_path / "pair.npz"))
+    seen = np.random.default_rng(1).uniform(-1, 1, (50, 61)).astype(np.float32)
+    roles = np.arange(50) % 3
+    held = (seen[:, 8] > 0) | (seen[:, 9] > 0)
+    assert 0 < held.sum() < 50
+    expected = np.where(held[:, None], two.outputs(seen, roles), one.outputs(seen, roles))
+    np.testing.assert_allclose(pair.outputs(seen, roles), expected, atol=1e-5)  # sums in another order
+    with pytest.raises(ValueError, match="interval 4, not 5"):
+        joined(one, network(interval=4), np.array([8]))
+    with pytest.raises(ValueError, match="no numbers of the observation"):
+        joined(one, two, np.array([61]))
+    with pytest.raises(ValueError, match="a pair already"):
+        joined(pair, two, np.array([8]))
+
+
+def test_a_team_plays_as_it_learned(tmp_path):
+    """Also where a decision asks for straight astern: 180 deg, not -180, which turns the other way."""
+    config = GameConfig.preset("aamas2024", max_time_s=30.0, default_start=False)
+    learned, played = BatchedMctf(config, n_games=2, seed=4), BatchedMctf(config, n_games=2, seed=4)
+    one = network(3, interval=10)
+    astern = np.zeros(17, np.float32)
+    astern[0] = 20.0  # the first action: full speed, 180 deg
+    one = replace(one, biases=[one.biases[0], one.biases[1] + astern])
+    batch = TeamBatch(learned, interval=10, seed=4)
+    seen = batch.reset(4)
+    played.reset(seed=4)
+    team = LearnedBatch(one)
+    team.reset(played, 0, 4)
+    commands, asked = np.zeros((2, 6, 2)), 0
+    for _ in range(6):
+        actions = np.argmax(one.outputs(seen, np.tile(np.arange(3), 2)), axis=1)
+        asked += int((actions == 0).sum())
+        seen = batch.step(actions).observations
+        for _ in range(10):
+            commands[:, :3] = team.act(played, 0)
+            played.step(commands)
+    assert asked
+    np.testing.assert_allclose(played.state, learned.state, atol=1e-9)

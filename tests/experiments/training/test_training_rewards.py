@@ -1,0 +1,70 @@
+"""What cannot be earned again and again without a capture."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from steerclear.experiments.training.rewards import Advance, Own, Progress
+from steerclear.shield.platforms.layout import N_STATE, X, Y
+
+NOW = np.ones(1, np.bool_)
+
+
+def game():
+    """One blue boat of one game, 80 x 40 m, at the own flag."""
+    core = SimpleNamespace(
+        state=np.zeros((1, 1, N_STATE)),
+        has_flag=np.zeros((1, 1), np.bool_),
+        is_tagged=np.zeros((1, 1), np.bool_),
+        flag_taken=np.zeros((1, 2), np.bool_),
+        flag_home=np.array([[10.0, 20.0], [70.0, 20.0]]),
+        events=np.zeros((1, 2, 4), np.int64),
+        config=SimpleNamespace(env_bounds_m=(80.0, 40.0)),
+    )
+    core.state[0, 0, [X, Y]] = 10.0, 20.0
+    return SimpleNamespace(core=core, boats=np.array([0]), team=0)
+
+
+def played(term, batch, moments):
+    """The term's sum over moments (x, carries, tagged, captured)."""
+    term.begin(batch, NOW)
+    total = 0.0
+    for x, carries, tagged, captured in moments:
+        core = batch.core
+        core.state[0, 0, X] = x
+        core.has_flag[:], core.is_tagged[:], core.flag_taken[0, 1] = carries, tagged, carries
+        core.events[0, 0, 0] = captured
+        total += float(term.reward(batch, NOW)[0, 0])
+    return total
+
+
+TAGGED = [(30, 0, 0, 0), (60, 1, 0, 0), (50, 1, 0, 0), (45, 0, 1, 0), (12, 0, 0, 0)]
+BROUGHT_HOME = [(30, 0, 0, 0), (60, 1, 0, 0), (50, 1, 0, 0), (39, 0, 0, 1), (38, 0, 0, 0)]
+
+
+def test_a_way_that_ends_in_a_tag_earns_nothing():
+    assert abs(played(Advance(), game(), TAGGED * 3)) < 1e-12
+    assert played(Own(), game(), TAGGED * 3) == 0.0
+    assert played(Progress(), game(), TAGGED) > 0.1
+
+
+def test_a_capture_keeps_what_it_earned():
+    batch, term = game(), Advance()
+    earned = played(term, batch, BROUGHT_HOME)
+    assert earned > 0.3
+    lost = played_on(term, batch, [(45, 0, 0, 0), (45, 0, 1, 0)])
+    assert abs(earned + lost - kept_at_home()) < 1e-9
+    assert played(Own(), game(), BROUGHT_HOME) == 3.0
+
+
+def played_on(term, batch, moments):
+    """As `played`, without a new beginning."""
+    begin, term.begin = term.begin, lambda batch, games: None
+    try:
+        return played(term, batch, moments)
+    finally:
+        term.begin = begin
+
+
+def kept_at_home():
+    """What the way to the capture earned: 20 m to the flag, 10 m home with it, in widths."""
+    return (20.0 + 10.0) / 80.0
