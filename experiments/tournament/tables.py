@@ -112,12 +112,20 @@ def price(results: Results) -> Table:
             f"{number_text(line['hits_off'])} → {number_text(line['hits_on'])}",
             _interval(line["hits"]),
             "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
-            {True: "yes", False: "no", None: "-"}[line["kept"]],
+            _kept(line),
         ]
         for line in results["prices"]
     ]
     heads = ["team", "net captures", "change", "hits", "change", "avoidable", "keeps 95 %"]
     return "Price of safety, per team and game; avoidable hits in judged games", heads, rows
+
+
+def _kept(line: Mapping[str, Any]) -> str:
+    """Whether net captures are kept; "unsure" where too few, but the interval reaches what is to be kept."""
+    if line["kept"] is not False:
+        return "yes" if line["kept"] else "-"
+    high = line["margin"]["high"]
+    return "unsure" if high is not None and high >= 0.0 else "no"
 
 
 def qualifying(results: Results) -> Table:
@@ -135,16 +143,30 @@ def agreement_lines(results: Results) -> list[str]:
     for state in results["states"]:
         for name, words in (("table_3", "Table 3"), ("table_4", "Table 4")):
             if state[name] is not None:
-                found.append(f"{words}, {shown(state['state'])}: {_agreed(state[name])}")
+                found += [f"{words}, {shown(state['state'])}: {text}" for text in _agreed(state[name])]
         if state["cycles"]:
             found.append(f"Cycles, {shown(state['state'])}: {'; '.join(state['cycles'])}.")
     return found
 
 
-def _agreed(entry: Mapping[str, Any]) -> str:
-    pairs = ", ".join(entry["disagree"])
-    return f"Kendall's tau-b {_interval(entry['kendall'])} over {', '.join(entry['teams'])}; " + (
-        f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round."
+def _agreed(entry: Mapping[str, Any]) -> list[str]:
+    """A sentence over all of the paper's teams, where others than the scripted ones are among them; then of those."""
+    scripted = entry["scripted"]
+    if scripted is None:
+        return [_sentence(entry, "")]
+    lines = [] if scripted["all_games"]["teams"] == entry["teams"] else [_sentence(entry, "")]
+    lines.append(_sentence(scripted["all_games"], ""))
+    if scripted["among"] != scripted["all_games"]:
+        lines.append(_sentence(scripted["among"], ", from the games among them alone"))
+    return lines
+
+
+def _sentence(entry: Mapping[str, Any], of: str) -> str:
+    pairs = "; ".join(entry["why"])
+    return (
+        f"Spearman's rho {_interval(entry['spearman'])}, Kendall's tau-b {_interval(entry['kendall'])} over "
+        f"{', '.join(entry['teams'])}{of}; "
+        + (f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round.")
     )
 
 
