@@ -38,7 +38,8 @@ def draw(results: Results, target: Path | BytesIO) -> None:
     axis.set_xlabel("collisions per double round robin")
     axis.set_ylabel("net captures per double round robin")
     axis.axhline(0.0, color="#999999", linewidth=0.7, zorder=0)
-    axis.margins(x=0.09)
+    axis.margins(x=0.09, y=0.12)
+    axis.set_ylim(min(-1.0, axis.get_ylim()[0]), max(1.0, axis.get_ylim()[1]))  # no captures: no ticks of hundredths
     axis.set_xlim(left=min(-0.5, axis.get_xlim()[0]))
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)  # above: arrows go everywhere

@@ -19,7 +19,7 @@ def all_tables(results: Results) -> list[Table]:
     if results["qualifying"]:
         found.append(qualifying(results))
     if results["prices"]:
-        found.append(price(results))
+        found += [kept(results), avoided(results)]
     for state in results["states"]:
         if state["standings"]:
             found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
@@ -102,22 +102,36 @@ def alpha(state: Mapping[str, Any]) -> Table:
     )
 
 
-def price(results: Results) -> Table:
-    """What the shield costs and brings, per team and game."""
+def kept(results: Results) -> Table:
+    """What the shield leaves of net captures, per team and game."""
     rows = [
         [
             line["team"],
-            f"{number_text(line['net_captures_off'])} → {number_text(line['net_captures_on'])}",
+            number_text(line["net_captures_off"]),
+            number_text(line["net_captures_on"]),
             _interval(line["net_captures"]),
-            f"{number_text(line['hits_off'])} → {number_text(line['hits_on'])}",
-            _interval(line["hits"]),
-            "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
             _kept(line),
         ]
         for line in results["prices"]
     ]
-    heads = ["team", "net captures", "change", "hits", "change", "avoidable", "keeps 95 %"]
-    return "Price of safety, per team and game; avoidable hits in judged games", heads, rows
+    heads = ["team", "no shields", "shielded", "change, paired", "keeps 95 %"]
+    return "Price of safety: net captures a game", heads, rows
+
+
+def avoided(results: Results) -> Table:
+    """What the shield leaves of hits, per team and game."""
+    rows = [
+        [
+            line["team"],
+            number_text(line["hits_off"]),
+            number_text(line["hits_on"]),
+            _interval(line["hits"]),
+            "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
+        ]
+        for line in results["prices"]
+    ]
+    heads = ["team", "no shields", "shielded", "change, paired", "avoidable, in judged games"]
+    return "Price of safety: hits a game", heads, rows
 
 
 def _kept(line: Mapping[str, Any]) -> str:

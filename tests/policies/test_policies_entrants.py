@@ -17,6 +17,7 @@ from steerclear.policies.entrants.chao.search import bolt, search, way_home
 from steerclear.policies.entrants.lucas.model import home_of
 from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
+from steerclear.policies.entrants.posts import row
 from steerclear.policies.entrants.sight import Boat, look
 from steerclear.shield.exceptions import PolicyError
 
@@ -78,6 +79,37 @@ def test_ohto_holds_near_its_base_and_never_grabs():
     assert (np.linalg.norm(before - env.core.flag_home[0], axis=1) < 20.0).all()
     assert (env.core.state[0, :3, 3] < 0.05).all()
     assert env.core.grabs.sum() == 0
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_ohto_holds_the_row_in_which_the_presets_start_boats(preset):
+    """Also where a game starts them elsewhere, in disorder and bunched beside the flag: no way is left open."""
+    env = MctfEnv(preset)
+    env.reset(seed=1)
+    starts = env.core.state[0, :3, :2].copy()
+    np.testing.assert_allclose(sorted(row(look(env.core, 0))), sorted(starts.tolist()))
+    _, held = play("ohto", preset, steps=50)
+    np.testing.assert_allclose(held.core.state[0, :3, :2], starts, atol=0.5)
+    width, height = env.config.env_bounds_m
+    places = [[0.3 * width, 0.9 * height], [0.1 * width, 0.9 * height], [0.1 * width, 0.75 * height]]
+    places += [[width - x, height - y] for x, y in places]
+    init = {"agent_position": places, "agent_heading": [0.0] * 6, "agent_speed": [0.0] * 6}
+    env = held_until(110.0, preset, init)
+    found = env.core.state[0, :3]
+    off_m = np.linalg.norm(found[:, None, :2] - starts[None], axis=2).min(axis=0)
+    assert (off_m < 0.6 * height / 4.0).all()
+    assert (found[:, 3] < 0.05).all()
+
+
+def held_until(time_s, preset, init):
+    """A game of Ohto against boats that hold."""
+    env = MctfEnv(preset)
+    observations, infos = env.reset(seed=1, options={"init_dict": init})
+    team, still = policies.make("ohto"), dict.fromkeys(env.possible_agents[3:], -1)
+    team.reset(env, env.possible_agents[:3], 1)
+    while env.core.time_s[0] < time_s:
+        observations, _, _, _, infos = env.step(team.act(observations, infos) | still)
+    return env
 
 
 def test_a_crossing_mate_of_meo_is_turned_round():
