@@ -175,8 +175,7 @@ def _show(results: dict[str, Any], folder: Path) -> None:
     for words in results["warnings"]:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for title, heads, rows in all_tables(results):
-        # lines that run on rather than cells that lose their ends
-        console.print(titled(title, heads, rows), width=max(console.width, WIDE), crop=False)
+        out(WIDE).print(titled(title, heads, rows))
         console.print()
     for words in agreement_lines(results):
         console.print(f"{words}", markup=False, soft_wrap=True)
