@@ -172,6 +172,14 @@ def test_the_planner_finds_ways_as_short_as_the_search():
             assert all(problem.open_to(cell) for cell in planned)
 
 
+def test_a_plan_does_not_hang_on_the_time_the_planner_has():
+    """Searches that share out wall time plan otherwise on a busy machine: five of these problems, in a tenth of it."""
+    pytest.importorskip("kairos", reason="extra [plan]")
+    for problem in problems():
+        found = pddl.plan(problem, 0.2)
+        assert found is None or found == pddl.plan(problem)
+
+
 def test_options_begin_and_end_where_they_say():
     env = MctfEnv("aamas2024")
     env.reset(seed=1)
