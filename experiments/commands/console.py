@@ -43,10 +43,10 @@ class Interrupted(Exception):
     """The user pressed Ctrl-C, or SIGTERM came; the text says what is kept and how to go on."""
 
 
-def out() -> Console:
-    """Return the console for results."""
-    console = SafeConsole()
-    return console if console.width <= MAX_WIDTH else SafeConsole(width=MAX_WIDTH)
+def out(least: int = 0) -> Console:
+    """Return the console for results; lines of up to ``least`` characters run on rather than lose their ends."""
+    width = SafeConsole().width
+    return SafeConsole(width=max(min(width, MAX_WIDTH), least))
 
 
 def err() -> Console:

@@ -45,6 +45,8 @@ Finalists = Annotated[
 ]
 Replays = Annotated[bool, typer.Option("--replays/--no-replays", help="Play best, worst and most changed game again.")]
 QUICK_TIME_S = 120.0
+WIDE = 104
+"""Characters of the widest table: ranks, scores and collisions with intervals, and the paper's."""
 DEFAULT_TEAMS = ",".join(SCRIPTED)
 
 
@@ -173,7 +175,7 @@ def _show(results: dict[str, Any], folder: Path) -> None:
     for words in results["warnings"]:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for title, heads, rows in all_tables(results):
-        console.print(titled(title, heads, rows))
+        out(WIDE).print(titled(title, heads, rows))
         console.print()
     for words in agreement_lines(results):
         console.print(f"{words}", markup=False, soft_wrap=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from .paper import SCRIPTED, paper_row
-from .standings import Totals, limits, ranks_of
+from .standings import Totals, column, limits, ranks_of, score_of
 
 
 def agreement(totals: Totals, penalty: float, free: bool, seed: int) -> dict[str, Any] | None:
@@ -25,23 +25,49 @@ def agreement(totals: Totals, penalty: float, free: bool, seed: int) -> dict[str
         seed: of the bootstrap.
 
     Returns:
-        ``teams``, ``kendall`` and ``spearman`` (value, low, high), ``disagree`` (pairs that the paper ranks the other
-        way), ``spearman_scripted``; None with fewer than three teams of the paper.
+        What `compared` gives over all of them and, under ``scripted``, over the scripted, searching and planning ones:
+        ``all_games``, and ``among`` from the games among these alone (None with fewer than three); None with fewer than
+        three teams of the paper.
     """
-    rows = [(k, paper_row(name)) for k, name in enumerate(totals.teams)]
-    known = [(k, row.rank_free if free else row.rank) for k, row in rows if row is not None]
+    known = [(k, _rank(name, free)) for k, name in enumerate(totals.teams) if paper_row(name) is not None]
     if len(known) < 3:
         return None
-    places, theirs = np.array([k for k, _ in known]), np.array([rank for _, rank in known], dtype=np.float64)
+    chosen = [(k, rank) for k, rank in known if totals.teams[k] in SCRIPTED]
+    scripted = None
+    if len(chosen) > 2:
+        among = totals.among([totals.teams[k] for k, _ in chosen])
+        scripted = {
+            "all_games": compared(totals, chosen, penalty, seed),
+            "among": compared(among, chosen, penalty, seed),
+        }
+    return {**compared(totals, known, penalty, seed), "scripted": scripted}
+
+
+def compared(totals: Totals, known: Sequence[tuple[int, int]], penalty: float, seed: int) -> dict[str, Any]:
+    """Compare our ranks with given ones.
+
+    Args:
+        totals: games that rank ours.
+        known: place of each team in ``totals.teams``, and its given rank.
+        penalty: weight that ranks ours.
+        seed: of the bootstrap.
+
+    Returns:
+        ``teams``, ``kendall`` and ``spearman`` (value, low, high), ``disagree`` (pairs that are given the other way
+        round) and ``why``, a sentence for each of those.
+    """
+    places, theirs = [k for k, _ in known], np.array([rank for _, rank in known], dtype=np.float64)
     ours = ranks_of(totals.sums(), penalty)[places]
-    drawn = ranks_of(totals.resampled(seed), penalty)[:, places] if totals.repetitions > 1 else None
+    scores = score_of(totals.resampled(seed), penalty)[:, places] if totals.repetitions > 1 else None
+    drawn = None if scores is None else stats.rankdata(-np.round(scores, 9), method="min", axis=-1)
+    pairs = _discordant(ours, theirs)
     names = [totals.teams[k] for k in places]
     return {
         "teams": names,
         "kendall": _interval(tau_b, ours, theirs, drawn),
         "spearman": _interval(rho, ours, theirs, drawn),
-        "spearman_scripted": _of_scripted(names, ours, theirs),
-        "disagree": [f"{a} before {b}" for a, b in _discordant(names, ours, theirs)],
+        "disagree": [f"{names[i]} before {names[j]}" for i, j in pairs],
+        "why": [_why(totals, places[i], places[j], scores, (i, j), penalty) for i, j in pairs],
     }
 
 
@@ -64,16 +90,27 @@ def _interval(measure: Any, ours: Any, theirs: Any, drawn: Any) -> dict[str, flo
     return {"value": None if np.isnan(value) else value, "low": low, "high": high}
 
 
-def _of_scripted(names: Sequence[str], ours: Any, theirs: Any) -> float | None:
-    chosen = [k for k, name in enumerate(names) if name in SCRIPTED]
-    value = rho(ours[chosen], theirs[chosen]) if len(chosen) > 2 else float("nan")
-    return None if np.isnan(value) else value
-
-
-def _discordant(names: Sequence[str], ours: Any, theirs: Any) -> list[tuple[str, str]]:
-    """Pairs in our order that the paper has the other way round."""
+def _discordant(ours: Any, theirs: Any) -> list[tuple[int, int]]:
+    """Pairs in our order that are given the other way round."""
     found = []
-    for i, j in combinations(range(len(names)), 2):
+    for i, j in combinations(range(len(ours)), 2):
         if (ours[i] - ours[j]) * (theirs[i] - theirs[j]) < 0:
-            found.append((names[i], names[j]) if ours[i] < ours[j] else (names[j], names[i]))
+            found.append((i, j) if ours[i] < ours[j] else (j, i))
     return found
+
+
+def _why(totals: Totals, first: int, second: int, scores: Any, pair: tuple[int, int], penalty: float) -> str:
+    """What puts one team before another: net captures, collisions, and how sure it is."""
+    sums = totals.sums()[[first, second]]
+    (a, b), (x, y) = score_of(sums, 0.0), sums[:, column("collisions")]
+    words = f"{totals.teams[first]} before {totals.teams[second]}: net captures {a:+.1f} and {b:+.1f}"
+    words += f", collisions {x:.1f} and {y:.1f}" if penalty else ""
+    if scores is None:
+        return words
+    return f"{words}, so in {100 * np.mean(scores[:, pair[0]] > scores[:, pair[1]] + 1e-9):.0f} % of resamples"
+
+
+def _rank(team: str, free: bool) -> int:
+    row = paper_row(team)
+    assert row is not None  # its caller asked
+    return row.rank_free if free else row.rank

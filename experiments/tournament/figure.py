@@ -31,18 +31,24 @@ def draw(results: Results, target: Path | BytesIO) -> None:
     before, after = ({line["team"]: line for line in state["standings"]} for state in (shown[0], shown[-1]))
     canvas = Figure(figsize=(7.5, 4.6), layout="constrained", dpi=150)
     axis = canvas.subplots()
-    for number, team in enumerate(sorted(set(before) & set(after))):
+    for number, team in enumerate(sorted(set(before) & set(after), key=lambda team: _place(before[team]))):
         _arrow(axis, team, before[team], after[team], number)
     axis.scatter([], [], color=COLOURS["off"], label="without shields")
     axis.scatter([], [], color=COLOURS["on"], label="shielded")
     axis.set_xlabel("collisions per double round robin")
     axis.set_ylabel("net captures per double round robin")
     axis.axhline(0.0, color="#999999", linewidth=0.7, zorder=0)
-    axis.margins(x=0.09)
+    axis.margins(x=0.09, y=0.12)
+    axis.set_ylim(min(-1.0, axis.get_ylim()[0]), max(1.0, axis.get_ylim()[1]))  # no captures: no ticks of hundredths
     axis.set_xlim(left=min(-0.5, axis.get_xlim()[0]))
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)  # above: arrows go everywhere
     canvas.savefig(target, format="png")
+
+
+def _place(line: Mapping[str, Any]) -> tuple[float, float]:
+    """Height, then way to the right: teams whose labels could meet follow each other."""
+    return float(line["net_captures"]), float(line["collisions"])
 
 
 def _arrow(axis: Any, team: str, before: Mapping[str, Any], after: Mapping[str, Any], number: int) -> None:
@@ -53,5 +59,5 @@ def _arrow(axis: Any, team: str, before: Mapping[str, Any], after: Mapping[str, 
     )
     axis.scatter([x0], [y0], color=COLOURS["off"], zorder=3)
     axis.scatter([x1], [y1], color=COLOURS["on"], zorder=3)
-    # labels of teams that start at the same height alternate above and below their dots
+    # labels alternate above and below their dots
     axis.annotate(plot_text(team), (x0, y0), (4, 7 if number % 2 == 0 else -13), textcoords="offset points", fontsize=9)

@@ -62,8 +62,8 @@ _AGREEMENT = {
     "teams[]": "teams that are in both rankings",
     **{f"kendall.{k}": f"Kendall's tau-b, {v}" for k, v in _LIMITS.items()},
     **{f"spearman.{k}": f"Spearman's rho, {v}" for k, v in _LIMITS.items()},
-    "spearman_scripted": "Spearman's rho over the scripted, searching and planning teams; null where it has none",
     "disagree[]": "pairs in our order that the paper has the other way round",
+    "why[]": "of each such pair: net captures, collisions, share of resamples that have it so",
 }
 _PRICE = {
     "team": "name",
@@ -76,6 +76,7 @@ _PRICE = {
     "hits_on": "on",
     **{f"hits.{k}": f"change of hits per game, on - off, paired: {v}" for k, v in _LIMITS.items()},
     "kept": "whether net captures stay at 95 % or more of those without",
+    **{f"margin.{k}": f"net captures per game above those 95 %, paired: {v}" for k, v in _LIMITS.items()},
     "judged": "shielded games that were judged",
     "avoidable": "avoidable hits in them; null when none was judged",
     "avoidable_per_game": "null when none was judged",
@@ -112,6 +113,13 @@ TOURNAMENT = {
     "states[].table_3": "agreement with the paper's Table 3; null with fewer than three of its teams",
     "states[].table_4": "agreement with the paper's Table 4, penalty off",
     **{f"states[].table_{n}.{k}": v for n in (3, 4) for k, v in _AGREEMENT.items()},
+    **{
+        f"states[].table_{n}.scripted.{games}.{k}": f"{v}; scripted teams alone{words}"
+        for n in (3, 4)
+        for games, words in (("all_games", ""), ("among", ", of the games among them"))
+        for k, v in _AGREEMENT.items()
+    },
+    **{f"states[].table_{n}.scripted": "null with fewer than three scripted teams" for n in (3, 4)},
     **{f"prices[].{k}": v for k, v in _PRICE.items()},
     "bars[].name": "what is judged",
     "bars[].value": "measured",

@@ -13,7 +13,7 @@ from ..page import as_text, report_page, template, write_page
 from ..report_parts import bars_table as bars_html
 from ..report_parts import replay_links, values_table
 from .figure import can_be_drawn, draw
-from .tables import Table, agreement_lines, all_tables
+from .tables import Table, agreement_lines, all_tables, shown
 
 Results = Mapping[str, Any]
 IMAGES = "; img-src data:"
@@ -81,7 +81,15 @@ def subtitle(results: Results) -> str:
         + (f" of {length:g} s" if length else "")
         + f", {repetitions} repetition{'' if repetitions == 1 else 's'} of every pair on both sides in every state, "
         + f"seeds {settings['seed']} to {settings['seed'] + repetitions - 1}, penalty {settings['penalty']:g}"
-        + ("" if results["complete"] else "; not complete")
+        + ("" if results["complete"] else f"; not complete: {_there(results)}")
+    )
+
+
+def _there(results: Results) -> str:
+    """What there is of each state of a tournament that is not complete, and what its tables count."""
+    return "; ".join(
+        f"{shown(state['state'])} {state['games']} games, repetitions of every pair that met: {state['repetitions']}"
+        for state in results["states"]
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..spec import SIDES
-from ..statistics import Interval, count_interval, mean_interval, paired_ratio
+from ..statistics import Interval, bootstrap_interval, count_interval, mean_interval, paired_ratio
 
 Row = Mapping[str, Any]
 KEPT = 0.95
@@ -49,16 +49,20 @@ def _price(team: str, pairs: Sequence[tuple[Row, Row]], seed: int) -> dict[str, 
         "hits_on": float(hits[:, 1].mean()) if len(seen) else None,
         "hits": _plain(mean_interval(hits[:, 1] - hits[:, 0], seed)),
         "kept": keeps(net),
+        "margin": _plain(bootstrap_interval(net.astype(np.float64), _margin, seed)),
         **avoidable([(after, side) for _, after, side in seen]),
     }
 
 
 def keeps(net: Any) -> bool | None:
     """Whether net captures stay at 95 % or more of those without (a loss may grow by 5 %); None without games."""
-    if len(net) == 0:
-        return None
-    off, on = net.sum(axis=0)
-    return bool(on >= off - (1.0 - KEPT) * abs(off))
+    return None if len(net) == 0 else bool(_margin(np.asarray(net, dtype=np.float64)) >= -1e-9)
+
+
+def _margin(net: Any) -> Any:
+    """Net captures per game above what is to be kept, from (..., games, [off, on])."""
+    off, on = np.moveaxis(net.mean(axis=-2), -1, 0)
+    return on - off + (1.0 - KEPT) * np.abs(off)
 
 
 def avoidable(seen: Sequence[tuple[Row, str]]) -> dict[str, Any]:

@@ -157,10 +157,7 @@ def bars_of(rows: Sequence[Row], teams: Sequence[str], settings: TournamentSetti
     for state in settings.states:
         table = state_results(rows, state, teams, settings)
         if state == OFF and table["table_3"] is not None:
-            value = table["table_3"]["spearman_scripted"]
-            name = "Spearman's rho of unshielded ranks and Table 3, scripted teams"
-            met = None if value is None else value >= SPEARMAN
-            bars.append(_bar(name, value, ">=", SPEARMAN, met))
+            bars.append(_spearman_bar(table["table_3"]["scripted"]))
     never = [row[f"{side}_grabs"] for row in rows for side in SIDES if row[side] in NEVER_GRAB]
     if never:
         bars.append(_bar("grabs of Ohto and Alamer, all games", float(sum(never)), "<=", 0.0, sum(never) == 0))
@@ -175,6 +172,13 @@ def bars_of(rows: Sequence[Row], teams: Sequence[str], settings: TournamentSetti
         name = "teams that keep 95 % of their net captures, of those shielded"
         bars.append(_bar(name, float(sum(kept)), ">=", float(len(kept)), all(kept)))
     return bars
+
+
+def _spearman_bar(scripted: Mapping[str, Any] | None) -> dict[str, Any]:
+    found = {"value": None, "low": None, "high": None} if scripted is None else scripted["all_games"]["spearman"]
+    met = None if found["value"] is None else found["value"] >= SPEARMAN
+    bar = _bar("Spearman's rho of unshielded ranks and Table 3, scripted teams", found["value"], ">=", SPEARMAN, met)
+    return bar | {"low": found["low"], "high": found["high"]}
 
 
 def _bar(name: str, value: float | None, sense: str, limit: float, met: bool | None) -> dict[str, Any]:

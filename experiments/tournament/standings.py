@@ -49,6 +49,11 @@ class Totals:
                     values[s, r, list(teams).index(name)] = _figures(games[repetition], own, other)
         return cls(tuple(teams), values, tuple(found))
 
+    def among(self, names: Sequence[str]) -> Totals:
+        """The same, of the games among some teams alone."""
+        kept = [s for s, pair in enumerate(self.strata) if set(pair) <= set(names)]
+        return Totals(self.teams, self.values[kept], tuple(self.strata[s] for s in kept))
+
     @property
     def repetitions(self) -> int:
         """Repetitions that all pairs have played."""

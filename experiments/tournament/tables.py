@@ -19,7 +19,7 @@ def all_tables(results: Results) -> list[Table]:
     if results["qualifying"]:
         found.append(qualifying(results))
     if results["prices"]:
-        found.append(price(results))
+        found += [kept(results), avoided(results)]
     for state in results["states"]:
         if state["standings"]:
             found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
@@ -102,22 +102,44 @@ def alpha(state: Mapping[str, Any]) -> Table:
     )
 
 
-def price(results: Results) -> Table:
-    """What the shield costs and brings, per team and game."""
+def kept(results: Results) -> Table:
+    """What the shield leaves of net captures, per team and game."""
     rows = [
         [
             line["team"],
-            f"{number_text(line['net_captures_off'])} → {number_text(line['net_captures_on'])}",
+            number_text(line["net_captures_off"]),
+            number_text(line["net_captures_on"]),
             _interval(line["net_captures"]),
-            f"{number_text(line['hits_off'])} → {number_text(line['hits_on'])}",
-            _interval(line["hits"]),
-            "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
-            {True: "yes", False: "no", None: "-"}[line["kept"]],
+            _kept(line),
         ]
         for line in results["prices"]
     ]
-    heads = ["team", "net captures", "change", "hits", "change", "avoidable", "keeps 95 %"]
-    return "Price of safety, per team and game; avoidable hits in judged games", heads, rows
+    heads = ["team", "no shields", "shielded", "change, paired", "keeps 95 %"]
+    return "Price of safety: net captures a game", heads, rows
+
+
+def avoided(results: Results) -> Table:
+    """What the shield leaves of hits, per team and game."""
+    rows = [
+        [
+            line["team"],
+            number_text(line["hits_off"]),
+            number_text(line["hits_on"]),
+            _interval(line["hits"]),
+            "-" if line["avoidable"] is None else f"{line['avoidable']} in {line['judged']}",
+        ]
+        for line in results["prices"]
+    ]
+    heads = ["team", "no shields", "shielded", "change, paired", "avoidable, in judged games"]
+    return "Price of safety: hits a game", heads, rows
+
+
+def _kept(line: Mapping[str, Any]) -> str:
+    """Whether net captures are kept; "unsure" where too few, but the interval reaches what is to be kept."""
+    if line["kept"] is not False:
+        return "yes" if line["kept"] else "-"
+    high = line["margin"]["high"]
+    return "unsure" if high is not None and high >= 0.0 else "no"
 
 
 def qualifying(results: Results) -> Table:
@@ -135,16 +157,30 @@ def agreement_lines(results: Results) -> list[str]:
     for state in results["states"]:
         for name, words in (("table_3", "Table 3"), ("table_4", "Table 4")):
             if state[name] is not None:
-                found.append(f"{words}, {shown(state['state'])}: {_agreed(state[name])}")
+                found += [f"{words}, {shown(state['state'])}: {text}" for text in _agreed(state[name])]
         if state["cycles"]:
             found.append(f"Cycles, {shown(state['state'])}: {'; '.join(state['cycles'])}.")
     return found
 
 
-def _agreed(entry: Mapping[str, Any]) -> str:
-    pairs = ", ".join(entry["disagree"])
-    return f"Kendall's tau-b {_interval(entry['kendall'])} over {', '.join(entry['teams'])}; " + (
-        f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round."
+def _agreed(entry: Mapping[str, Any]) -> list[str]:
+    """A sentence over all of the paper's teams, where others than the scripted ones are among them; then of those."""
+    scripted = entry["scripted"]
+    if scripted is None:
+        return [_sentence(entry, "")]
+    lines = [] if scripted["all_games"]["teams"] == entry["teams"] else [_sentence(entry, "")]
+    lines.append(_sentence(scripted["all_games"], ""))
+    if scripted["among"] != scripted["all_games"]:
+        lines.append(_sentence(scripted["among"], ", from the games among them alone"))
+    return lines
+
+
+def _sentence(entry: Mapping[str, Any], of: str) -> str:
+    pairs = "; ".join(entry["why"])
+    return (
+        f"Spearman's rho {_interval(entry['spearman'])}, Kendall's tau-b {_interval(entry['kendall'])} over "
+        f"{', '.join(entry['teams'])}{of}; "
+        + (f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round.")
     )
 
 

@@ -23,6 +23,12 @@ def arc(sight: Sight) -> list[Point]:
     return [ahead(sight.home, first + k * step, radius) for k in range(len(sight.own))]
 
 
+def row(sight: Sight) -> list[Point]:
+    """A station per own boat in a row across the own half, midway to the dividing line: the presets' start places."""
+    x, gap = 0.5 * (sight.home[0] + sight.line), sight.size[1] / (len(sight.own) + 1)
+    return [(x, gap * (k + 1)) for k in range(len(sight.own))]
+
+
 def assign(starts: Sequence[Point], ends: Sequence[Point]) -> list[int]:
     """For each start the number of its end, the sum of all distances being least; -1 where ends are fewer."""
     costs = np.array([[distance(a, b) for b in ends] for a in starts])

@@ -17,6 +17,7 @@ from steerclear.policies.entrants.chao.search import bolt, search, way_home
 from steerclear.policies.entrants.lucas.model import home_of
 from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
+from steerclear.policies.entrants.posts import row
 from steerclear.policies.entrants.sight import Boat, look
 from steerclear.shield.exceptions import PolicyError
 
@@ -80,6 +81,37 @@ def test_ohto_holds_near_its_base_and_never_grabs():
     assert env.core.grabs.sum() == 0
 
 
+@pytest.mark.parametrize("preset", PRESETS)
+def test_ohto_holds_the_row_in_which_the_presets_start_boats(preset):
+    """Also where a game starts them elsewhere, in disorder and bunched beside the flag: no way is left open."""
+    env = MctfEnv(preset)
+    env.reset(seed=1)
+    starts = env.core.state[0, :3, :2].copy()
+    np.testing.assert_allclose(sorted(row(look(env.core, 0))), sorted(starts.tolist()))
+    _, held = play("ohto", preset, steps=50)
+    np.testing.assert_allclose(held.core.state[0, :3, :2], starts, atol=0.5)
+    width, height = env.config.env_bounds_m
+    places = [[0.3 * width, 0.9 * height], [0.1 * width, 0.9 * height], [0.1 * width, 0.75 * height]]
+    places += [[width - x, height - y] for x, y in places]
+    init = {"agent_position": places, "agent_heading": [0.0] * 6, "agent_speed": [0.0] * 6}
+    env = held_until(110.0, preset, init)
+    found = env.core.state[0, :3]
+    off_m = np.linalg.norm(found[:, None, :2] - starts[None], axis=2).min(axis=0)
+    assert (off_m < 0.6 * height / 4.0).all()
+    assert (found[:, 3] < 0.05).all()
+
+
+def held_until(time_s, preset, init):
+    """A game of Ohto against boats that hold."""
+    env = MctfEnv(preset)
+    observations, infos = env.reset(seed=1, options={"init_dict": init})
+    team, still = policies.make("ohto"), dict.fromkeys(env.possible_agents[3:], -1)
+    team.reset(env, env.possible_agents[:3], 1)
+    while env.core.time_s[0] < time_s:
+        observations, _, _, _, infos = env.step(team.act(observations, infos) | still)
+    return env
+
+
 def test_a_crossing_mate_of_meo_is_turned_round():
     boats = [Boat(10.0, y, 0.0, 0.0, 2.0, 1.0, False, False, True, True) for y in (10.0, 20.0)]
     assert plane.cross(boats[0].at, (30.0, 20.0), boats[1].at, (30.0, 10.0))
@@ -138,6 +170,14 @@ def test_the_planner_finds_ways_as_short_as_the_search():
         if planned is not None:
             assert len(planned) == len(searched)
             assert all(problem.open_to(cell) for cell in planned)
+
+
+def test_a_plan_does_not_hang_on_the_time_the_planner_has():
+    """Searches that share out wall time plan otherwise on a busy machine: five of these problems, in a tenth of it."""
+    pytest.importorskip("kairos", reason="extra [plan]")
+    for problem in problems():
+        found = pddl.plan(problem, 0.2)
+        assert found is None or found == pddl.plan(problem)
 
 
 def test_options_begin_and_end_where_they_say():

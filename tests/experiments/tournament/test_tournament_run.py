@@ -12,7 +12,7 @@ from steerclear.experiments.store import ResultStore
 from steerclear.experiments.tournament import campaign as played
 from steerclear.experiments.tournament.campaign import Tournament
 from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
-from steerclear.experiments.tournament.pages import write_html, write_markdown
+from steerclear.experiments.tournament.pages import subtitle, write_html, write_markdown
 from steerclear.experiments.tournament.play import play_game
 from steerclear.experiments.tournament.replays import chosen_games
 from steerclear.experiments.tournament.results import results_of, silent_teams
@@ -94,6 +94,7 @@ def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatc
     monkeypatch.undo()
     again = Tournament(settings(), ResultStore(tmp_path / "cut", resume=True))
     assert again.resumed == 2
+    assert subtitle(results(again)).endswith("not complete: no shields 2 games, repetitions of every pair that met: 1")
     again.run()
     assert without_times(again.rows()) == without_times(whole.rows())
     assert str(results(again)["states"]) == str(results(whole)["states"])

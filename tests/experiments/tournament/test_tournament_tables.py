@@ -6,6 +6,7 @@ from steerclear.experiments.tournament.agreement import agreement, rho, tau_b
 from steerclear.experiments.tournament.paper import PAPER
 from steerclear.experiments.tournament.price import keeps, prices
 from steerclear.experiments.tournament.standings import Totals, column, score_of, standings
+from steerclear.experiments.tournament.tables import _agreed, _kept
 from steerclear.experiments.tournament.winning import alpha_rank, cycles, win_matrix
 
 PLAIN = {"captures": 0, "grabs": 0, "tags": 0, "collisions": 0, "hits_teammate": 0, "hits_opponent": 0}
@@ -74,6 +75,25 @@ def test_pairs_the_other_way_round_are_named():
     assert agreement(Totals.of(rows[:1], ["lucas", "x"]), 0.25, False, 0) is None  # one team of the paper
 
 
+def test_the_scripted_are_compared_on_all_games_and_on_those_among_them():
+    """Alamer loses to a learned team alone: among the scripted it stands where the paper has it."""
+    rows = [game(a, b, k) for k in range(4) for a in ("lucas", "alamer", "meo", "jin") for b in ("x",)]
+    rows += [game("lucas", "meo", k, red_collisions=3) for k in range(4)]
+    rows += [game("lucas", "alamer", k, red_collisions=1) for k in range(4)]
+    rows += [game("alamer", "jin", k, red_captures=2 + k % 2) for k in range(4)]
+    found = agreement(Totals.of(rows, ["lucas", "alamer", "meo", "jin", "x"]), 0.25, False, 0)
+    among, over_all = found["scripted"]["among"], found["scripted"]["all_games"]
+    assert among["teams"] == over_all["teams"] == ["lucas", "alamer", "meo"]
+    assert among["kendall"] == {"value": pytest.approx(1.0), "low": pytest.approx(1.0), "high": pytest.approx(1.0)}
+    assert over_all["spearman"]["value"] == pytest.approx(0.5)
+    why = "meo before alamer: net captures +0.0 and -2.5, collisions 3.0 and 1.0, so in 100 % of resamples"
+    assert over_all["why"] == [why]
+    assert "jin" in found["teams"]
+    words = " ".join(_agreed(found))
+    assert "from the games among them alone; no pair is the other way round" in words
+    assert why in words
+
+
 def test_rank_measures_know_ties():
     assert tau_b(np.array([1, 2, 2, 4]), np.array([1, 2, 2, 4])) == pytest.approx(1.0)
     assert np.isnan(rho(np.ones(4), np.arange(4)))
@@ -105,6 +125,7 @@ def test_prices_pair_games_of_the_same_seed():
     assert line["captures_kept"]["value"] == 0.5
     assert line["kept"] is False
     assert line["avoidable"] is None  # nobody judged
+    assert line["margin"]["value"] == pytest.approx(-0.9)  # of 2 it is to keep 1.9
 
 
 @pytest.mark.parametrize(
@@ -113,3 +134,17 @@ def test_prices_pair_games_of_the_same_seed():
 def test_a_team_keeps_its_net_captures(off, on, kept):
     assert keeps(np.array([[off, on]])) is kept
     assert score_of(np.zeros(9), 0.25) == 0.0
+
+
+def test_a_loss_that_may_be_chance_is_called_unsure():
+    rows = [game("a", "b", k, "off") for k in range(6)] + [
+        game("a", "b", k, "all", red_captures=k % 2) for k in range(6)
+    ]
+    assert _kept(prices(rows, ["a"], "off", "all", 0)[0]) == "no"
+    rows[6]["blue_captures"] = 3
+    line = prices(rows, ["a"], "off", "all", 0)[0]
+    assert (line["kept"], _kept(line)) == (True, "yes")
+    rows[6]["blue_captures"] = 2
+    rows[7]["red_captures"] = 2
+    line = prices(rows, ["a"], "off", "all", 0)[0]
+    assert (line["kept"], _kept(line)) == (False, "unsure")
