@@ -57,14 +57,16 @@ def ablate(
 
     Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input or a policy that never played, 130 interrupted.
     """
+    played = o.game_settings(max_time, platform, rules)
+    asked = o.shield_settings(separation, certificate, profile, solver, shield_set)
     settings = AblationSettings(
         preset=preset,
         own=own,
         opponents=o.split_names(opponents, "--opponents"),
         seed=seed,
-        shield=o.shield_settings(separation, certificate, profile, solver, shield_set),
+        shield=o.with_distance(asked, preset, played),
         shield_autopilot=not no_shield_autopilot,
-        rules=o.game_settings(max_time, platform, rules),
+        rules=played,
         fixed_start=fixed_start,
         penalty=penalty,
         judge=judge,

@@ -62,15 +62,16 @@ def evaluate(
     unused = [name for name in wanted if name != "separation_m"]  # at that radius breaches are counted anyhow
     if unused and not shield:
         raise ConfigError(f"the shield is off, and {', '.join(unused)} would change nothing; add --shield")
+    played = o.game_settings(max_time, platform, rules)
     settings = AblationSettings(
         preset=preset,
         own=policy,
         opponents=o.split_names(opponents, "--opponents"),
         seed=seed,
-        shield=wanted,
+        shield=o.with_distance(wanted, preset, played),
         states=(shield,),
         shield_autopilot=not no_shield_autopilot,
-        rules=o.game_settings(max_time, platform, rules),
+        rules=played,
         fixed_start=fixed_start,
         penalty=penalty,
         judge=judge,

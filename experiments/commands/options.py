@@ -7,9 +7,13 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
+from steerclear.env.config import GameConfig
 from steerclear.shield.config import PROFILES
 from steerclear.shield.exceptions import ConfigError
+
+from ..tally import RADII_M
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
 Own = Annotated[str, typer.Option(metavar="NAME", help="Policy of the shielded team: a name or a submission's path.")]
@@ -26,7 +30,9 @@ Address = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with what an interrupted run left in --out.")]
 Quick = Annotated[bool, typer.Option("--quick", help="The small version: fewer and shorter games.")]
-Separation = Annotated[float | None, typer.Option(metavar="M", help="Radius the shield keeps, m.", show_default="2.5")]
+Separation = Annotated[
+    float | None, typer.Option(metavar="M", help="Radius the shield keeps, m.", show_default="at which the game counts")
+]
 Certificate = Annotated[str | None, typer.Option(metavar="NAME", help="Certificate of the shield.")]
 Profile = Annotated[
     str | None, typer.Option(metavar="NAME", help=f"Whom opponents are taken for: {', '.join(PROFILES)}.")
@@ -116,6 +122,17 @@ def shield_settings(
     """
     named = {"separation_m": separation, "certificate": certificate, "profile": profile, "solver": solver}
     return _together(named, pairs, "--shield-set")
+
+
+def with_distance(shield: dict[str, Any], preset: str, rules: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a shield for a game: where none is given it keeps the distance at which the game counts collisions.
+
+    Raises:
+        ConfigError: a rule is unknown or unusable.
+    """
+    radius_m = float(np.max(GameConfig.preset(preset, **rules).agent_radius_m))
+    counted = {} if 2.0 * radius_m <= RADII_M[0] else {"separation_m": 2.0 * radius_m}
+    return {**counted, **shield}
 
 
 def game_settings(max_time_s: float | None, platform: str | None, pairs: list[str] | None) -> dict[str, Any]:

@@ -91,15 +91,16 @@ def play(
     asked = o.shield_settings(separation, certificate, profile, solver, shield_set)
     if asked and not shield:
         raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
+    played = o.game_settings(max_time, platform, rules)
     spec = MatchSpec(
         preset=preset,
         own=own,
         opponent=opponent,
         seed=seed,
         side=side,
-        shield=asked if shield else None,
+        shield=o.with_distance(asked, preset, played) if shield else None,
         shield_autopilot=not no_shield_autopilot,
-        rules=o.game_settings(max_time, platform, rules),
+        rules=played,
         fixed_start=fixed_start,
         penalty=check_penalty(penalty),
         conditions=Conditions(delay, noise, current),

@@ -82,6 +82,8 @@ def tournament(
 
     Exit status: 0 done, 1 a bar is not met (with --check), 2 bad input or a team that never played, 130 interrupted.
     """
+    played = o.game_settings(max_time, None, rules)
+    asked = o.shield_settings(separation, None, None, None, shield_set)
     settings = TournamentSettings(
         teams=o.split_names(teams, "--teams"),
         preset=preset,
@@ -92,8 +94,8 @@ def tournament(
         finalists=finalists,
         penalty=check_penalty(penalty),
         judge=check_judge(judge),
-        shield=o.shield_settings(separation, None, None, None, shield_set),
-        rules=o.game_settings(max_time, None, rules),
+        shield=o.with_distance(asked, preset, played),
+        rules=played,
         fixed_start=fixed_start,
         trust=trust,
         answer_s=answer_time,
