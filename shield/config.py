@@ -14,7 +14,7 @@ COORDINATION = ("team", "per_boat")
 
 
 PROFILES = {"players": (12.0, 8.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
-"""`ShieldConfig.adversary_s` of each profile, s."""
+"""`ShieldConfig.adversary_s` and `visitor_s` of each profile, s."""
 
 
 class Unsaid(float):

@@ -25,7 +25,7 @@ class Reason(IntEnum):
     QP = plan.QP
     """The least change, found by the quadratic program, re-checked with the full boat model."""
     QP_RELAXED = plan.QP_RELAXED
-    """Not all rows could hold; the program's answer with reported slack, better than any escape."""
+    """Of logs of 0.2.0 and before: the program's answer with slack. Nothing sends it any more."""
     ESCAPE = plan.ESCAPE
     """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats, or as much
     of it as fixed things ask for."""

@@ -28,6 +28,21 @@ def anchors_of(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_programs_are_included_by_markers_that_are_whole(page):
+    """A formatter that takes them for code leaves the site without the program, and no build says so."""
+    for marker in re.findall(r"^.*-- ?8.*$", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        found = re.fullmatch(r'--8<-- "(examples/\w+\.py)"', marker)
+        assert found, marker
+        assert (DOCS / found[1]).exists()
+
+
+def test_every_example_is_on_its_page():
+    text = (DOCS / "examples.md").read_text(encoding="utf-8")
+    for example in (DOCS / "examples").glob("*.py"):
+        assert f'--8<-- "examples/{example.name}"' in text, example.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_links_lead_somewhere(page):
     for link in LINK.findall(text_of(page)):
         if re.match(r"[a-z]+:", link):
