@@ -54,7 +54,7 @@ def test_the_command_for_a_turn_makes_that_turn_in_the_whole_step(platform, turn
 @pytest.mark.parametrize(("steps", "platform"), [(10, "surveyor"), (4, "heron")])
 def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
     """Own boats at the end of the decision, boats that the game drives at every sample until then."""
-    rules = {"decision_steps": steps, "platforms": platform, "power_play_share": 0.0, "max_time_s": 100.0}
+    rules = {"decision_steps": steps, "platforms": platform, "power_play_share": 0.0, "max_time_s": 150.0}
     env = MctfEnv(GameConfig.preset("mctf2026", default_start=False, on_side_start=False, **rules), seed=4)
     blue, red = (
         ShieldedTeamPolicy(policies.make("medium"), Shield.for_game(env, profile="rammers")),
