@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform, known_platforms
@@ -38,15 +39,17 @@ def show(name: Annotated[str | None, typer.Argument(metavar="[NAME|FILE]", show_
     if name is not None:
         out().print(to_text(file_of(name)), markup=False, highlight=False, soft_wrap=True, end="")
         return
-    table = Table(title="entries of a platform file: name, kind, and", title_justify="left")
-    for column in ("entry", "unit", "of kinds", "what it is"):
-        table.add_column(column)
+    table = Table(title="entries of a platform file: name, kind, and", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("entry, unit", "of kinds"):
+        table.add_column(column, no_wrap=True)
+    table.add_column("what it is")
     for key, entry in ENTRIES.items():
-        table.add_row(key, entry.unit, ", ".join(entry.kinds), entry.words)
+        named = f"{key}\n  {entry.unit}" if entry.unit else key
+        table.add_row(named, "\n".join(entry.kinds), entry.words)
     for key, words in GAINS.items():
-        table.add_row(f"*_pid.{key}", "", "usv, rate", words)
+        table.add_row(f"*_pid.{key}", "usv\nrate", words)
     for key, entry in MEASURED.items():
-        table.add_row(f"measured.{key}", entry.unit, "all", entry.words)
+        table.add_row(f"measured.{key}\n  {entry.unit}", "all", entry.words)
     out().print(table)
     for kind, words in KIND_WORDS.items():
         out().print(f"{kind}: {words}", soft_wrap=True)
