@@ -32,8 +32,6 @@ Also = Annotated[str | None, typer.Option(metavar="A.zip,B.zip", help="Further o
 Games = Annotated[int, typer.Option(metavar="N", help="Games against each opponent, without the shield and with it.")]
 Looks = Annotated[int, typer.Option(metavar="N", help="Pairs of games to keep as replays, 0 to 3.")]
 CheckTime = Annotated[float, typer.Option(metavar="S", help="Length of the game it is tried in, s.")]
-KEEPS_M = 4.0
-"""Distance at which the games of 2025 and 2026 count a collision, m."""
 QUICK_GAMES, QUICK_TIME_S = 2, 200.0
 
 
@@ -99,7 +97,7 @@ def report(
     quick: o.Quick = False,
     jobs: o.Jobs = None,
     resume: o.Resume = False,
-    separation: Annotated[float, typer.Option(metavar="M", help="Radius the shield keeps, m.")] = KEEPS_M,
+    separation: o.Separation = None,
     shield_set: o.ShieldSet = None,
     max_time: o.MaxTime = None,
     rules: o.RuleSet = None,
@@ -116,14 +114,16 @@ def report(
     if not 0 <= looks <= 3:
         raise ConfigError(f"--looks is {looks}; give 0 to 3")
     names = o.split_names(opponents + (f",{also}" if also else ""), "--opponents")
+    played = o.game_settings(max_time, None, rules)
+    asked = o.shield_settings(separation, None, None, None, shield_set)
     settings = AblationSettings(
         preset=preset,
         own=entry,
         opponents=names,
         games=games,
         seed=seed,
-        shield=o.shield_settings(separation, None, None, None, shield_set),
-        rules=o.game_settings(max_time, None, rules),
+        shield=o.with_distance(asked, preset, played),
+        rules=played,
         judge=judge,
         answer_s=answer_time,
     )
@@ -143,7 +143,7 @@ def wrap(
     entry: Entry,
     out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; none may be there.")],
     preset: o.Preset = "mctf2026",
-    separation: Annotated[float, typer.Option(metavar="M", help="Radius the shield keeps, m.")] = KEEPS_M,
+    separation: o.Separation = None,
     profile: o.Profile = None,
     shield_set: o.ShieldSet = None,
     json_file: o.JsonFile = None,
@@ -153,7 +153,8 @@ def wrap(
     Exit status: 0 written, 2 bad input or an entry that cannot be loaded.
     """
     check_path(entry)
-    made = wrap_entry(entry, out_file, preset, o.shield_settings(separation, None, profile, None, shield_set))
+    asked = o.shield_settings(separation, None, profile, None, shield_set)
+    made = wrap_entry(entry, out_file, preset, o.with_distance(asked, preset, {}))
     settings = made["shield"]
     console = out()
     words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
