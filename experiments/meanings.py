@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 REASONS = {
-    "qp": "the least change that leaves every boat an escape, found by the quadratic program",
-    "qp_relaxed": "the program's answer where not all could be kept, better than any escape",
-    "escape": "no small change was safe: the boat carries out the turn and straight run that it kept ready",
+    "qp": "the least change that leaves every boat a backup, found by the quadratic program",
+    "qp_relaxed": "the program's answer where not all could be kept, better than any backup",
+    "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready",
+    "escape": "the same, as results of 0.2.0 and before name it",
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two team-mates kept each other from turning: one gives way, one stands on",

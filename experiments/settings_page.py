@@ -49,13 +49,13 @@ COSTS = {
     "margin_cap_m": Cost("m", "more: boats far apart bind, and time", _STUDY),
     "mate_cap_m": Cost("m", "2 m instead of 0.2 m: 6.4 instead of 4.5 % of the commands changed", _STUDY),
     "tail_s": Cost("s", "time of a decision", _METHOD),
-    "horizon_s": Cost("s", "shorter: escapes end before they are proved clear", _METHOD),
+    "horizon_s": Cost("s", "shorter: backups end before they are proved clear", _METHOD),
     "search_limit": Cost("clearances", "lower: large crowds are decided sooner, and less well", _STUDY),
-    "hysteresis_m": Cost("m", "0: escapes flip", _METHOD),
+    "hysteresis_m": Cost("m", "0: backups flip", _METHOD),
     "speed_weight": Cost("", "higher: turns rather than slows down", _METHOD),
     "position_error_m": Cost("m", "widens the separation twice", "[conditions](conditions.md)"),
     "current_mps": Cost(
-        "m/s", "widens what is kept from fixed things, the more the later", "[conditions](conditions.md)"
+        "m/s", "widens what is kept from static constraints, the more the later", "[conditions](conditions.md)"
     ),
     "track_error_mps": Cost("m/s", "widens the separation with the age of a track", "[boats](boats.md)"),
     "max_track_age_s": Cost("s", "shorter: decisions are refused sooner", "[boats](boats.md)"),

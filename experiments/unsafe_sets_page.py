@@ -16,7 +16,7 @@ WORDS = f"""Positions of an opponent from which the radius is not sure to be kep
 certificate is negative, and where the worst-case value table is below the radius. Both boats at full thrust; the
 heading is the opponent's relative to the own one, 180° is head-on. "Missed" is the area that the table calls lost and
 the shield calls safe, also as a share of the table's set: of each such position one of the two is wrong. The shield's
-hunters are strategies, the table's opponent is the worst that its grid and horizon can tell
+pursuers are strategies, the table's opponent is the worst that its grid and horizon can tell
 (see [tables.md](tables.md)).
 
 A set much larger than the table's costs freedom, one that misses positions costs the promise. The bars are

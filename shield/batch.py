@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .arrays import NoNumbersError, numbers, truths, whole_numbers
-from .certificates.foreseen import DRIVEN_S
-from .certificates.manoeuvre import told_margin
-from .certificates.values import WAYS
+from .barriers.boats import reported_margin
+from .barriers.foreseen import DRIVEN_S
+from .barriers.value_function import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .filter.flow import decide_compiled
 from .fleet import LARGEST, LARGEST_SPEED_MPS, usable_drives
-from .game_facts import facts_of_games, told_distances
+from .game_facts import facts_of_games, warn_of_distances
 from .jit import Array, BoolArray, IntArray, copy_row, kernel, lean_kernel
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
@@ -51,7 +51,7 @@ class Asked(NamedTuple):
     known: BoolArray
 
 
-class Hunting(NamedTuple):
+class Granted(NamedTuple):
     """What boats are granted as opponents while nothing drives them, as in `Boats`."""
 
     granted_turn_dps: Array
@@ -60,7 +60,7 @@ class Hunting(NamedTuple):
     feared: BoolArray
 
 
-class Told(NamedTuple):
+class Decided(NamedTuple):
     """What is decided: see `BatchedShield.decide`."""
 
     sent: Array
@@ -70,25 +70,25 @@ class Told(NamedTuple):
 
 
 @lean_kernel
-def _foresee_driven(driven: Array, known: BoolArray, hunting: Hunting, scene: Scene) -> None:
-    """Note what drives the boats of a game: they go their ways, and hunt nobody; see `setup.without_hunters`."""
+def _foresee_driven(driven: Array, known: BoolArray, granted: Granted, scene: Scene) -> None:
+    """Note what drives the boats of a game: they go their ways, and pursue nobody; see `setup.without_pursuers`."""
     boats, work = scene.boats, scene.work
     for j in range(known.shape[0]):
         copy_row(work.driven[j], driven[j])
         work.known[j] = known[j]
-        boats.granted_turn_dps[j] = 0.0 if known[j] else hunting.granted_turn_dps[j]
-        boats.granted_acc_mps2[j] = 0.0 if known[j] else hunting.granted_acc_mps2[j]
-        boats.feared[j] = hunting.feared[j] and not known[j]
+        boats.granted_turn_dps[j] = 0.0 if known[j] else granted.granted_turn_dps[j]
+        boats.granted_acc_mps2[j] = 0.0 if known[j] else granted.granted_acc_mps2[j]
+        boats.feared[j] = granted.feared[j] and not known[j]
         for i in range(known.shape[0]):
-            boats.table[i, j] = -1 if known[j] else hunting.table[i, j]
+            boats.table[i, j] = -1 if known[j] else granted.table[i, j]
 
 
 @kernel
 def decide_games(
     asked: Asked,
-    told: Told,
+    decided: Decided,
     scene: Scene,
-    hunting: Hunting,
+    granted: Granted,
     memory: Memory,
     pending: Array,
     error_m: Array,
@@ -102,7 +102,7 @@ def decide_games(
     boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
     ahead, wanted, margin_m = np.empty_like(asked.state[0]), np.empty_like(asked.wanted[0]), np.empty(n)
     for b in range(asked.state.shape[0]):
-        state, ours, sent = asked.state[b], asked.ours[b], told.sent[b]
+        state, ours, sent = asked.state[b], asked.ours[b], decided.sent[b]
         ahead[:] = state
         turn_round(ahead, ours)
         fill_memory(ahead, boats.params)
@@ -113,18 +113,18 @@ def decide_games(
             if ahead[i, L.HEADING] != state[i, L.HEADING]:
                 wanted[i, 1] += state[i, L.HEADING] - ahead[i, L.HEADING]
         copy_row(work.fear_s, asked.fear_s[b])
-        _foresee_driven(asked.driven[b], asked.known[b], hunting, scene)
+        _foresee_driven(asked.driven[b], asked.known[b], granted, scene)
         take_memory(memory, b, scene.memory)
         decide_compiled(scene, ahead, wanted, margin_m, ours)
         put_memory(scene.memory, b, memory)
-        told.cut_short[b] = work.cut_short[0]
+        decided.cut_short[b] = work.cut_short[0]
         for i in range(n):
             sent[i] = asked.wanted[b, i]
             if plan.commands[i, 0] != wanted[i, 0] or plan.commands[i, 1] != wanted[i, 1]:
                 sent[i, 0] = plan.commands[i, 0]
                 sent[i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[i, L.HEADING]
-            told.reason[b, i] = plan.reason[i]
-            told.certificate_m[b, i] = told_margin(i, ahead, work) if ours[i] else np.inf
+            decided.reason[b, i] = plan.reason[i]
+            decided.certificate_m[b, i] = reported_margin(i, ahead, work) if ours[i] else np.inf
         if pending.shape[1] > 0:
             queue_commands(pending[b], ahead, plan.commands)
 
@@ -140,7 +140,7 @@ class BatchedShield:
         games: number of games B.
         platforms: platforms of the n boats.
         team: team of the n boats.
-        surroundings: fixed things, the same for all games.
+        surroundings: static constraints, the same for all games.
         flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
 
     Raises:
@@ -170,12 +170,12 @@ class BatchedShield:
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
             )
         n = len(self.platforms)
-        boats, self._hunting = _boats_of_its_own(boats_of(config, self.platforms, self.team))
+        boats, self._granted = _boats_of_its_own(boats_of(config, self.platforms, self.team))
         self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
         self._memory = new_memory(games, n)
         self._scene = new_scene(
             boats=boats,
-            fixed=surroundings.pack(config),
+            static=surroundings.pack(config),
             plans=plans_of(config),
             tuning=tuning_of(config),
             memory=new_memory(n),
@@ -192,14 +192,14 @@ class BatchedShield:
         self.cut_short = np.zeros(games, np.bool_)
 
     def reset(self, mask: BoolArray | None = None) -> None:
-        """Forget the escapes of the games in ``mask`` (B,) of True and False, or of all.
+        """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
 
         Raises:
             FleetError: the mask is no such array.
         """
         which = slice(None) if mask is None else _mask(mask, len(self.reason))
         self._memory.kept[which] = False
-        self._memory.escaping[which] = False
+        self._memory.backing_up[which] = False
         self._pending[which] = np.nan
 
     def decide(
@@ -242,9 +242,9 @@ class BatchedShield:
         driven = self._undriven if driven is None else _shaped("driven", driven, (*games, 4), numbers)
         known = ~ours & usable_drives(driven) & (driven[..., DRIVEN_S] >= self._horizon_s)
         asked = Asked(state, wanted, ours, fear_s, driven, known)
-        told = Told(self.sent, self.reason, self.certificate_m, self.cut_short)
-        scene = self._scene, self._hunting, self._memory
-        decide_games(asked, told, *scene, self._pending, self._margin, self._late_m)
+        decided = Decided(self.sent, self.reason, self.certificate_m, self.cut_short)
+        scene = self._scene, self._granted, self._memory
+        decide_games(asked, decided, *scene, self._pending, self._margin, self._late_m)
         return self.sent
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
@@ -277,7 +277,7 @@ class BatchedShield:
             ConfigError: they are not.
         """
         check_same_games(core, len(self.reason), self.platforms, self.team, self.config.dt_s)
-        told_distances(self.config, facts_of_games(core), team)
+        warn_of_distances(self.config, facts_of_games(core), team)
 
 
 class GamesFilter:
@@ -301,11 +301,11 @@ class GamesFilter:
         return self.shield.decide(core.state, commands, ours, ~core.on_side, driven_boats(core))
 
 
-def _boats_of_its_own(boats: Boats) -> tuple[Boats, Hunting]:
+def _boats_of_its_own(boats: Boats) -> tuple[Boats, Granted]:
     """The same constants in arrays that are nobody else's, and what in them changes with who is driven."""
-    hunting = Hunting(boats.granted_turn_dps, boats.granted_acc_mps2, boats.table, boats.feared)
-    own = {name: array.copy() for name, array in hunting._asdict().items()}
-    return share(boats._replace(**own)), share(hunting)
+    granted = Granted(boats.granted_turn_dps, boats.granted_acc_mps2, boats.table, boats.feared)
+    own = {name: array.copy() for name, array in granted._asdict().items()}
+    return share(boats._replace(**own)), share(granted)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import NoNumbersError, numbers
 from .exceptions import FleetError
-from .hints import look_at_headings
+from .hints import hint_at_headings
 from .jit import Array, BoolArray
 
 LARGEST_HEADING_RAD = 1e6
@@ -49,7 +49,7 @@ class Commands:
                 "absolute_deg or relative_deg"
             )
         if not self.relative:
-            look_at_headings(
+            hint_at_headings(
                 "Commands.absolute_rad",
                 self.values[:, 1],
                 "give Commands.absolute_deg; rows are (speed m/s, heading), in this order",

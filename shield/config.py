@@ -32,7 +32,7 @@ class ShieldConfig:
         dt_s: step of the decision loop, s, and of the boat model where ``move_s`` is None.
         move_s: step of the boat model, s, where a command is held for several: ``dt_s`` is a whole number of them, in
             each of which the same relative heading is applied anew; None: a command is for one.
-        certificate: name of the certificate, see `certificates.CERTIFICATES`.
+        certificate: name of the certificate, see `backup.families.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
         solver: QP backend, a name known to qpsolvers.
@@ -51,11 +51,12 @@ class ShieldConfig:
         table_margin_m: added to the separation where a value table is looked into, for its own error, m.
         margin_cap_m: margins above this shrink freely and are told as this much, or as infinite where nobody can come
             near, m, at most 50.
-        mate_cap_m: the same of margins from team-mates whose escapes are known: one program decides for all
+        mate_cap_m: the same of margins from team-mates whose backups are known: one program decides for all
             (coordination "team"), positions are exact, commands act at once and no current is feared; and opponents
-            are feared (as hunters or by tables), whose own margins are kept beside. Else `margin_cap_m` holds for them.
+            are feared (as pursuers or by tables), whose own margins are kept beside. Else `margin_cap_m` holds for
+            them.
         tail_s: how long courses are run on straight beyond the horizon, s.
-        horizon_s: length of escape manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
+        horizon_s: length of backup manoeuvres, s; None takes the time of a half turn plus 4 s per platform.
         search_limit: what a decision may cost before it searches no further, in clearances of one path from one boat,
             0.2 to 1 microsecond each; it then sends the best that it has verified and says so
             (`Decision.cut_short`). Counted in work, so that the same inputs give the same bits on any machine; at least
@@ -108,7 +109,7 @@ class ShieldConfig:
     hull_m: float = Unsaid(1.0)
 
     def __post_init__(self) -> None:
-        from .certificates import CERTIFICATES
+        from .backup.families import CERTIFICATES
         from .filter.program import check_solver
 
         for entry in fields(self):

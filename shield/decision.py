@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import plan
-from .certificates.rating import FIXED_THING
+from .backup.rank import STATIC
 from .commands import Commands
 from .fleet import FIELD, Fleet
 from .jit import Array, BoolArray, IntArray
@@ -21,14 +21,16 @@ class Reason(IntEnum):
     """Why a command is what it is."""
 
     PASSED = plan.PASSED
-    """The wanted command leaves every boat its escape; it is sent bit for bit."""
+    """The wanted command leaves every boat its backup; it is sent bit for bit."""
     QP = plan.QP
     """The least change, found by the quadratic program, re-checked with the full boat model."""
     QP_RELAXED = plan.QP_RELAXED
     """Of logs of 0.2.0 and before: the program's answer with slack. Nothing sends it any more."""
-    ESCAPE = plan.ESCAPE
-    """No checked answer of the program; the boat's escape manoeuvre, which keeps clear of all boats, or as much
-    of it as fixed things ask for."""
+    BACKUP = plan.BACKUP
+    """No checked answer of the program; the boat's backup manoeuvre, which keeps clear of all boats, or as much
+    of it as static constraints ask for."""
+    ESCAPE = plan.BACKUP
+    """The name of `BACKUP` in 0.2.0 and before, for whoever stored it."""
     BEST_EFFORT = plan.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
     HELD = plan.HELD
@@ -38,10 +40,10 @@ class Reason(IntEnum):
     RIGHT_OF_WAY = plan.RIGHT_OF_WAY
     """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
     LIMITED = plan.LIMITED
-    """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its escape."""
+    """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its backup."""
 
 
-FALLBACKS = {Reason.ESCAPE: "escape manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}
+FALLBACKS = {Reason.BACKUP: "backup manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class Decision:
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.
         no_table: names of the opponents that a value table should answer for and none does: they are run through as
-            hunters instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
+            pursuers instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
             decisions read from a black box.
         cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
             the best that was verified until then.
@@ -109,7 +111,7 @@ class Decisions(Sequence[Decision]):
         reason: (n,) values of `Reason`.
         certificate_m: (n,) margins, m.
         slack_m: (n,) m.
-        bound: (n,) index of the binding neighbour, -1 none, -2 fixed things.
+        bound: (n,) index of the binding neighbour, -1 none, -2 static constraints.
         solve_time_s: time of the whole decision, s.
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
@@ -171,7 +173,7 @@ class Decisions(Sequence[Decision]):
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:
-        if bound == FIXED_THING:
+        if bound == STATIC:
             return (FIELD,)
         return (self.fleet.names[bound],) if bound >= 0 else ()
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import NoNumbersError, numbers, whole_numbers
 from .exceptions import FleetError
-from .hints import look_at_headings, look_at_positions
+from .hints import hint_at_headings, hint_at_positions
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform, get_platform
 from .platforms import layout as L
@@ -64,7 +64,7 @@ class Fleet:
         driven: (n, 4) of boats that something drives whose doing is known (a game, of tagged or disabled ones): speed
             m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
             sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
-            `certificates.foreseen`, unless they may be free before an escape ends, or are controlled.
+            `barriers.foreseen`, unless they may be free before a backup ends, or are controlled.
         adversary_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s; NaN, or
             None for all: as the settings say, see `ShieldConfig.adversary_s`; where that is 0 nobody is feared at all.
         visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
@@ -148,7 +148,7 @@ class Fleet:
             state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
             state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
-        look_at_positions(position)
+        hint_at_positions(position)
         teams = _whole("team", team, n)
         fleet = cls(
             state=state,
@@ -316,7 +316,7 @@ def _headings_deg(heading_rad: ArrayLike | None, heading_deg: ArrayLike | None, 
     if heading_rad is None or heading_deg is not None:
         raise FleetError("give either heading_rad or heading_deg, clockwise from north")
     found = _shaped("heading_rad", heading_rad, (n,))
-    look_at_headings("Fleet.of: heading_rad", found, "give heading_deg")
+    hint_at_headings("Fleet.of: heading_rad", found, "give heading_deg")
     return np.degrees(found)
 
 

@@ -120,7 +120,7 @@ def with_distances(config: ShieldConfig, facts: GameFacts, team: int) -> ShieldC
     return replace(config, **larger) if larger else config
 
 
-def told_distances(config: ShieldConfig, facts: GameFacts, team: int | None) -> None:
+def warn_of_distances(config: ShieldConfig, facts: GameFacts, team: int | None) -> None:
     """Log, once, that a shield keeps less than the distances of its game."""
     for name, metres, why in _distances(facts, team):
         kept_m = getattr(config, name)

@@ -26,7 +26,7 @@ def say_once(topic: str, words: str) -> None:
         _LOG.warning(words)
 
 
-def look_at_headings(what: str, heading_rad: Array, remedy: str) -> None:
+def hint_at_headings(what: str, heading_rad: Array, remedy: str) -> None:
     """Say so if headings in rad look like degrees."""
     largest = np.abs(heading_rad).max(initial=0.0, where=np.isfinite(heading_rad))
     if largest > MOST_RAD:
@@ -35,7 +35,7 @@ def look_at_headings(what: str, heading_rad: Array, remedy: str) -> None:
         )
 
 
-def look_at_positions(position_m: Array) -> None:
+def hint_at_positions(position_m: Array) -> None:
     """Say so if positions in m look like degrees of longitude and latitude."""
     if len(position_m) < 2 or not np.isfinite(position_m).all():
         return
@@ -49,7 +49,7 @@ def look_at_positions(position_m: Array) -> None:
         )
 
 
-def look_at_speed(boat: str, speed_mps: float, highest_mps: float) -> None:
+def hint_at_speed(boat: str, speed_mps: float, highest_mps: float) -> None:
     """Say that a wanted speed is cut, and how rows are read."""
     say_once(
         "speed",

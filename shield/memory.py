@@ -11,7 +11,7 @@ from .shared import share
 
 
 class Memory(NamedTuple):
-    """Escape manoeuvre each boat holds between decisions (n boats).
+    """Backup manoeuvre each boat holds between decisions (n boats).
 
     Attributes:
         kept: whether the boat has one.
@@ -19,10 +19,10 @@ class Memory(NamedTuple):
         target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
         margin_m: margin verified at the last decision.
-        threat_m: (n, n) the same against each hunting opponent, or the least of these for all, see `flow.commit`.
+        threat_m: (n, n) the same against each pursuing opponent, or the least of these for all, see `flow.commit`.
         joint_m: of boats that look opponents up, the least on runs of several, 0 where there were none.
-        fixed_m: the margin from fixed things, 0 where it was not looked at.
-        escaping: whether the boat was carrying it out at the last decision.
+        static_m: the margin from static constraints, 0 where it was not looked at.
+        backing_up: whether the boat was carrying it out at the last decision.
         pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
             given way to it, see `right_of_way`.
         pressed_deg: heading it had when that began.
@@ -38,8 +38,8 @@ class Memory(NamedTuple):
     margin_m: Array
     threat_m: Array
     joint_m: Array
-    fixed_m: Array
-    escaping: BoolArray
+    static_m: Array
+    backing_up: BoolArray
     pressed_s: Array
     pressed_deg: Array
     free_s: Array
@@ -58,8 +58,8 @@ def new_memory(*shape: int) -> Memory:
             margin_m=np.zeros(shape),
             threat_m=np.zeros((*shape, shape[-1])),
             joint_m=np.zeros(shape),
-            fixed_m=np.zeros(shape),
-            escaping=np.zeros(shape, np.bool_),
+            static_m=np.zeros(shape),
+            backing_up=np.zeros(shape, np.bool_),
             pressed_s=np.zeros(shape),
             pressed_deg=np.zeros(shape),
             free_s=np.zeros(shape),
@@ -79,8 +79,8 @@ def take_memory(games: Memory, game: int, own: Memory) -> None:
     own.margin_m[:] = games.margin_m[game]
     own.threat_m[:] = games.threat_m[game]
     own.joint_m[:] = games.joint_m[game]
-    own.fixed_m[:] = games.fixed_m[game]
-    own.escaping[:] = games.escaping[game]
+    own.static_m[:] = games.static_m[game]
+    own.backing_up[:] = games.backing_up[game]
     own.pressed_s[:] = games.pressed_s[game]
     own.pressed_deg[:] = games.pressed_deg[game]
     own.free_s[:] = games.free_s[game]
@@ -98,8 +98,8 @@ def put_memory(own: Memory, game: int, games: Memory) -> None:
     games.margin_m[game] = own.margin_m
     games.threat_m[game] = own.threat_m
     games.joint_m[game] = own.joint_m
-    games.fixed_m[game] = own.fixed_m
-    games.escaping[game] = own.escaping
+    games.static_m[game] = own.static_m
+    games.backing_up[game] = own.backing_up
     games.pressed_s[game] = own.pressed_s
     games.pressed_deg[game] = own.pressed_deg
     games.free_s[game] = own.free_s

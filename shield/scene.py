@@ -31,31 +31,31 @@ class Boats(NamedTuple):
         granted_dec_mps2: rate at which each boat, as an opponent, loses speed in a turn, (n,).
         granted_loss: share of its top speed that each boat, as an opponent, loses in its granted turn, (n,).
         samples: path samples of each boat's horizon, (n,).
-        hunt_samples: path samples over which hunting opponents are followed once thrust is full, (n,), at least
+        pursuit_samples: path samples over which pursuing opponents are followed once thrust is full, (n,), at least
             ``samples``.
-        chase_samples: path samples for which a hunting opponent (column) no faster than the boat (row) is followed
+        chase_samples: path samples for which a pursuing opponent (column) no faster than the boat (row) is followed
             beyond that, (n, n).
         chased_samples: the most of them for each boat, (n,).
         ready_thrust: thrust, percent, from which each boat is taken to have all of it, (n,).
-        thrust_samples: path samples until a boat has its thrust back at the latest, (n,): so much longer hunters are
+        thrust_samples: path samples until a boat has its thrust back at the latest, (n,): so much longer pursuers are
             followed at most.
-        fade: factor of negative margins against hunters per path sample, for boats that have their thrust, (n,).
-        static_samples: samples over which fixed things are looked at, (n,).
+        fade: factor of negative margins against pursuers per path sample, for boats that have their thrust, (n,).
+        static_samples: samples over which static constraints are looked at, (n,).
         stride: model steps between path samples.
         sample_s: time between path samples, s.
-        plans: escape manoeuvres each boat looks at, the first so many of the family, (n,).
+        plans: backup manoeuvres each boat looks at, the first so many of the family, (n,).
         decay: factor by which each boat's margin may shrink in one step; 0 lets it fall to 0 at once, (n,).
         cap_m: margins above this may shrink freely, (n,), m.
         tables: value tables.
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
         table_margin_m: added to the radius where a table is looked into, m.
-        look: steps ahead at which each boat's escapes are compared by table, 0 for boats without one, (n,).
+        table_steps: steps ahead at which each boat's backups are compared by table, 0 for boats without one, (n,).
         joint_decay: factor by which the margin on such runs may shrink in one step.
         joint_samples: path samples over which opponents of a boat that several come near to are run through before they
             are looked up.
-        told_range_m: range, m, beyond which each table tells margins of their cap or more, for each of its cells of
+        known_range_m: range, m, beyond which each table tells margins of their cap or more, for each of its cells of
             own speed, (tables, cells); infinite where it does so nowhere.
-        told_radius_m: largest radius for which that holds, m.
+        known_radius_m: largest radius for which that holds, m.
         feared: whether some boat's table is about this boat, (n,).
     """
 
@@ -67,7 +67,7 @@ class Boats(NamedTuple):
     granted_dec_mps2: Array
     granted_loss: Array
     samples: IntArray
-    hunt_samples: IntArray
+    pursuit_samples: IntArray
     chase_samples: IntArray
     chased_samples: IntArray
     ready_thrust: Array
@@ -82,15 +82,15 @@ class Boats(NamedTuple):
     tables: Tables
     table: IntArray
     table_margin_m: float
-    look: IntArray
+    table_steps: IntArray
     joint_decay: float
     joint_samples: int
-    told_range_m: Array
-    told_radius_m: float
+    known_range_m: Array
+    known_radius_m: float
     feared: BoolArray
 
 
-class Fixed(NamedTuple):
+class Static(NamedTuple):
     """Things that do not move, already widened by the distance to keep from them.
 
     Attributes:
@@ -126,9 +126,9 @@ class Tuning(NamedTuple):
         margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
         mate_cap_m: margins from team-mates above this may shrink freely, m.
-        fixed_decay: factor by which a margin from fixed things may shrink in one step.
+        static_decay: factor by which a margin from static constraints may shrink in one step.
         give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
-        search_limit: cost at which a decision searches no further, see `certificates.effort`.
+        search_limit: cost at which a decision searches no further, see `backup.effort`.
     """
 
     dt_s: float
@@ -141,7 +141,7 @@ class Tuning(NamedTuple):
     margin_cap_m: float
     speed_weight: float
     mate_cap_m: float
-    fixed_decay: float
+    static_decay: float
     give_way_after_s: float
     search_limit: float
 
@@ -153,8 +153,8 @@ class Scene(NamedTuple):
         state: (n, N_STATE) the boats' states that this decision is about.
         ours: (n,) boats that it decides for.
         boats: their constants.
-        fixed: things that do not move.
-        plans: the family of escape manoeuvres.
+        static: things that do not move.
+        plans: the family of backup manoeuvres.
         tuning: the settings.
         memory: what is kept from one decision to the next.
         work: scratch of one decision.
@@ -164,7 +164,7 @@ class Scene(NamedTuple):
     state: Array
     ours: BoolArray
     boats: Boats
-    fixed: Fixed
+    static: Static
     plans: Array
     tuning: Tuning
     memory: Memory
@@ -173,15 +173,15 @@ class Scene(NamedTuple):
 
 
 def new_scene(
-    boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+    boats: Boats, static: Static, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
 ) -> Scene:
     """A scene that nothing is to be decided about yet."""
     n = len(boats.team)
     return share(
-        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, fixed, plans, tuning, memory, work, plan)
+        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, static, plans, tuning, memory, work, plan)
     )
 
 
 def path_samples(boats: Boats) -> int:
     """Path samples that the working memory of these boats must hold."""
-    return int((boats.hunt_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))
+    return int((boats.pursuit_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))

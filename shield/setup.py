@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .certificates import CERTIFICATES
-from .certificates.paths import SAG_M
+from .backup.families import CERTIFICATES
+from .backup.paths import SAG_M
 from .config import ShieldConfig
 from .exceptions import TableError
 from .jit import Array, BoolArray, IntArray
@@ -21,31 +21,31 @@ from .scene import Boats, Tuning
 from .shared import share
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
+from .tables.known_range import known_ranges_m
 from .tables.lookup import Tables, no_tables
 from .tables.settings import OtherMay
-from .tables.told import ranges_told_m
 
 _LOG = logging.getLogger(__name__)
 
 FADE = 4.0
-"""A negative margin against a hunter at the end of the time it is followed counts exp(-FADE) of one now."""
+"""A negative margin against a pursuer at the end of the time it is followed counts exp(-FADE) of one now."""
 
-JOINT_LOOK_S = 3.0
+JOINT_RUN_S = 3.0
 """Time over which several opponents of a boat are run through before they are looked up one by one, s.
 
 With 5 s as few surveyors are hit by two and three rammers, but more commands are changed in games; with 8 s more are
-hit, since hunters are less than the worst there is.
+hit, since pursuers are less than the worst there is.
 """
 
 CHASE_S = 30.0
-"""Time over which opponents no faster than a boat are followed as hunters, s.
+"""Time over which opponents no faster than a boat are followed as pursuers, s.
 
 On the boat's quarter they close in for so long on an all but parallel course: of herons two such leave less room than
 either. Of faster ones a run that long says that all is lost, which it is not.
 """
 
 STATIC_REACTION_S = 0.5
-"""Time beyond a half turn over which fixed things are looked at, s."""
+"""Time beyond a half turn over which static constraints are looked at, s."""
 
 
 def tuning_of(config: ShieldConfig) -> Tuning:
@@ -62,7 +62,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
             mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
-            fixed_decay=_decay(config.fixed_response_per_s, config),
+            static_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
             search_limit=config.search_limit,
         )
@@ -75,12 +75,12 @@ def _mates_are_known(config: ShieldConfig) -> bool:
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    feared = CERTIFICATES[config.certificate].hunters and config.feared_s > 0.0
+    feared = CERTIFICATES[config.certificate].pursuers and config.feared_s > 0.0
     return config.coordination == "team" and exact and feared
 
 
 def plans_of(config: ShieldConfig) -> Array:
-    """Escape manoeuvres of the certificate chosen, (m, 3)."""
+    """Backup manoeuvres of the certificate chosen, (m, 3)."""
     return CERTIFICATES[config.certificate].plans
 
 
@@ -94,11 +94,11 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.model_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    granted = 1.0 if certificate.hunters and config.feared_s > 0.0 else 0.0
+    granted = 1.0 if certificate.pursuers and config.feared_s > 0.0 else 0.0
     strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
-    looked = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
-    with_table = np.asarray((looked.table >= 0).any(axis=1))
+    lookup = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
+    with_table = np.asarray((lookup.table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
     if config.moves > 1:
         params = np.column_stack([params, np.full(len(kinds), config.model_s)])
@@ -118,23 +118,23 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             decay=np.where(
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
             ),
-            cap_m=np.where(with_table, _table_cap(config, looked), config.margin_cap_m),
-            tables=looked.tables,
-            table=looked.table,
+            cap_m=np.where(with_table, _table_cap(config, lookup), config.margin_cap_m),
+            tables=lookup.tables,
+            table=lookup.table,
             table_margin_m=config.table_margin_m,
-            look=np.where(with_table, looked.steps, 0),
+            table_steps=np.where(with_table, lookup.steps, 0),
             joint_decay=_decay(config.response_per_s, config),
-            joint_samples=math.ceil(max(looked.steps, round(JOINT_LOOK_S / config.model_s)) / stride),
-            told_range_m=looked.told_range_m,
-            told_radius_m=_widest_m(config),
-            feared=np.asarray((looked.table >= 0).any(axis=0)),
+            joint_samples=math.ceil(max(lookup.steps, round(JOINT_RUN_S / config.model_s)) / stride),
+            known_range_m=lookup.known_range_m,
+            known_radius_m=_widest_m(config),
+            feared=np.asarray((lookup.table >= 0).any(axis=0)),
             **_horizons(config, kinds, limits, team, stride * config.model_s, granted > 0.0),
         )
     )
 
 
-def without_hunters(boats: Boats, known: BoolArray) -> Boats:
-    """Constants of the same boats when of those of ``known`` (n,) it is foreseen where they go: they hunt nobody."""
+def without_pursuers(boats: Boats, known: BoolArray) -> Boats:
+    """Constants of the same boats when of those of ``known`` (n,) it is foreseen where they go: they pursue nobody."""
     return share(
         boats._replace(
             granted_turn_dps=np.where(known, 0.0, boats.granted_turn_dps),
@@ -149,14 +149,14 @@ def without_hunters(boats: Boats, known: BoolArray) -> Boats:
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     certificate, sides = CERTIFICATES[config.certificate], np.array(team)
-    wanted = certificate.hunters and config.feared_s > 0.0
+    wanted = certificate.pursuers and config.feared_s > 0.0
     limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
     kinds = [get_platform(name) for name in platforms]
-    looks = np.array(
-        [wanted and _looks_up(config, kind, limit) for kind, limit in zip(kinds, limits, strict=True)], dtype=np.bool_
+    uses = np.array(
+        [wanted and _uses_table(config, kind, limit) for kind, limit in zip(kinds, limits, strict=True)], dtype=np.bool_
     )
     found: BoolArray = boats_of(config, platforms, team).table >= 0
-    missing: BoolArray = looks[:, None] & (sides[:, None] != sides[None]) & ~found
+    missing: BoolArray = uses[:, None] & (sides[:, None] != sides[None]) & ~found
     missing.setflags(write=False)  # all shields of such a fleet tell the same one
     return missing
 
@@ -167,36 +167,36 @@ def _horizons(
     limits: list[Limits],
     team: tuple[int, ...],
     sample_s: float,
-    hunters: bool,
+    pursuers: bool,
 ) -> dict[str, Any]:
-    """How many samples each boat's paths, hunters and fixed things are followed for."""
+    """How many samples each boat's paths, pursuers and static constraints are followed for."""
     certificate = CERTIFICATES[config.certificate]
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
-    hunt_s, static_s, thrust_s = list(horizon_s), [], []
+    pursuit_s, static_s, thrust_s = list(horizon_s), [], []
     for i, limit in enumerate(limits):
         turn_s = horizon_s[i] if certificate.braking else limit.half_turn_s + STATIC_REACTION_S
         static_s.append(min(turn_s, horizon_s[i]))
-        thrust_s.append(limit.thrust_s if hunters else 0.0)
-        if hunters:
-            hunt_s[i] = max(horizon_s[i], certificate.hunt_s(limit))
-    chase = _chases(kinds, team, hunt_s, hunters, sample_s)
+        thrust_s.append(limit.thrust_s if pursuers else 0.0)
+        if pursuers:
+            pursuit_s[i] = max(horizon_s[i], certificate.pursuit_s(limit))
+    chase = _chases(kinds, team, pursuit_s, pursuers, sample_s)
     return {
         "chase_samples": chase,
         "chased_samples": chase.max(axis=1, initial=0),
         "samples": _samples(horizon_s, sample_s, 2),
-        "hunt_samples": _samples(hunt_s, sample_s, 2),
+        "pursuit_samples": _samples(pursuit_s, sample_s, 2),
         "thrust_samples": _samples(thrust_s, sample_s, 0),
-        "fade": np.array([math.exp(-FADE * sample_s / value) for value in hunt_s]),
+        "fade": np.array([math.exp(-FADE * sample_s / value) for value in pursuit_s]),
         "static_samples": _samples(static_s, sample_s, 2),
     }
 
 
 def _chases(
-    kinds: tuple[Platform, ...], team: tuple[int, ...], hunt_s: list[float], hunters: bool, sample_s: float
+    kinds: tuple[Platform, ...], team: tuple[int, ...], pursuit_s: list[float], pursuers: bool, sample_s: float
 ) -> IntArray:
-    """Samples beyond its own hunt for which each boat (row) is followed by each opponent that is no faster, (n, n)."""
+    """Samples beyond its own pursuit for which each boat (row) is followed by opponents that are no faster, (n, n)."""
     top, side = np.array([kind.pack()[L.MAX_SPEED] for kind in kinds]), np.array(team)
-    longer = _samples([max(0.0, CHASE_S - value) if hunters else 0.0 for value in hunt_s], sample_s, 0)
+    longer = _samples([max(0.0, CHASE_S - value) if pursuers else 0.0 for value in pursuit_s], sample_s, 0)
     follows = (side[:, None] != side[None]) & (top[None] <= top[:, None])
     return np.where(follows, longer[:, None], 0)
 
@@ -212,29 +212,29 @@ def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:
     return np.array([max(least, math.ceil(value / sample_s)) for value in times_s], dtype=np.int64)
 
 
-class _LookedUp(NamedTuple):
+class _Lookup(NamedTuple):
     """Value tables of a fleet.
 
-    All of them, which holds for each pair (-1: none), the steps of one table step, and see `ranges_told_m`.
+    All of them, which holds for each pair (-1: none), the steps of one table step, and see `known_ranges_m`.
     """
 
     tables: Tables
     table: IntArray
     steps: int
-    told_range_m: Array
+    known_range_m: Array
 
 
-def _no_tables(boats: int) -> _LookedUp:
-    return _LookedUp(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1, np.zeros((0, 1)))
+def _no_tables(boats: int) -> _Lookup:
+    return _Lookup(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1, np.zeros((0, 1)))
 
 
-def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]) -> _LookedUp:
+def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]) -> _Lookup:
     """Tables of all pairs of opponents whose own boat looks them up; pairs without one are run through instead."""
-    looked = _no_tables(len(kinds))
+    lookup = _no_tables(len(kinds))
     found: dict[tuple[Platform, Platform], int] = {}
     tables: list[ValueTable] = []
     for i, own in enumerate(kinds):
-        if not _looks_up(config, own, limits_of(own, config.model_s)):
+        if not _uses_table(config, own, limits_of(own, config.model_s)):
             continue
         for j, other in enumerate(kinds):
             if team[i] == team[j]:
@@ -245,24 +245,24 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
                     continue
                 found[own, other] = len(tables)
                 tables.append(table)
-            looked.table[i, j] = found[own, other]
+            lookup.table[i, j] = found[own, other]
     steps = max((round(table.card.dt_s / config.model_s) for table in tables), default=1)
     enough_m = _widest_m(config) + config.table_margin_m + config.margin_cap_m
-    return _LookedUp(stack_tables(tables), looked.table, max(config.moves, steps), ranges_told_m(tables, enough_m))
+    return _Lookup(stack_tables(tables), lookup.table, max(config.moves, steps), known_ranges_m(tables, enough_m))
 
 
-def _looks_up(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:
+def _uses_table(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:
     """Whether a boat looks opponents up where there is a table; there is none for boats that turn by a rate loop."""
-    return kind.kind != "rate" and CERTIFICATES[config.certificate].looks_up(limit)
+    return kind.kind != "rate" and CERTIFICATES[config.certificate].uses_table(limit)
 
 
 @lru_cache(maxsize=64)
 def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
-    """The table of a pair; without a usable one its opponents are run through as hunters, which the log says once."""
+    """The table of a pair; without a usable one its opponents are run through as pursuers, which the log says once."""
     try:
         return load_table(own, other, OtherMay.WORST_CASE)
     except TableError as error:
-        _LOG.warning("%s; opponents are run through as hunters instead", error)
+        _LOG.warning("%s; opponents are run through as pursuers instead", error)
         return None
 
 
@@ -276,11 +276,11 @@ def _widest_m(config: ShieldConfig) -> float:
     return config.separation_m + config.buffer_m + 2.0 * config.position_error_m
 
 
-def _table_cap(config: ShieldConfig, looked: _LookedUp) -> float:
+def _table_cap(config: ShieldConfig, lookup: _Lookup) -> float:
     """Margins above this may shrink freely, m: no more than the tables can tell."""
     kept_m = _widest_m(config) + config.table_margin_m
-    told_m = min((float(axes[CAP]) for axes in looked.tables.axes), default=math.inf)
-    return max(0.0, min(config.margin_cap_m, told_m - kept_m))
+    known_m = min((float(axes[CAP]) for axes in lookup.tables.axes), default=math.inf)
+    return max(0.0, min(config.margin_cap_m, known_m - kept_m))
 
 
 def _stride(kind: Platform, limit: Limits, dt_s: float) -> int:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .certificates import CERTIFICATES
-from .certificates.foreseen import DRIVEN_S
-from .certificates.values import WAYS
+from .backup.families import CERTIFICATES
+from .barriers.foreseen import DRIVEN_S
+from .barriers.value_function import WAYS
 from .commands import Commands
 from .config import ShieldConfig
 from .decision import Decisions
@@ -26,10 +26,10 @@ from .memory import Memory, new_memory
 from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
-from .scene import Boats, Fixed, Scene, Tuning, new_scene, path_samples
-from .setup import boats_of, missing_tables, plans_of, tuning_of, without_hunters
+from .scene import Boats, Scene, Static, Tuning, new_scene, path_samples
+from .setup import boats_of, missing_tables, plans_of, tuning_of, without_pursuers
 from .surroundings import OPEN_WATER, Surroundings
-from .tracking.autopilots import Autopilots, all_told, unknown_memory
+from .tracking.autopilots import Autopilots, all_known, unknown_memory
 from .tracking.remembering import Known, Stayed, carry_over, meets_new
 from .tracking.tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
@@ -48,23 +48,23 @@ class _Seat:
     plan: Plan
     scene: Scene | None = None
 
-    def scene_of(self, boats: Boats, fixed: Fixed, plans: Array, tuning: Tuning) -> Scene:
-        """The scene with these boats and fixed things; manoeuvres and settings are always the shield's."""
-        if self.scene is None or self.scene.boats is not boats or self.scene.fixed is not fixed:
-            self.scene = new_scene(boats, fixed, plans, tuning, self.memory, self.work, self.plan)
+    def scene_of(self, boats: Boats, static: Static, plans: Array, tuning: Tuning) -> Scene:
+        """The scene with these boats and static constraints; manoeuvres and settings are always the shield's."""
+        if self.scene is None or self.scene.boats is not boats or self.scene.static is not static:
+            self.scene = new_scene(boats, static, plans, tuning, self.memory, self.work, self.plan)
         return self.scene
 
 
 class Shield:
     """Filters commanded heading and speed so that boats keep their distance.
 
-    Every step, `decide` sends a wanted command on unchanged when every boat still has an escape after it (and no two
+    Every step, `decide` sends a wanted command on unchanged when every boat still has a backup after it (and no two
     team-mates have kept each other from turning for seconds, see `right_of_way`), and otherwise the least change that
     keeps one,
 
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
-    with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the escape
+    with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the backup
     of each boat, its margins, the commands on their way and, where nobody tells it, its autopilot's memory, for as long
     as the boat (name, platform, team) is in the fleet; the same sequence of inputs from `reset` on gives the same bits.
     It takes one call per step of the settings, and boats that do what was sent. It decides for one thread at a time:
@@ -92,10 +92,10 @@ class Shield:
         self.surroundings = surroundings
         self._tuning = tuning_of(self.config)
         self._plans = plans_of(self.config)
-        self._packed: dict[Surroundings, Fixed] = {}
-        self._last_around: tuple[Surroundings, Fixed] | None = None
-        self._fixed(surroundings)  # one that does not fit the settings is refused here, not in a loop
-        self._kept_from: Fixed | None = None
+        self._packed: dict[Surroundings, Static] = {}
+        self._last_around: tuple[Surroundings, Static] | None = None
+        self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
+        self._kept_from: Static | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
         self._foreseen: dict[bytes, Boats] = {}
@@ -121,7 +121,7 @@ class Shield:
         return cls(**{**settings_of(game), **settings})
 
     def reset(self) -> None:
-        """Forget all escapes, as before a new game."""
+        """Forget all backups, as before a new game."""
         self._known = None
 
     def warm_up(self, fleet: Fleet | None = None) -> None:
@@ -152,7 +152,7 @@ class Shield:
             fleet: all boats seen now.
             wanted: command of each boat, n rows; rows of boats not controlled are passed through. Speeds beyond what a
                 boat's platform does are cut first (not those of `Commands.game_deg`).
-            surroundings: fixed things now, when they differ from the ones given at construction.
+            surroundings: static constraints now, when they differ from the ones given at construction.
 
         Returns:
             One decision per boat, in the fleet's order, which decides nothing: see `ordering`.
@@ -185,13 +185,13 @@ class Shield:
         state, margin = prepare(seen, self.config, boats.params, self._pending)
         turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
         asked = less_turn(within.as_relative_deg(fleet.state[:, L.HEADING]), turned)
-        fixed = self._around(self.surroundings if surroundings is None else surroundings)
+        static = self._around(self.surroundings if surroundings is None else surroundings)
         if self.config.coordination == "team":
             seat = self._seats[0]
-            self._run(seat, state, asked, margin, fleet.controlled, boats, fixed)
+            self._run(seat, state, asked, margin, fleet.controlled, boats, static)
             answer = Answer(seat.plan, seat.work, state)
         else:
-            answer = self._each(state, asked, margin, fleet.controlled, boats, fixed)
+            answer = self._each(state, asked, margin, fleet.controlled, boats, static)
         sent, changed, bound = to_send(fleet, within, asked, turned, answer)
         if cut is not None:
             changed = tell_of_limits(cut, changed, answer)
@@ -237,7 +237,7 @@ class Shield:
         return self._boats
 
     def _foresee(self, fleet: Fleet, boats: Boats) -> Boats:
-        """Note which boats' ways are foreseen; the boats' constants, by which those hunt nobody."""
+        """Note which boats' ways are foreseen; the boats' constants, by which those pursue nobody."""
         known = np.zeros(len(fleet), np.bool_)
         if fleet.driven is not None:
             horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
@@ -250,7 +250,7 @@ class Shield:
             return boats
         key = known.tobytes()
         if key not in self._foreseen:
-            self._foreseen[key] = without_hunters(boats, known)
+            self._foreseen[key] = without_pursuers(boats, known)
         return self._foreseen[key]
 
     def _fear(self, fleet: Fleet) -> Array:
@@ -263,8 +263,8 @@ class Shield:
         fear_s = np.where(visiting, self.config.visitor_feared_s, self.config.feared_s)
         if fleet.adversary_s is not None:
             fear_s = np.where(np.isnan(fleet.adversary_s), fear_s, fleet.adversary_s)
-        if not CERTIFICATES[self.config.certificate].hunters or self.config.feared_s == 0.0:
-            fear_s[:] = 0.0  # nobody hunts in boat constants made so: what is told is what was acted on
+        if not CERTIFICATES[self.config.certificate].pursuers or self.config.feared_s == 0.0:
+            fear_s[:] = 0.0  # nobody pursues in boat constants made so: what is told is what was acted on
         for seat in self._seats:
             seat.work.fear_s[:] = fear_s
             fear_s[seat.work.known] = 0.0
@@ -292,7 +292,7 @@ class Shield:
 
     def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray | None]:
         """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it, if any."""
-        if self._autopilots is None and all_told(fleet.state):
+        if self._autopilots is None and all_known(fleet.state):
             return fleet, None
         unknown: BoolArray = fleet.controlled & unknown_memory(fleet.state)
         if fleet.age_s is not None:  # what was sent since is not in what is seen
@@ -320,16 +320,16 @@ class Shield:
         if unknown is not None and self._autopilots is not None:
             self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
-    def _around(self, surroundings: Surroundings) -> Fixed:
-        """Fixed things now; what was kept from others is no measure for these."""
-        fixed = self._fixed(surroundings)
-        if fixed is not self._kept_from:
-            self._kept_from = fixed
+    def _around(self, surroundings: Surroundings) -> Static:
+        """Static constraints now; what was kept from others is no measure for these."""
+        static = self._static(surroundings)
+        if static is not self._kept_from:
+            self._kept_from = static
             for seat in self._seats:
-                seat.memory.fixed_m[:] = 0.0
-        return fixed
+                seat.memory.static_m[:] = 0.0
+        return static
 
-    def _fixed(self, surroundings: Surroundings) -> Fixed:
+    def _static(self, surroundings: Surroundings) -> Static:
         if not isinstance(surroundings, Surroundings):
             raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
         if self._last_around is not None and surroundings is self._last_around[0]:
@@ -342,10 +342,10 @@ class Shield:
         return self._packed[surroundings]
 
     def _run(
-        self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, fixed: Fixed
+        self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, static: Static
     ) -> None:
         """The stages of `flow` with the QP backend in between."""
-        scene = seat.scene_of(boats, fixed, self._plans, self._tuning)
+        scene = seat.scene_of(boats, static, self._plans, self._tuning)
         todo = begin(scene, state, wanted, margin, ours)
         if todo == PASSES:
             return
@@ -366,7 +366,7 @@ class Shield:
         return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
 
     def _each(
-        self, state: Array, wanted: Array, margin: Array, controlled: BoolArray, boats: Boats, fixed: Fixed
+        self, state: Array, wanted: Array, margin: Array, controlled: BoolArray, boats: Boats, static: Static
     ) -> Answer:
         """One program per boat: it knows its own wanted command and takes team-mates to hold theirs."""
         answer = Answer.empty(len(state))
@@ -376,6 +376,6 @@ class Shield:
             asked = straight.copy()
             asked[i] = wanted[i]
             seat = self._seats[i]
-            self._run(seat, state, asked, margin, controlled, boats, fixed)
+            self._run(seat, state, asked, margin, controlled, boats, static)
             answer.take(int(i), seat.plan, seat.work, state)
         return answer

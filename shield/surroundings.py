@@ -1,7 +1,7 @@
 """`Surroundings`: field edge, obstacles and keep-out circles the boats stay clear of.
 
 They all give way to keeping clear of boats. Obstacles stop a boat, and one that is stopped cannot get away: they come
-before what hunting opponents may do. Edge and keep-out circles are rules, and come after it.
+before what pursuing opponents may do. Edge and keep-out circles are rules, and come after it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from .arrays import NoNumbersError, numbers
-from .certificates.fixed_things import LEAVE_S
+from .barriers.static import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
 from .jit import Array
-from .scene import Fixed
+from .scene import Static
 from .shared import share
 
 Point = tuple[float, float]
@@ -26,7 +26,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Fixed things, in m, east and north.
+    """Static constraints, in m, east and north.
 
     Attributes:
         field: (xmin, ymin, xmax, ymax) to stay inside, or None.
@@ -65,7 +65,7 @@ class Surroundings:
         if self.field is not None and not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
             raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 
-    def pack(self, config: ShieldConfig) -> Fixed:
+    def pack(self, config: ShieldConfig) -> Static:
         """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
 
         That is also how far a current carries it until a command has acted, and a little longer.
@@ -78,7 +78,7 @@ class Surroundings:
         circles += [(x, y, r + off_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return share(
-            Fixed(
+            Static(
                 field=self._edge(config),
                 keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
                 circles=np.array(circles, dtype=np.float64).reshape(-1, 3),

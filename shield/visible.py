@@ -12,7 +12,7 @@ pairs, private and unassigned ones, separators of lines and paragraphs."""
 def visible(text: object, keep: str = "") -> str:
     """Write every character that would be obeyed rather than drawn as its code.
 
-    A terminal obeys escape sequences; both it and a browser turn what follows a mark of direction round.
+    A terminal obeys backup sequences; both it and a browser turn what follows a mark of direction round.
 
     Args:
         text: anything; its ``str`` is shown.

@@ -13,7 +13,7 @@ PLACES_M = ((0.0, 0.0), (0.0, 4.2), (300.0, 3.0))
 
 
 def tight_spot() -> tuple[Fleet, Commands, Surroundings]:
-    """Boats whose wanted commands need the program and its check, between fixed things of each kind."""
+    """Boats whose wanted commands need the program and its check, between static constraints of each kind."""
     fleet = Fleet.of(
         position_m=PLACES_M,
         heading_rad=[0.0, np.pi, -np.pi / 2],

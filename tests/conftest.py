@@ -9,7 +9,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.record import find_breaches, make_record
 from steerclear.env.record_meta import meta_of
 
-REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
+REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
 COMPILING = "from steerclear.experiments.warming import compile_share; compile_share({}, {})"
 

@@ -16,7 +16,7 @@ SAYS = {
     "ablation": "shield off: ",
     "batched_training": "24 learners",
     "count_collisions": "judged in hindsight: ",
-    "first_decision": "ESCAPE 111.1 deg",
+    "first_decision": "BACKUP 111.1 deg",
     "own_encounter": "without a shield 0.03 m",
     "own_platform": "launch turns to",
     "own_policy": "every boat straight to the flag",

@@ -62,7 +62,7 @@ def _one_size(config: ShieldConfig, boats: int, scenes: int, seed: int) -> dict[
     times = np.zeros(scenes)
     for k, (fleet, wanted) in enumerate(drawn):
         shield.reset()
-        shield.decide(fleet, wanted)  # makes working memory and the escapes the timed decision goes on from
+        shield.decide(fleet, wanted)  # makes working memory and the backups the timed decision goes on from
 
         def call(_: int, fleet: Any = fleet, wanted: Any = wanted) -> None:
             shield.decide(fleet, wanted)

@@ -32,7 +32,7 @@ WHY = {
     Reason.PASSED: ("passed", "green"),
     Reason.QP: ("QP", "cyan"),
     Reason.QP_RELAXED: ("QP slack", "yellow"),
-    Reason.ESCAPE: ("escape", "yellow"),
+    Reason.BACKUP: ("backup", "yellow"),
     Reason.BEST_EFFORT: ("best eff.", "bold red"),
     Reason.HELD: ("held", "magenta"),
     Reason.NOT_COVERED: ("-", "dim"),

@@ -1,4 +1,4 @@
-"""Fixed things of the game a fleet plays, by the code that gives them to the shield in the simulator."""
+"""Static constraints of the game a fleet plays, by the code that gives them to the shield in the simulator."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def rehearse(fleet: FleetFile, grounds: Surroundings) -> None:
 
     Args:
         fleet: the file, with its measured delay.
-        grounds: fixed things of the game, see `grounds.grounds_of`.
+        grounds: static constraints of the game, see `grounds.grounds_of`.
 
     Raises:
         FleetFileError: the shield's settings leave nothing of the water, or it would refuse these boats.

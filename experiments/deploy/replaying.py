@@ -85,7 +85,7 @@ class Proof:
 class Prover:
     """Decides again tick by tick.
 
-    The shield remembers escapes from tick to tick, so that after missing ticks its answer is only known again from the
+    The shield remembers backups from tick to tick, so that after missing ticks its answer is only known again from the
     next reset on, or from the next change of the fleet's boats, which makes it forget as well.
 
     Args:

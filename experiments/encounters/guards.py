@@ -39,7 +39,7 @@ class Guard(Protocol):
 
 
 GuardMaker = Callable[[ShieldConfig, int, tuple[str, ...], tuple[int, ...], Surroundings], Guard]
-"""From settings, games, platforms, teams and fixed things to a guard."""
+"""From settings, games, platforms, teams and static constraints to a guard."""
 
 
 class NoGuard:

@@ -7,13 +7,13 @@ import math
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array, BoolArray, IntArray
-from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
+from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.step import step_boat
 
 from ..jit import kernel
-from .ladder import take_escapes
+from .ladder import take_backups
 from .rows import Pairs, Program, build_rows, set_inputs
 from .values import WAYS, Setup, fill_margins, least_margin, mark_failing, near_pairs, run_on, set_targets
 
@@ -104,9 +104,9 @@ def _ladder(
     side: Array,
     movers: BoolArray,
 ) -> None:
-    """Boats short of a target escape, and those that then fall short by it, until nobody is added."""
+    """Boats short of a target take their backup, and so do those that then fall short by it, until nobody is added."""
     for _ in range(state.shape[0]):
-        take_escapes(setup, state, ours, pairs.near, movers, commands, side)
+        take_backups(setup, state, ours, pairs.near, movers, commands, side)
         predict(setup, state, ours, commands, later)
         fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
         if mark_failing(setup, ours, pairs.near, pairs.margin, pairs.target, movers):
@@ -141,7 +141,7 @@ def decide_game(
         state: (n, N_STATE).
         wanted: (n, 2) speed m/s, relative heading deg.
         ours: (n,).
-        side: (n,) side of each boat's escape under way, kept between decisions.
+        side: (n,) side of each boat's backup under way, kept between decisions.
         sent: (n, 2) written.
         reason: (n,) written.
         certificate_m: (n,) written: least margin after the step, inf where nobody is near.
@@ -169,7 +169,7 @@ def decide_game(
     for i in range(n):
         certificate_m[i] = least_margin(setup, ours, near, margin, i) if ours[i] else np.inf
         if movers[i]:
-            reason[i] = ESCAPE if certificate_m[i] >= 0.0 else BEST_EFFORT
+            reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
         elif reason[i] != QP:
             side[i] = 0.0
 

@@ -38,10 +38,10 @@ def check_settings(settings: dict[str, Any]) -> None:
 class ReachGuard(BatchGuard):
     """Commands of B games of the same fleet, kept where the value tables promise the separation.
 
-    Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 escape, 4 best effort (no rudder and no
+    Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 backup, 4 best effort (no rudder and no
     braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``certificate_m`` is the
-    least value after this step less the radius kept, m, inf where nobody is within the tables' range. Fixed things and
-    the field's edge are not kept clear of.
+    least value after this step less the radius kept, m, inf where nobody is within the tables' range. Static
+    constraints and the field's edge are not kept clear of.
 
     Args:
         config: settings; see `SETTINGS`. Opponents do their worst within a step, and by the tables for `feared_s`.
@@ -67,7 +67,7 @@ class ReachGuard(BatchGuard):
         return self._setup
 
     def reset(self, mask: BoolArray | None = None) -> None:
-        """Forget the escapes of the games in ``mask`` (B,), or of all."""
+        """Forget the backups of the games in ``mask`` (B,), or of all."""
         super().reset(mask)
         self._side[slice(None) if mask is None else mask] = 0.0
 

@@ -16,20 +16,20 @@ from .values import WAYS, Setup, joint, margin_of, run_on
 
 RUDDERS = 9
 BRAKE = RUDDERS
-"""Number of the escape that stops the boat on its course."""
+"""Number of the backup that stops the boat on its course."""
 SWEEPS = 2
 """Times the boats choose, one after the other, each knowing the others' choices."""
 
 
 @kernel
 def share_of(k: int) -> float:
-    """Rudder of escape k as a share of full, positive to starboard; 0 for braking."""
+    """Rudder of backup k as a share of full, positive to starboard; 0 for braking."""
     return 0.0 if k == BRAKE else 2.0 * k / (RUDDERS - 1) - 1.0
 
 
 @kernel
 def escape(setup: Setup, i: int, k: int, row: Array) -> tuple[float, float]:
-    """Speed and relative heading that make boat i begin or go on with escape k from state ``row``."""
+    """Speed and relative heading that make boat i begin or go on with backup k from state ``row``."""
     params = setup.params[i]
     speed = 0.0 if k == BRAKE else params[L.MAX_SPEED]
     full = abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), setup.dt_s))
@@ -38,7 +38,7 @@ def escape(setup: Setup, i: int, k: int, row: Array) -> tuple[float, float]:
 
 @kernel
 def try_escape(setup: Setup, i: int, k: int, state: Array, end: Array) -> tuple[float, float]:
-    """Write the state after ``look`` steps of escape k; returns its first command."""
+    """Write the state after ``look`` steps of backup k; returns its first command."""
     end[:] = state
     first = escape(setup, i, k, end)
     step_boat(setup.params[i], end, first[0], first[1], setup.dt_s)
@@ -64,7 +64,7 @@ def _least(setup: Setup, ours: BoolArray, near: BoolArray, i: int, later: Array,
 def _choose(
     setup: Setup, ours: BoolArray, near: BoolArray, i: int, state: Array, later: Array, ways: Array, side: Array
 ) -> int:
-    """Best escape of boat i with the others as in ``later``; it changes sides only for what is clearly better."""
+    """Best backup of boat i with the others as in ``later``; it changes sides only for what is clearly better."""
     best, chosen = -math.inf, 0
     for turn in range(RUDDERS + 1):
         k = (RUDDERS // 2 + turn) % (RUDDERS + 1)
@@ -79,19 +79,19 @@ def _choose(
 
 
 @kernel
-def take_escapes(
+def take_backups(
     setup: Setup, state: Array, ours: BoolArray, near: BoolArray, movers: BoolArray, commands: Array, side: Array
 ) -> None:
-    """Give every mover its best escape's first command; other boats of ours go by ``commands``.
+    """Give every mover its best backup's first command; other boats of ours go by ``commands``.
 
     Args:
         setup: constants.
         state: (n, N_STATE) present states.
         ours: (n,) boats decided for.
         near: (n, n) pairs that count.
-        movers: (n,) boats that escape.
+        movers: (n,) boats that are to have one.
         commands: (n, 2) changed for the movers.
-        side: (n,) side of each boat's escape, -1, 0 or 1; changed for the movers.
+        side: (n,) side of each boat's backup, -1, 0 or 1; changed for the movers.
     """
     n = state.shape[0]
     later, ways = state.copy(), np.empty((n, WAYS, L.N_STATE))

@@ -23,7 +23,7 @@ from .tick import Action
 AHEAD_S = (1.0, 2.0, 3.0)
 """How long ago what is compared was foreseen, s."""
 TOLD_BY = 1
-"""Place in `AHEAD_S` of the errors that make the margin: an escape is chosen anew long before it is carried out."""
+"""Place in `AHEAD_S` of the errors that make the margin: a backup is chosen anew long before it is carried out."""
 SHARE = 0.95
 """Quantile of the errors that a margin covers."""
 MEMORY_S = 60.0

@@ -118,7 +118,7 @@ class Helm:
         return {name: self._links[name].stop() for name in names}
 
     def _reset_if_due(self) -> bool:
-        """Forget all escapes at the start and after a failure: half-made memory is not to be trusted."""
+        """Forget all backups at the start and after a failure: half-made memory is not to be trusted."""
         reset = self._fresh
         if reset:
             self._shield.reset()

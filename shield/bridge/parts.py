@@ -57,7 +57,7 @@ class Parts:
         ears: links that are only listened to, of boats somebody else commands.
         contacts: other sources of positions.
         game: the referee's state of the game; None: none.
-        grounds: fixed things of the game: obstacles, and the own flag's circle as ``stops``, see `water.Water`.
+        grounds: static constraints of the game: obstacles, and the own flag's circle as ``stops``, see `water.Water`.
         policy: where wanted commands come from.
         sinks: get every tick; the black box among them.
     """

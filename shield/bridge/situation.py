@@ -1,4 +1,4 @@
-"""Checks of where all boats are before the start: known, inside the geofence, and with an escape each."""
+"""Checks of where all boats are before the start: known, inside the geofence, and with a backup each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def check_situation(name: str, fleet: FleetFile, roster: Roster, grounds: Surrou
         name: of the check.
         fleet: the file.
         roster: what is known of all boats.
-        grounds: fixed things of the game, see `water.Water`.
+        grounds: static constraints of the game, see `water.Water`.
     """
     return SITUATION[name](fleet, roster, Water(fleet, grounds))
 
@@ -74,7 +74,7 @@ def check_geofence(fleet: FleetFile, roster: Roster, water: Water) -> CheckResul
 
 
 def check_certificate(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
-    """Each boat of ours has an escape now: its certificate is not negative when told to stop."""
+    """Each boat of ours has a backup now: its certificate is not negative when told to stop."""
     try:
         given = assemble(roster, roster.commanded)
         if given is None:

@@ -24,7 +24,7 @@ class Water:
 
     Args:
         file: the file.
-        grounds: fixed things of the game: its obstacles, and the own flag's circle as ``stops``. Its field is not
+        grounds: static constraints of the game: its obstacles, and the own flag's circle as ``stops``. Its field is not
             looked at: the geofence is the edge of the water.
     """
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..certificates.manoeuvre import told_margin
-from ..certificates.rating import FIXED_THING
+from ..backup.rank import STATIC
+from ..barriers.boats import reported_margin
 from ..commands import Commands
 from ..fleet import Fleet
 from ..jit import Array, BoolArray, IntArray, lean_kernel
@@ -15,10 +15,10 @@ from ..work import Work
 
 
 @lean_kernel
-def read_margins(state: Array, work: Work, reason: IntArray, told_m: Array) -> None:
-    """Write the margin each boat is told, m; infinite for those not decided for."""
+def read_margins(state: Array, work: Work, reason: IntArray, reported_m: Array) -> None:
+    """Write the margin reported of each boat, m; infinite for those not decided for."""
     for i in range(state.shape[0]):
-        told_m[i] = np.inf if reason[i] == NOT_COVERED else told_margin(i, state, work)
+        reported_m[i] = np.inf if reason[i] == NOT_COVERED else reported_margin(i, state, work)
 
 
 @lean_kernel
@@ -59,7 +59,7 @@ class Answer:
     def take(self, i: int, plan: Plan, work: Work, state: Array) -> None:
         """Take boat i's row of another decider's answer."""
         self.commands[i], self.reason[i], self.slack[i] = plan.commands[i], plan.reason[i], plan.slack_m[i]
-        self.margin[i], self.bound[i] = told_margin(i, state, work), work.bound[i]
+        self.margin[i], self.bound[i] = reported_margin(i, state, work), work.bound[i]
         self.cut_short[i] = work.cut_short[0]
 
 
@@ -72,7 +72,7 @@ def to_send(
         return wanted, changed, answer.bound
     sent = wanted.replaced(changed, less_turn(answer.commands, -turned), fleet.state[:, L.HEADING])
     alone = changed & (answer.bound < 0) & (answer.reason != HELD)
-    return sent, changed, np.where(alone, FIXED_THING, answer.bound)  # nothing else changes commands
+    return sent, changed, np.where(alone, STATIC, answer.bound)  # nothing else changes commands
 
 
 def less_turn(commands: Array, turned_deg: Array) -> Array:

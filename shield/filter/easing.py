@@ -1,4 +1,4 @@
-"""Between an escape and the wanted commands: no more of the escape than fixed things ask for.
+"""Between a backup and the wanted commands: no more of the backup than static constraints ask for.
 
 Along an edge or a wall what is left of the distance to it falls with the square of the angle towards it. The rows of
 the program, which are linear, then find no answer, and a boat that wants through would steer full rudder out and in.
@@ -6,8 +6,8 @@ the program, which are linear, then find no answer, and a boat that wants throug
 
 from __future__ import annotations
 
-from ..certificates.effort import all_spent
-from ..certificates.rating import PAIR_SAFE, worst_merit
+from ..backup.effort import all_spent
+from ..backup.rank import PAIR_SAFE, worst_rank
 from ..jit import lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -17,28 +17,28 @@ from ..scene import Scene
 from .linearised import check
 from .screening import set_targets
 
-LOOKS = 6
-"""Looks for the least share of an escape, the first at none of it: to a 32nd of the way."""
+TRIALS = 6
+"""Looks for the least share of a backup, the first at none of it: to a 32nd of the way."""
 
 NO_WORSE = 1e-9
-"""Difference of merit that is rounding: a micrometre of distance."""
+"""Difference of rank that is rounding: a micrometre of distance."""
 
 
 @lean_kernel
 def _mildest_turn(i: int, plan: Plan) -> float:
-    """Turn, deg: the wanted one where it is a part of the escape's, straight on where it goes against it.
+    """Turn, deg: the wanted one where it is a part of the backup's, straight on where it goes against it.
 
     As much against it as is allowed in this step would have to be taken back in the next.
     """
-    wanted, escape = plan.wanted_turn[i], plan.eased[i, 0]
-    if wanted * escape <= 0.0:
+    wanted, backup = plan.wanted_turn[i], plan.eased[i, 0]
+    if wanted * backup <= 0.0:
         return 0.0
-    return wanted if abs(wanted) < abs(escape) else escape
+    return wanted if abs(wanted) < abs(backup) else backup
 
 
 @lean_kernel
 def _go_back(share: float, i: int, scene: Scene) -> None:
-    """Command of boat i that share of the way back from its escape, ``plan.eased``."""
+    """Command of boat i that share of the way back from its backup, ``plan.eased``."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
     speed = plan.eased[i, 1] + share * (plan.kept_commands[i, 0] - plan.eased[i, 1])
@@ -49,11 +49,11 @@ def _go_back(share: float, i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _no_worse(scene: Scene) -> bool:
-    """Whether no boat of ours has less than with all escapes."""
+    """Whether no boat of ours has less than with all backups."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     worse = False
     for i in range(ours.shape[0]):
-        worse = worse or (ours[i] and work.merit[i] < plan.eased[i, 2] - NO_WORSE)
+        worse = worse or (ours[i] and work.rank[i] < plan.eased[i, 2] - NO_WORSE)
     return not worse
 
 
@@ -63,7 +63,7 @@ def _ease_one(i: int, count: int, scene: Scene) -> None:
     plan = scene.plan
     speed, heading = plan.commands[i, 0], plan.commands[i, 1]
     kept, too_far, at = 0.0, 2.0, 0.0
-    for _ in range(LOOKS):
+    for _ in range(TRIALS):
         at = 0.5 * (kept + too_far)
         _go_back(at, i, scene)
         check(count, scene)
@@ -83,19 +83,19 @@ def _ease_one(i: int, count: int, scene: Scene) -> None:
 
 @lean_kernel
 def ease(count: int, scene: Scene) -> None:
-    """Take back of the movers' escapes, boat by boat, what is not needed to keep what they keep.
+    """Take back of the movers' backups, boat by boat, what is not needed to keep what they keep.
 
-    Margins from boats are those that have to be kept, as when the wanted commands were screened; escapes that do not
-    keep them are carried out as they are. Of fixed things only their distance is asked for.
+    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
+    keep them are carried out as they are. Of static constraints only their distance is asked for.
     """
     state, ours, tuning, work, plan = scene.state, scene.ours, scene.tuning, scene.work, scene.plan
     set_targets(scene)
-    work.fixed_target_m[:] = 0.0
+    work.static_target_m[:] = 0.0
     check(count, scene)
-    if worst_merit(ours, work) < PAIR_SAFE:
+    if worst_rank(ours, work) < PAIR_SAFE:
         return
     for i in range(ours.shape[0]):
-        plan.eased[i, 2] = work.merit[i]
+        plan.eased[i, 2] = work.rank[i]
     for m in range(count):
         if all_spent(tuning, work):
             return

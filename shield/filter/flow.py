@@ -10,18 +10,18 @@ import math
 
 import numpy as np
 
-from ..certificates.clearance import MARGIN
-from ..certificates.effort import all_spent
-from ..certificates.rating import FIXED_LOST, FIXED_THING, PAIR_SAFE
+from ..backup.effort import all_spent
+from ..backup.rank import PAIR_SAFE, STATIC, STATIC_LOST
+from ..barriers.clearance import MARGIN
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
-from ..plan import BEST_EFFORT, ESCAPE, QP, unchanged
+from ..plan import BACKUP, BEST_EFFORT, QP, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .backup import back_up, mark_answer, opposed
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .screening import screen
+from .switching import back_up, mark_answer, opposed
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups take over."""
@@ -47,7 +47,7 @@ def commit(scene: Scene) -> None:
     for i in range(ours.shape[0]):
         if not ours[i]:
             memory.kept[i] = False
-            memory.escaping[i] = False
+            memory.backing_up[i] = False
             forget_pressing(i, memory)
             continue
         memory.kept[i] = True
@@ -59,13 +59,13 @@ def commit(scene: Scene) -> None:
             )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
-        memory.fixed_m[i] = work.fixed[i, MARGIN] if work.merit[i] >= FIXED_LOST else 0.0
-        memory.joint_m[i] = work.joint_m[i] if work.beset[i] else 0.0
-        if boats.look[i] > 0:
+        memory.static_m[i] = work.static[i, MARGIN] if work.rank[i] >= STATIC_LOST else 0.0
+        memory.joint_m[i] = work.joint_m[i] if work.outnumbered[i] else 0.0
+        if boats.table_steps[i] > 0:
             copy_row(memory.threat_m[i], work.threats_m[i])
         else:
             memory.threat_m[i, :] = work.threat_m[i]
-        memory.escaping[i] = plan.reason[i] == ESCAPE or plan.reason[i] == BEST_EFFORT
+        memory.backing_up[i] = plan.reason[i] == BACKUP or plan.reason[i] == BEST_EFFORT
         note_pressing(i, scene)
 
 
@@ -74,27 +74,27 @@ def _note_causes(scene: Scene) -> None:
     """Note what each boat's wanted command is short of."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        plan.cause[i] = work.bound[i] if ours[i] and work.merit[i] < PAIR_SAFE else -1
+        plan.cause[i] = work.bound[i] if ours[i] and work.rank[i] < PAIR_SAFE else -1
 
 
 @lean_kernel
-def _tell_of_fixed_things(scene: Scene) -> None:
-    """Say of a command that was changed for fixed things, and keeps them now, that these bind and no boat."""
+def _name_static(scene: Scene) -> None:
+    """Say of a command that was changed for static constraints, and keeps them now, that these bind and no boat."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        if ours[i] and plan.cause[i] == FIXED_THING and work.merit[i] >= PAIR_SAFE and not unchanged(i, plan):
-            work.bound[i] = FIXED_THING
+        if ours[i] and plan.cause[i] == STATIC and work.rank[i] >= PAIR_SAFE and not unchanged(i, plan):
+            work.bound[i] = STATIC
 
 
 @lean_kernel
 def finish(scene: Scene, safe: bool, count: int) -> None:
-    """Name the reasons of a checked answer, or send the backups without one; then remember the escapes."""
+    """Name the reasons of a checked answer, or send the backups without one; then remember the backups."""
     if safe:
         mark_answer(count, QP, scene.plan)
     else:
         count = pick_movers(scene)
         back_up(count, scene)
-    _tell_of_fixed_things(scene)
+    _name_static(scene)
     commit(scene)
 
 

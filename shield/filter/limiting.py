@@ -11,7 +11,7 @@ import numpy as np
 
 from ..commands import Commands
 from ..fleet import Fleet
-from ..hints import look_at_speed
+from ..hints import hint_at_speed
 from ..jit import Array, BoolArray
 from ..plan import LARGEST_COMMAND, LIMITED, PASSED
 from ..platforms import layout as L
@@ -35,7 +35,7 @@ def within_limits(wanted: Commands, fleet: Fleet, params: Array) -> tuple[Comman
     if not cut.any():
         return wanted, None
     first = int(np.argmax(cut))
-    look_at_speed(fleet.names[first], float(speed[first]), float(highest[first]))
+    hint_at_speed(fleet.names[first], float(speed[first]), float(highest[first]))
     return wanted.within(cut, highest), cut
 
 

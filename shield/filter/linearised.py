@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..certificates.assign import hold, recheck
-from ..certificates.effort import ROW_COST, spend
-from ..certificates.rating import PAIR_SAFE
+from ..backup.assign import hold, recheck
+from ..backup.effort import ROW_COST, spend
+from ..backup.rank import PAIR_SAFE
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -26,7 +26,7 @@ def pick_movers(scene: Scene) -> int:
     ours, work, plan = scene.ours, scene.work, scene.plan
     n = ours.shape[0]
     for i in range(n):
-        if ours[i] and work.merit[i] < PAIR_SAFE:
+        if ours[i] and work.rank[i] < PAIR_SAFE:
             plan.moving[i] = True
             j = work.bound[i]
             if j >= 0 and ours[j]:
@@ -96,7 +96,7 @@ def take_answer(z: Array, count: int, scene: Scene) -> bool:
 
 @lean_kernel
 def check(count: int, scene: Scene) -> bool:
-    """Exact re-check of candidate commands: full model one step on, then the escapes the rows were about."""
+    """Exact re-check of candidate commands: full model one step on, then the backups the rows were about."""
     plan = scene.plan
     for m in range(count):
         predict(plan.movers[m], plan.commands, scene)

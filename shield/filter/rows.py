@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import math
 
-from ..certificates.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
-from ..certificates.fixed_things import clear_of_fixed, clear_of_near_obstacles
-from ..certificates.hunters import clear_of_hunter, hunts
-from ..certificates.manoeuvre import clear_of_boat, must_keep
-from ..certificates.values import WAYS, looked_up, table_slope
+from ..barriers.boats import clear_of_boat, must_keep
+from ..barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from ..barriers.opponents import clear_of_pursuer, pursues
+from ..barriers.static import clear_of_near_obstacles, clear_of_static
+from ..barriers.value_function import WAYS, table_answers, table_slope
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -34,14 +34,15 @@ from ..work import Work
 AIM_M = 0.02
 """Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""
 
-FIXED_AIM_M = 1e-3
-"""The same of fixed things: a boat along an edge is not to be sent away from it for more."""
+STATIC_AIM_M = 1e-3
+"""The same of static constraints: a boat along an edge is not to be sent away from it for more."""
 
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 
-NEAR_OBSTACLES, FIXED_THINGS, LIMITS = -1, -2, -3
-"""What a row is about, where that is no boat: obstacles near in time, all fixed things, or the inputs' own limits."""
+NEAR_OBSTACLES, ALL_STATIC, LIMITS = -1, -2, -3
+"""What a row is about, where that is no boat: obstacles near in time, all static constraints, or the inputs' own
+limits."""
 
 
 @lean_kernel
@@ -127,13 +128,13 @@ def _pair_row(r: int, m: int, j: int, count: int, scene: Scene) -> bool:
     ours, boats, tuning, work, plan = scene.ours, scene.boats, scene.tuning, scene.work, scene.plan
     i = plan.movers[m]
     clear_of_boat(i, j, work.path[i], scene, -FAR, FAR)
-    hunter = hunts(i, j, ours, boats)
-    if hunter and not work.breach[i, j] and not looked_up(i, j, i, boats, work):
+    pursuer = pursues(i, j, ours, boats)
+    if pursuer and not work.breach[i, j] and not table_answers(i, j, i, boats, work):
         copy_row(work.spare2, work.out)
-        clear_of_hunter(i, j, i, scene, -FAR, tuning.margin_cap_m)
+        clear_of_pursuer(i, j, i, scene, -FAR, tuning.margin_cap_m)
         if work.out[MARGIN] > work.spare2[MARGIN]:
             copy_row(work.out, work.spare2)
-    target = work.threat_target_m[i, j] if hunter else must_keep(i, j, ours, work)
+    target = work.threat_target_m[i, j] if pursuer else must_keep(i, j, ours, work)
     plan.C[r, :] = 0.0
     _add_effect(r, i, m, 1.0, work, plan)
     if plan.place[j] >= 0:
@@ -155,14 +156,14 @@ def _table_row(r: int, m: int, j: int, way: int, count: int, scene: Scene) -> bo
 
 
 @lean_kernel
-def _fixed_row(r: int, m: int, target_m: float, count: int, scene: Scene) -> bool:
-    """Row of mover m about the clearance from fixed things in ``work.out``."""
+def _static_row(r: int, m: int, target_m: float, count: int, scene: Scene) -> bool:
+    """Row of mover m about the clearance from static constraints in ``work.out``."""
     work, plan = scene.work, scene.plan
     if work.out[MARGIN] >= FAR:
         return False
     plan.C[r, :] = 0.0
     _add_effect(r, plan.movers[m], m, 1.0, work, plan)
-    return _close_row(r, count, target_m + FIXED_AIM_M - work.out[MARGIN], scene.tuning, plan)
+    return _close_row(r, count, target_m + STATIC_AIM_M - work.out[MARGIN], scene.tuning, plan)
 
 
 @lean_kernel
@@ -210,7 +211,7 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
             continue
         if r + WAYS + 1 + 6 * count > plan.C.shape[0]:
             return -1
-        if not ours[j] and looked_up(i, j, i, boats, work):
+        if not ours[j] and table_answers(i, j, i, boats, work):
             for way in range(WAYS):
                 if _table_row(r, m, j, way, count, scene):
                     r = _label(r, i, j, plan)
@@ -226,7 +227,7 @@ def build_rows(count: int, scene: Scene) -> int:
     ``plan.label[r]`` says whose row it is, and about which other boat, or about what else, see `LIMITS`.
     """
     work, plan = scene.work, scene.plan
-    if 6 * count > plan.C.shape[0]:  # two rows of fixed things and four of limits for each
+    if 6 * count > plan.C.shape[0]:  # two rows of static constraints and four of limits for each
         return -1
     r = 0
     for m in range(count):
@@ -235,9 +236,9 @@ def build_rows(count: int, scene: Scene) -> int:
         if r < 0:
             return -1
         clear_of_near_obstacles(i, i, scene, work.out)
-        if _fixed_row(r, m, 0.0, count, scene):
+        if _static_row(r, m, 0.0, count, scene):
             r = _label(r, i, NEAR_OBSTACLES, plan)
-        clear_of_fixed(i, i, scene, work.out)
-        if _fixed_row(r, m, work.fixed_target_m[i], count, scene):
-            r = _label(r, i, FIXED_THINGS, plan)
+        clear_of_static(i, i, scene, work.out)
+        if _static_row(r, m, work.static_target_m[i], count, scene):
+            r = _label(r, i, ALL_STATIC, plan)
     return _box_rows(r, count, scene.tuning, plan)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..certificates.assign import assign_plans
-from ..certificates.clearance import FAR
-from ..certificates.manoeuvre import look_around
+from ..backup.assign import assign_plans
+from ..barriers.clearance import FAR
+from ..barriers.neighbours import find_neighbours
 from ..jit import Array, copy_row, lean_kernel
 from ..liveness.right_of_way import apply_right_of_way
 from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
@@ -26,7 +26,7 @@ def predict(i: int, commands: Array, scene: Scene) -> None:
 
 
 @lean_kernel
-def _most_told(i: int, j: int, boats: Boats, work: Work) -> float:
+def _most_known(i: int, j: int, boats: Boats, work: Work) -> float:
     """Largest margin, m, a table can tell of a pair: beyond it the margin is said to be infinite."""
     table = boats.table[i, j]
     if table < 0:
@@ -47,28 +47,28 @@ def set_targets(scene: Scene) -> None:
         work.mate_target_m[i] = 0.0
         work.threat_target_m[i, :] = 0.0
         work.joint_target_m[i] = 0.0
-        work.fixed_target_m[i] = 0.0
+        work.static_target_m[i] = 0.0
         if ours[i] and memory.kept[i]:
             least_m = max(0.0, memory.margin_m[i])
             work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
             work.mate_target_m[i] = boats.decay[i] * min(least_m, tuning.mate_cap_m, boats.cap_m[i])
             work.joint_target_m[i] = boats.joint_decay * max(0.0, min(memory.joint_m[i], boats.cap_m[i]))
-            work.fixed_target_m[i] = tuning.fixed_decay * max(0.0, min(memory.fixed_m[i], tuning.margin_cap_m))
+            work.static_target_m[i] = tuning.static_decay * max(0.0, min(memory.static_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):
-                most = min(boats.cap_m[i], _most_told(i, j, boats, work))
+                most = min(boats.cap_m[i], _most_known(i, j, boats, work))
                 work.threat_target_m[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
 
 
 @lean_kernel
 def screen(scene: Scene, wanted: Array, margin_m: Array) -> bool:
-    """Check the wanted commands as they are; True when every boat still has its escape after them.
+    """Check the wanted commands as they are; True when every boat still has its backup after them.
 
     An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
     the check.
     """
     state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
     n = state.shape[0]
-    look_around(scene, margin_m)
+    find_neighbours(scene, margin_m)
     set_targets(scene)
     for i in range(n):
         copy_row(plan.commands[i], wanted[i])

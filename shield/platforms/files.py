@@ -88,27 +88,27 @@ def parse_platform(text: str) -> PlatformFile:
     from ..bridge.fleet_yaml import read_settings  # the strict reader; importing it here keeps the package light
 
     try:
-        told = read_settings(text)
+        given = read_settings(text)
     except FleetFileError as error:
         raise PlatformError(str(error)) from None
-    if not isinstance(told, Mapping):
+    if not isinstance(given, Mapping):
         raise PlatformError("it holds no settings; make one with: steerclear platform new NAME")
-    return platform_file_of(dict(told))
+    return platform_file_of(dict(given))
 
 
-def platform_file_of(told: dict[str, Any]) -> PlatformFile:
+def platform_file_of(given: dict[str, Any]) -> PlatformFile:
     """The platform of settings as a file has them.
 
     Raises:
         PlatformError: an entry is unknown, missing, of another unit or not a number, or the boat cannot be steered.
     """
-    name, kind = told.pop("name", None), told.pop("kind", "usv")
+    name, kind = given.pop("name", None), given.pop("kind", "usv")
     if not isinstance(name, str) or not name:
         raise PlatformError(f"name is {name!r}; give the boat's name, a text")
     if not isinstance(kind, str) or kind not in KINDS:
         raise PlatformError(f"kind is {kind!r}; choose one of {', '.join(sorted(KINDS))}")
-    measured = _measured(told.pop("measured", {}))
-    settings = {key: _setting(key, value, kind) for key, value in told.items()}
+    measured = _measured(given.pop("measured", {}))
+    settings = {key: _setting(key, value, kind) for key, value in given.items()}
     if "max_speed_mps" not in settings:
         raise PlatformError("max_speed_mps is missing; give the boat's top speed, m/s")
     if settings["max_speed_mps"] > FASTEST_MPS:
@@ -146,15 +146,15 @@ def _gains(key: str, value: Any) -> Gains:
     return Gains(**{name: _number(f"{key}.{name}", gain, "") for name, gain in value.items()})
 
 
-def _measured(told: Any) -> dict[str, float]:
-    if not isinstance(told, Mapping):
-        raise PlatformError(f"measured is {told!r}; give the entries that steerclear fit writes, or leave it out")
-    for key, value in told.items():
+def _measured(given: Any) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise PlatformError(f"measured is {given!r}; give the entries that steerclear fit writes, or leave it out")
+    for key, value in given.items():
         if key not in MEASURED:
             _refuse_key(f"measured.{key}", {f"measured.{known}": None for known in MEASURED})
         if not 0.0 <= _number(f"measured.{key}", value, MEASURED[key].unit) < 1e6:
             raise PlatformError(f"measured.{key} is {value!r}; give a number from 0 to 1e6")
-    return {key: float(value) for key, value in told.items()}
+    return {key: float(value) for key, value in given.items()}
 
 
 def _refuse_key(key: str, known: Mapping[str, Any]) -> NoReturn:

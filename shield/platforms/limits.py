@@ -22,7 +22,7 @@ FULL_THRUST = 0.9
 """Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
 
 ENOUGH_THRUST = 0.85
-"""Share of its thrust at top speed from which a boat gets away from hunters about as well as with all of it."""
+"""Share of its thrust at top speed from which a boat gets away from pursuers about as well as with all of it."""
 
 
 @dataclass(frozen=True)

@@ -92,15 +92,15 @@ def steer(params: Array, state: Array, rudder: float) -> None:
 
 
 @kernel
-def chase(params: Array, hunter: Array, prey: Array, lead: bool) -> float:
-    """Rudder that turns the hunter onto the prey, or onto where the prey will be when reached."""
-    dx, dy = prey[L.X] - hunter[L.X], prey[L.Y] - hunter[L.Y]
+def chase(params: Array, pursuer: Array, prey: Array, lead: bool) -> float:
+    """Rudder that turns the pursuer onto the prey, or onto where the prey will be when reached."""
+    dx, dy = prey[L.X] - pursuer[L.X], prey[L.Y] - pursuer[L.Y]
     if lead:
-        time = math.sqrt(dx * dx + dy * dy) / max(hunter[L.SPEED] + 0.5 * prey[L.SPEED], 0.5)
+        time = math.sqrt(dx * dx + dy * dy) / max(pursuer[L.SPEED] + 0.5 * prey[L.SPEED], 0.5)
         heading = math.radians(prey[L.HEADING])
         dx += math.sin(heading) * prey[L.SPEED] * time
         dy += math.cos(heading) * prey[L.SPEED] * time
-    error = wrap_degrees(math.degrees(math.atan2(dx, dy)) - hunter[L.HEADING])
+    error = wrap_degrees(math.degrees(math.atan2(dx, dy)) - pursuer[L.HEADING])
     full = abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
     return min(max(error / full, -1.0), 1.0)
 

@@ -43,7 +43,7 @@ _MEMORY = (
 
 
 @kernel
-def all_told(state: Array) -> bool:
+def all_known(state: Array) -> bool:
     """Whether no memory of any boat is unknown: the quick answer, which simulators' states give at every step."""
     for i in range(state.shape[0]):
         for column in range(L.THRUST, L.HEADING_ERROR + 1):
@@ -131,12 +131,12 @@ class Autopilots:
 def _write(believed: Array, who: BoolArray, state: Array) -> None:
     """Write memory into states, in place, where it is not told, for the parts of ``who`` (n, 2): heading and speed."""
     for part, sign, columns in _MEMORY:
-        missing = who[:, part] & ~_told(sign, state)
+        missing = who[:, part] & ~_known(sign, state)
         for column in columns:
             state[missing, column] = believed[missing, column]
 
 
-def _told(sign: int, state: Array) -> BoolArray:
+def _known(sign: int, state: Array) -> BoolArray:
     """Boats, (n,), of which that column is told; a turn rate of 0 is what fleets say that know none."""
     column = state[:, sign]
     return np.asarray(~np.isnan(column) & ((sign != L.TURN_RATE) | (column != 0.0)))

@@ -77,19 +77,19 @@ def _drive_home(core: Any, where: BoolArray, rows: Array) -> None:
         marks = core.rules.corner_marks[team] if corners else core.flag_home[team][np.newaxis]
         ends = core.rules.corners[team] if corners else marks
         position, speed_mps = core.state[here][:, [L.X, L.Y]], core.state[here][:, L.SPEED]
-        told_mps = (core.max_speed_mps * share)[here]
-        rows[here, SPEED] = told_mps
+        commanded_mps = (core.max_speed_mps * share)[here]
+        rows[here, SPEED] = commanded_mps
         rows[here, PLACE] = nearest(position, marks)
-        rows[here, UNTIL] = time_until(position, ends, radius_m, np.maximum(told_mps, speed_mps))
+        rows[here, UNTIL] = time_until(position, ends, radius_m, np.maximum(commanded_mps, speed_mps))
 
 
 def _drive_in(core: Any, where: BoolArray, rows: Array) -> None:
     """Boats out of bounds: straight off the nearest edge."""
-    told_mps = (core.max_speed_mps * core.config.oob_speed_frac)[np.nonzero(where)[1]]
+    commanded_mps = (core.max_speed_mps * core.config.oob_speed_frac)[np.nonzero(where)[1]]
     places, beyond_m = inwards(core.state[where][:, [L.X, L.Y]], core.field.size)
-    rows[where, SPEED] = told_mps
+    rows[where, SPEED] = commanded_mps
     rows[where, PLACE] = places
-    rows[where, UNTIL] = beyond_m / np.maximum(np.maximum(told_mps, core.state[where][:, L.SPEED]), LEAST_MPS)
+    rows[where, UNTIL] = beyond_m / np.maximum(np.maximum(commanded_mps, core.state[where][:, L.SPEED]), LEAST_MPS)
 
 
 def _distances(position: Array, places: Array) -> Array:

@@ -19,8 +19,8 @@ _OWN = (
     "speed_mps",
     "margin_m",
     "joint_m",
-    "fixed_m",
-    "escaping",
+    "static_m",
+    "backing_up",
     "pressed_s",
     "pressed_deg",
     "free_s",
@@ -67,7 +67,7 @@ def carry_over(old: Memory, new: Memory, stayed: Stayed, met: BoolArray) -> None
     """Copy the memory of boats that stayed, in place.
 
     Margins are those of the boats seen then. Of a boat that meets a new one (``met``, (n,)) none is known of them all:
-    it is asked for no more than a margin of 0, and its escape is kept.
+    it is asked for no more than a margin of 0, and its backup is kept.
     """
     now, then = stayed
     for name in _OWN:
@@ -83,8 +83,8 @@ def meets_new(fleet: Fleet, stayed: Stayed, boats: Boats, tuning: Tuning) -> Boo
     """Boats, (n,), that one which was not there before can come near to while paths are looked at."""
     fresh = np.ones(len(fleet), np.bool_)
     fresh[stayed.now] = False
-    hunted = boats.hunt_samples + boats.thrust_samples + boats.chased_samples
-    samples = np.maximum(boats.samples, hunted).max() + 1
+    pursued = boats.pursuit_samples + boats.thrust_samples + boats.chased_samples
+    samples = np.maximum(boats.samples, pursued).max() + 1
     horizon_s = samples * boats.sample_s + tuning.tail_s
     top: Array = np.maximum(boats.fastest_mps, np.abs(fleet.speed_mps))
     apart = fleet.position_m[:, None] - fleet.position_m[None]

@@ -15,7 +15,7 @@ from ..game_facts import (
     check_step,
     facts_of_games,
     for_held_commands,
-    told_distances,
+    warn_of_distances,
     with_distances,
 )
 from ..shield import Shield
@@ -57,7 +57,7 @@ def shield_for(shield: Any, reader: GameReader, team: int, held: bool = False) -
         check_step(config, facts)
         fitting = config
     fitting = with_distances(fitting, facts, team)
-    told_distances(fitting, facts, team)
+    warn_of_distances(fitting, facts, team)
     if fitting is config or not isinstance(shield, Shield):
         return shield
     other = copy.copy(shield)

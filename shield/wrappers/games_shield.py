@@ -1,4 +1,4 @@
-"""`games_shield`: the shield for one team in a batch of our own games, with their fixed things."""
+"""`games_shield`: the shield for one team in a batch of our own games, with their static constraints."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 from ..batch import BatchedShield
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
-from ..game_facts import check_step, facts_of_games, told_distances, with_distances
+from ..game_facts import check_step, facts_of_games, warn_of_distances, with_distances
 from ..same_games import platforms_of
 from .mctf import surroundings_of
 from .reading import team_number
@@ -35,6 +35,6 @@ def games_shield(
     number, facts = team_number(team), facts_of_games(core)
     settings = ShieldConfig.of(**facts.settings()) if config is None else with_distances(config, facts, number)
     check_step(settings, facts)
-    told_distances(settings, facts, number)
+    warn_of_distances(settings, facts, number)
     around = surroundings_of(core, number, keep_out)
     return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number)

@@ -89,7 +89,7 @@ class MctfReader:
 
 
 def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings:
-    """Fixed things of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle.
+    """Static constraints of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle.
 
     It counts while the flag is away as well: the game throws out who is inside when the flag comes home, at any time.
     A game with ``flag_keepout_m`` 0 throws nobody out, and has no circle.

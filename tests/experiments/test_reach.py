@@ -77,7 +77,7 @@ def interrupt(*_):
     ("arguments", "words"),
     [
         (["--own", "canoe", "--other", "heron"], "canoe"),
-        (["--own", "si", "--other", "heron"], "run through as hunters instead"),
+        (["--own", "si", "--other", "heron"], "run through as pursuers instead"),
         (["--own", "heron", "--other", "heron", "--other-may", "help"], "choose one of worst-case, cooperative"),
         (["--own", "heron", "--other", "heron", "--radius", "5.5"], "choose one within"),
         (["--own", "heron", "--other", "heron", "--horizon", "nan"], "make it finite"),

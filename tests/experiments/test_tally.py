@@ -9,7 +9,7 @@ from steerclear.experiments.score import check_penalty, scores
 from steerclear.experiments.tally import reason_counts, tally
 from steerclear.shield.exceptions import ConfigError
 
-REASONS = ["PASSED", "QP", "QP_RELAXED", "ESCAPE", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
+REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
 
 def record_of(position, shielded=True, **arrays):
@@ -111,7 +111,7 @@ def test_reasons_are_counted_for_covered_boats_only(crossing):
     reason = np.full((4, 4), 6)
     reason[:, 0], reason[:, 1] = [0, 0, 1, 3], 0
     counts = reason_counts(record_of(crossing, reason=reason), 0)
-    assert (counts["PASSED"], counts["QP"], counts["ESCAPE"], counts["HELD"]) == (6, 1, 1, 0)
+    assert (counts["PASSED"], counts["QP"], counts["BACKUP"], counts["HELD"]) == (6, 1, 1, 0)
     assert "NOT_COVERED" not in counts
     assert reason_counts(record_of(crossing, shielded=False), 0)["PASSED"] == 0
 

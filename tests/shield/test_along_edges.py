@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import sail_games, scattered
 from steerclear.shield import ShieldConfig, Surroundings
-from steerclear.shield.certificates.paths import SAG_M
+from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
@@ -103,7 +103,7 @@ def test_round_a_circle_it_wants_into(rule):
 
 
 def test_what_was_kept_from_other_things_is_not_asked_of_new_ones():
-    """A keep-out circle that appears near a boat asks for no more than its escape, not for a margin it never had."""
+    """A keep-out circle that appears near a boat asks for no more than its backup, not for a margin it never had."""
     from shield_scenes import fleet_of
     from steerclear.shield import Commands, Shield
 

@@ -44,7 +44,7 @@ def test_a_boat_told_of_the_current_stays_out(name, top):
 @pytest.mark.parametrize(("name", "top"), [("heron", 2.0), ("surveyor", 3.0)])
 @pytest.mark.parametrize("inside_m", [0.05, 0.2, 0.6])
 def test_a_boat_that_begins_too_near_to_a_wall_comes_away(name, top, inside_m):
-    """Nothing is remembered of an escape, and all manoeuvres fail at once: the one that leaves must still be found."""
+    """Nothing is remembered of a backup, and all manoeuvres fail at once: the one that leaves must still be found."""
     wall = [(0.0, -50.0), (0.0, 150.0), (-1.0, 150.0), (-1.0, -50.0)]
     config = ShieldConfig(current_mps=CURRENT_MPS)
     kept_m = Surroundings(polygons=[wall]).pack(config).segment_m

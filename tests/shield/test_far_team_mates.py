@@ -12,7 +12,7 @@ STEPS = 250
 
 
 def chased(mates, ahead_m, course_deg):
-    """Run of a heron that presses on the upper edge with a hunter behind it, and of its two team-mates far away."""
+    """Run of a heron that presses on the upper edge with a pursuer behind it, and of its two team-mates far away."""
     rows = [(100.0, 70.0, 60.0, 2.0), (100.0 - ahead_m, 62.0, 60.0, 2.0)]
     rows += [(500.0, 20.0, 90.0, 1.5), (500.0, 22.58, 90.0, 1.5)] if mates else []
     fleet = fleet_of(rows, [0, 1, 0, 0][: len(rows)], "heron")

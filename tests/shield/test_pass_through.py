@@ -47,7 +47,7 @@ def test_what_is_marked_passed_is_what_was_wanted_bit_for_bit(data):
 @quick
 @given(st.data())
 def test_a_boat_that_passes_is_certified(data):
-    """PASSED says that an escape is left: with nothing but boats around, its margin is not negative."""
+    """PASSED says that a backup is left: with nothing but boats around, its margin is not negative."""
     fleet = data.draw(fleets(most=4))
     decisions = Shield().decide(fleet, Commands.relative_deg(data.draw(finite_commands(len(fleet)))))
     passed = decisions.reason == Reason.PASSED

@@ -47,15 +47,15 @@ def test_a_boat_turned_aside_by_one_that_holds_its_course_gets_past_it(platform)
 
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
 def test_no_boat_gives_way_to_an_opponent(platform):
-    """Turning away from a hunter alongside would only cost speed."""
+    """Turning away from a pursuer alongside would only cost speed."""
 
-    def hunt(state):
+    def pursuit(state):
         way = state[0, :2] - state[1, :2]
         error = np.degrees(np.arctan2(*way)) - state[1, L.HEADING]
         return (error + 180.0) % 360.0 - 180.0
 
-    run = sail(Shield(), crossing(platform), towards_goal(platform, hunt), STEPS[platform])
-    assert (run.reason[:, 0] == Reason.ESCAPE).any()
+    run = sail(Shield(), crossing(platform), towards_goal(platform, pursuit), STEPS[platform])
+    assert (run.reason[:, 0] == Reason.BACKUP).any()
     assert not (run.reason[:, 0] == Reason.RIGHT_OF_WAY).any()
     assert run.closest(np.array([True, False])) >= 2.5
 
@@ -84,7 +84,7 @@ def test_boats_that_cannot_talk_keep_the_rate_of_others():
 
 
 def test_of_a_command_changed_for_an_edge_the_edge_is_told():
-    """Also where the program or the eased escape found what keeps it, and a team-mate is the nearest boat then."""
+    """Also where the program or the eased backup found what keeps it, and a team-mate is the nearest boat then."""
     field = Surroundings(field=(0.0, 0.0, 80.0, 40.0))
     fleet = fleet_of([(40.0, 34.0, 10.0, 2.0), (30.0, 10.0, 0.0, 0.0)], [0, 0], "heron")
     shield, state, told = Shield(), fleet.state.copy(), []
@@ -148,7 +148,7 @@ def test_an_opponent_that_is_overtaken_is_passed():
         return np.array([(2.0, (error + 180.0) % 360.0 - 180.0), (0.8, 0.0)])
 
     run = sail(Shield(), fleet, wanted, 350)
-    assert (run.reason[:, 0] == Reason.ESCAPE).any()
+    assert (run.reason[:, 0] == Reason.BACKUP).any()
     assert run.closest(np.array([True, False])) >= 2.5
     assert run.position[:, 0, 1].max() > 57.0
 

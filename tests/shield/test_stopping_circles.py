@@ -12,7 +12,7 @@ GAMES, STEPS = 12, 200
 HOME, RADIUS = np.array([0.0, 0.0]), 5.0
 
 
-def hunted_before_the_circle(name, top, gap_m):
+def pursued_before_the_circle(name, top, gap_m):
     """A boat at half speed bound for the circle from 9 to 12 m, and one at full speed behind it."""
     random = np.random.default_rng(4)
     state = np.zeros((GAMES, 2, L.N_STATE))
@@ -27,19 +27,19 @@ def hunted_before_the_circle(name, top, gap_m):
     return state
 
 
-def chase(state, hunter_mps):
+def chase(state, pursuer_mps):
     """Commands (B, 2, 2): hold on at full speed, and straight at the boat."""
     way = state[:, 0, :2] - state[:, 1, :2]
     bearing = np.degrees(np.arctan2(way[:, 0], way[:, 1]))
     commands = np.zeros((len(state), 2, 2))
-    commands[:, 0, 0], commands[:, 1, 0] = hunter_mps, hunter_mps
+    commands[:, 0, 0], commands[:, 1, 0] = pursuer_mps, pursuer_mps
     commands[:, 1, 1] = (bearing - state[:, 1, L.HEADING] + 180.0) % 360.0 - 180.0
     return commands
 
 
 @pytest.mark.parametrize(("name", "top", "gap_m"), [("surveyor", 3.0, 24.0), ("heron", 2.0, 10.0)])
-def test_a_hunted_boat_goes_round_the_circle(name, top, gap_m):
-    state = hunted_before_the_circle(name, top, gap_m)
+def test_a_pursued_boat_goes_round_the_circle(name, top, gap_m):
+    state = pursued_before_the_circle(name, top, gap_m)
     around = Surroundings(stops=[(*HOME, RADIUS + 0.1)])
     shield = BatchedShield(ShieldConfig(), GAMES, (name, name), (0, 1), around)
     params, ours = packed([name, name]), np.tile([True, False], (GAMES, 1))

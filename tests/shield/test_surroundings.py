@@ -1,4 +1,4 @@
-"""Fixed things are checked when they are given."""
+"""Static constraints are checked when they are given."""
 
 import math
 
@@ -49,19 +49,19 @@ def test_lists_and_arrays_will_do():
 
 
 def test_packing_widens_by_the_distances_of_the_settings():
-    fixed = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)], [(7, 7, 3)]).pack(
+    static = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)], [(7, 7, 3)]).pack(
         ShieldConfig(edge_m=0.5, hull_m=1.5)
     )
-    assert fixed.field.tolist() == [0.5, 0.5, 39.5, 19.5]
-    assert fixed.circles.tolist() == [[1.0, 2.0, 4.5], [7.0, 7.0, 3.0]]  # a circle that stops boats has no hull
-    assert fixed.keep_out.tolist() == [[5.0, 5.0, 2.0]]
-    assert fixed.segments.shape == (3, 4)
-    assert fixed.segment_m == 1.5
+    assert static.field.tolist() == [0.5, 0.5, 39.5, 19.5]
+    assert static.circles.tolist() == [[1.0, 2.0, 4.5], [7.0, 7.0, 3.0]]  # a circle that stops boats has no hull
+    assert static.keep_out.tolist() == [[5.0, 5.0, 2.0]]
+    assert static.segments.shape == (3, 4)
+    assert static.segment_m == 1.5
 
 
 def test_without_an_edge_distance_the_edge_is_not_kept():
-    fixed = Surroundings((0, 0, 40, 20)).pack(ShieldConfig(edge_m=None))
-    assert np.isinf(fixed.field).all()
+    static = Surroundings((0, 0, 40, 20)).pack(ShieldConfig(edge_m=None))
+    assert np.isinf(static.field).all()
 
 
 def test_walls_of_a_polygon_close():

@@ -44,7 +44,7 @@ def test_each_opponent_that_is_looked_up_has_its_own():
     assert work.threat_target_m[0, 1] != work.threat_target_m[0, 2]
 
 
-def test_of_boats_that_run_hunters_through_the_least_counts_for_all():
+def test_of_boats_that_run_pursuers_through_the_least_counts_for_all():
     rows = [(0, 0, 0, 2.0), (1.0, 10.0, 180, 2.0), (-9.0, -9.0, 45.0, 2.0)]
     _, memory, _ = remembered(rows, [0, 1, 1], "heron")
     assert memory.threat_m[0, 1] == memory.threat_m[0, 2] > 0.0

@@ -1,4 +1,4 @@
-"""What a log viewer draws of a tick: boats with their radius, what was wanted and sent, the field and fixed things."""
+"""What a log viewer draws of a tick: boats with their radius, what was wanted and sent, field and obstacles."""
 
 from __future__ import annotations
 

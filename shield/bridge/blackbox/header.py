@@ -49,7 +49,7 @@ class LogHeader:
 
     Attributes:
         config: settings the shield was built with.
-        surroundings: fixed things it was built with.
+        surroundings: static constraints it was built with.
         platforms: parameters of the platforms, by name.
         boats: of the fleet file, in its order.
         frame: where the field is, None when it is nowhere on earth.

@@ -102,7 +102,7 @@ TICK = named(
         boats=many(_BOAT),
         surroundings=many(
             record(
-                "fixed things given with this decision; empty: as in the header",
+                "static constraints given with this decision; empty: as in the header",
                 field=many(NUMBER, "xmin, ymin, xmax, ymax, m"),
                 circles=many(_CIRCLE),
                 keep_out=many(_CIRCLE),

@@ -8,7 +8,7 @@ from steerclear.experiments.encounters.guards import build_guard, check_guard, p
 from steerclear.experiments.reach_guard import ReachGuard
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
-from steerclear.shield.plan import BEST_EFFORT, ESCAPE, HELD, NOT_COVERED, PASSED, QP
+from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tables.files import load_table, stack_tables
@@ -98,7 +98,7 @@ def test_boats_of_others_are_left_alone():
     sent = guard.decide(state, wanted, np.array([[True, False]]))
     assert sent[0, 1].tobytes() == wanted[0, 1].tobytes()
     assert (sent[0, 0] != wanted[0, 0]).any()
-    assert guard.reason[0, 0] in (QP, ESCAPE, BEST_EFFORT)
+    assert guard.reason[0, 0] in (QP, BACKUP, BEST_EFFORT)
     assert guard.reason[0, 1] == NOT_COVERED
 
 
@@ -113,7 +113,7 @@ def test_no_usable_command_holds_where_that_is_safe(bad):
     near = scene((0, 0, 0), (0.5, 6, 180))
     sent = guard.decide(near, wanted, np.array([[True, False]]))
     assert np.isfinite(sent[0, 0]).all()
-    assert guard.reason[0, 0] in (QP, ESCAPE, BEST_EFFORT)
+    assert guard.reason[0, 0] in (QP, BACKUP, BEST_EFFORT)
 
 
 def test_reason_tells_whether_a_command_was_changed():
@@ -129,8 +129,8 @@ def test_reason_tells_whether_a_command_was_changed():
     assert np.isfinite(sent).all()
     assert not changed[guard.reason == PASSED].any()
     assert changed[guard.reason == QP].all()
-    assert set(np.unique(guard.reason)) == {PASSED, QP, ESCAPE, BEST_EFFORT, NOT_COVERED}
-    assert (guard.certificate_m[(guard.reason == QP) | (guard.reason == ESCAPE)] >= 0.0).all()
+    assert set(np.unique(guard.reason)) == {PASSED, QP, BACKUP, BEST_EFFORT, NOT_COVERED}
+    assert (guard.certificate_m[(guard.reason == QP) | (guard.reason == BACKUP)] >= 0.0).all()
     assert (guard.certificate_m[guard.reason == BEST_EFFORT] < 0.0).all()
     assert (np.abs(sent[changed][:, 1]) <= 180.0).all()
     assert ((sent[changed][:, 0] >= 0.0) & (sent[changed][:, 0] <= 2.0)).all()

@@ -149,7 +149,7 @@ def test_it_is_the_boats_own_memory_while_she_obeys(platform, commands):
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
 @pytest.mark.parametrize("commands", [(2.0, 0.0), (0.5, 120.0)])
 def test_a_boat_that_does_not_obey_is_taken_for_what_her_speed_tells(platform, commands):
-    """Told to speed up or turn she lies still: a thrust built up in the model alone would promise her escapes."""
+    """Told to speed up or turn she lies still: a thrust built up in the model alone would promise her backups."""
     fleet = fleet_of([(0, 0, 0, 0.0)], [0], platform)
     disobeying, _ = believed_after(fleet, np.array([commands]), 200, False)
     obeying, _ = believed_after(fleet, np.array([commands]), 200, True)

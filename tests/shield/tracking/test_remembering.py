@@ -88,7 +88,7 @@ def test_boats_are_told_by_name_platform_and_team():
     assert len(known(twins).now) == len(Stayed.between(None, fleet).now) == 0
 
 
-def test_a_boat_that_meets_a_new_one_keeps_its_escape_but_no_margin():
+def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin():
     old, new = new_memory(2), new_memory(3)
     old.kept[:], old.side[:], old.target_deg[:] = True, (-1.0, 1.0), (30.0, 60.0)
     old.margin_m[:], old.threat_m[:] = (1.5, -0.5), [[0.0, 1.0], [0.5, 0.0]]

@@ -1,0 +1,302 @@
+"""Where a boat goes under a backup manoeuvre: turn to one side, then straight, at a set speed.
+
+The sign of ``side`` is the side, 1 clockwise; its size, up to 1, the share of full rudder the turn is made with.
+
+Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
+candidate command, or after the manoeuvre's own first step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ..jit import Array, lean_kernel
+from ..platforms import layout as L
+from ..platforms.actuator import actuate, full_turn, held_rudder
+from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
+
+SAG_M = 0.022
+"""Most a straight line between two samples may cut off the arc sailed between them, m."""
+
+READY_SAMPLE, READY_HEADING, READY_SPEED, TURNING_SAMPLE = range(4)
+"""What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there,
+and the last sample (-1: none) up to which the boat turns as hard as it may, as in every longer turn to that side."""
+
+STEADY_SPEED = 1e-4
+"""Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
+
+
+SETTLES_BY = 0.995
+"""A straight run's speed settles when less than this share of what it gains in one step is gained in the next,"""
+
+SETTLED_MPS = 1e-3
+"""and when that takes it this near, m/s, to the speed commanded, which is not 0: there it would be cut off.
+
+Only of a boat that gains speed: one that slows down may seem to settle there for one step of its way below."""
+
+
+class Manoeuvre(NamedTuple):
+    """Turn to one side, then straight on.
+
+    Attributes:
+        side: clockwise when > 0; its size is the share of full rudder.
+        togo_deg: turn to make before running straight, deg, >= 0.
+        speed_mps: speed commanded throughout, m/s.
+    """
+
+    side: float
+    togo_deg: float
+    speed_mps: float
+
+
+class Span(NamedTuple):
+    """What of a manoeuvre's path is written, and how.
+
+    Attributes:
+        dt_s: model step, s.
+        done: 0 when it starts in the present state; else in the state so many steps from now, and the samples until
+            then are written already (the first, of one step, is written with the rest).
+        stride: model steps between samples.
+        samples: number of samples after sample 0.
+        least: number of them after which the path may end.
+        beyond: number of them after the one where thrust is full that the path goes on for.
+        closely: number of them for which it follows the model; a straight run then goes on as its speed settles.
+        earliest: first sample at which that counts, at most ``samples``.
+        ready_thrust: thrust, percent, from which the boat has all of it.
+    """
+
+    dt_s: float
+    done: int
+    stride: int
+    samples: int
+    least: int
+    beyond: int
+    closely: int
+    earliest: int
+    ready_thrust: float
+
+
+class Straight(NamedTuple):
+    """A straight run from (x, y), m: what it goes east and north in a step, m, or per m/s of speed."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+
+
+@lean_kernel
+def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
+    """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
+    return ((target_deg - heading_deg) * math.copysign(1.0, side)) % 360.0
+
+
+@lean_kernel
+def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
+    """One model step of a backup manoeuvre on ``row``, in place; returns the turn still to make, deg."""
+    before, sign = row[L.HEADING], math.copysign(1.0, side)
+    turn = togo_deg
+    if togo_deg > 0.0 and abs(side) < 1.0:
+        turn = min(togo_deg, abs(side) * full_turn(params, row, speed_mps, dt_s))
+    actuate(params, row, speed_mps, sign * turn, dt_s)
+    if togo_deg <= 0.0:
+        return 0.0
+    turned = (row[L.HEADING] - before) * sign
+    if turned < -180.0:
+        turned += 360.0
+    togo_deg -= turned
+    return togo_deg if togo_deg > 1e-9 else 0.0
+
+
+@lean_kernel
+def _note_ready(k: int, span: Span, thrust: float, heading_rad: float, speed_mps: float, ready: Array) -> None:
+    """Note the first sample, from the earliest that counts, at which thrust is full."""
+    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust:
+        ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, heading_rad, speed_mps
+
+
+@lean_kernel
+def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
+    """Write sample k: that of a state."""
+    path[k, 0], path[k, 1] = row[L.X], row[L.Y]
+    _note_ready(k, span, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
+
+
+@lean_kernel
+def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> tuple[int, int]:
+    """Write the sample of a state so many steps on, if there is one then; returns the next sample and the step."""
+    step = done - 1
+    k = step // span.stride
+    if step % span.stride == 0:
+        _note_state(k, span, row, path, ready)
+    return k + 1, step
+
+
+@lean_kernel
+def _goes_on(k: int, span: Span, ready: Array) -> bool:
+    """Whether sample k is still to be written."""
+    if k > span.samples:
+        return False
+    return k <= span.least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + span.beyond
+
+
+@lean_kernel
+def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
+    """Write positions, m, along a manoeuvre: ``path[: span.samples + 1]``, or fewer, see ``least`` and ``beyond``.
+
+    Args:
+        params: platform row of the boat.
+        row: state to start from; used up.
+        manoeuvre: what is carried out.
+        span: what is written.
+        path: shape (>= samples + 1, 2), float64.
+        ready: shape (4,), what is noted, see `READY_SAMPLE`.
+    """
+    ready[READY_SAMPLE], ready[TURNING_SAMPLE] = -1.0, -1.0
+    if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
+        _trace_usv(params, row, manoeuvre, span, path, ready)
+        return
+    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
+    if span.done == 0:
+        togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
+    k, step = _note_done(max(1, span.done), span, row, path, ready)
+    while _goes_on(k, span, ready):
+        togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
+        step += 1
+        if step % span.stride == 0:
+            _note_state(k, span, row, path, ready)
+            k += 1
+
+
+@lean_kernel
+def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
+    """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
+
+    The turn of a step is rudder, thrust and sign in one: the rudder held until less than such a step's turn is left,
+    then the one that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
+    """
+    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
+    x, y, v = row[L.X], row[L.Y], row[L.SPEED]
+    thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
+    heading = math.radians(row[L.HEADING])
+    ux, uy = math.sin(heading), math.cos(heading)
+    most = held_rudder(params) * abs(side)
+    sign = math.copysign(1.0, side)
+    top = params[L.MAX_SPEED]
+    half, c, s = 0.0, 1.0, 0.0
+    gained = 0.0
+    turning = True
+    k, step = 0, -1
+    if span.done > 0:
+        k, step = _note_done(span.done, span, row, path, ready)
+        ready[TURNING_SAMPLE] = k - 1.0
+    while _goes_on(k, span, ready):
+        last = thrust
+        thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
+        turn, rudder = 0.0, 0.0
+        turning = turning and togo_deg > 0.0
+        if togo_deg > 0.0 and thrust > 0.0:
+            full = turn_of_rudder(params, thrust, most, dt_s)
+            turn = min(full, togo_deg)
+            rudder = most * turn / full
+            turning = turning and turn == full
+        new_speed = next_speed(params, v, thrust, rudder, dt_s)
+        if new_speed == 0.0:
+            turn = 0.0
+        mean = 0.5 * (new_speed + v)
+        if turn > 0.0:
+            togo_deg = togo_deg - turn if togo_deg - turn > 1e-9 else 0.0
+            if turn != half:
+                angle = math.radians(0.5 * turn) * sign
+                half, c, s = turn, math.cos(angle), math.sin(angle)
+            mx, my = ux * c + uy * s, uy * c - ux * s
+            ux, uy = mx * c + my * s, my * c - mx * s
+        else:
+            mx, my = ux, uy
+        x += mx * mean * dt_s
+        y += my * mean * dt_s
+        change = abs(mean - v) + abs(thrust - last)
+        gained_before, gained = gained, mean - v
+        v = min(max(mean, 0.0), top)
+        step += 1
+        if step % span.stride == 0:
+            path[k, 0], path[k, 1] = x, y
+            ready[TURNING_SAMPLE] = k if turning else ready[TURNING_SAMPLE]
+            if ready[READY_SAMPLE] < 0.0:
+                _note_ready(k, span, thrust, math.atan2(ux, uy), v, ready)
+            k += 1
+        if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= span.samples:
+            if change < STEADY_SPEED:
+                _note_ready(max(k, span.earliest), span, thrust, math.atan2(ux, uy), v, ready)  # as now
+                _run_on(Straight(x, y, ux * v * dt_s, uy * v * dt_s), step, k, span, path, ready)
+                return
+            rate = _rate(gained, gained_before, k - span.closely, ready)
+            settled = _settled(v, gained, rate, min(speed_mps, top))
+            if settled > 0.0:
+                short = (v - settled) * rate / (1.0 - rate)
+                _settle(Straight(x, y, ux * dt_s, uy * dt_s), settled, short, rate, step, k, span, path, ready)
+                return
+
+
+@lean_kernel
+def _last_sample(span: Span, ready: Array) -> int:
+    """Last sample of a path that is straight and steady from here on."""
+    if ready[READY_SAMPLE] < 0.0:
+        return span.samples
+    return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
+
+
+@lean_kernel
+def _rate(gained: float, gained_before: float, followed: int, ready: Array) -> float:
+    """What a step gained over what the one before did, 0 where the model is to be followed on."""
+    if not 0.0 <= ready[READY_SAMPLE] < followed or gained_before == 0.0:
+        return 0.0
+    return gained / gained_before
+
+
+@lean_kernel
+def _settled(speed_mps: float, gained_mps: float, rate: float, commanded_mps: float) -> float:
+    """Speed, m/s, at which a boat that gained so much in this step settles; 0 where that is not the one commanded."""
+    if not 0.0 < rate < SETTLES_BY or gained_mps <= 0.0:
+        return 0.0
+    settled_mps = speed_mps + gained_mps * rate / (1.0 - rate)
+    if commanded_mps <= SETTLED_MPS or abs(settled_mps - commanded_mps) >= SETTLED_MPS:
+        return 0.0
+    return settled_mps
+
+
+@lean_kernel
+def _settle(
+    run: Straight,
+    settled_mps: float,
+    short_mps: float,
+    rate: float,
+    step: int,
+    k: int,
+    span: Span,
+    path: Array,
+    ready: Array,
+) -> None:
+    """Fill the rest of a path with a straight run whose speed settles: what it still gains falls geometrically.
+
+    ``run`` tells the way of a step per m/s, ``rate`` what a step gains over what the one before did; the speeds of all
+    steps to come fall short of the settled one by ``short_mps`` in sum.
+    """
+    stride, last = span.stride, _last_sample(span, ready)
+    left, per_sample = rate ** (k * stride - step), rate**stride
+    while k <= last:
+        way = (k * stride - step) * settled_mps + short_mps * (1.0 - left)
+        path[k, 0], path[k, 1] = run.x + way * run.dx, run.y + way * run.dy
+        left *= per_sample
+        k += 1
+
+
+@lean_kernel
+def _run_on(run: Straight, step: int, k: int, span: Span, path: Array, ready: Array) -> None:
+    """Fill the rest of a path with equal steps: a steady straight run needs no model."""
+    last = _last_sample(span, ready)
+    while k <= last:
+        ahead = k * span.stride - step
+        path[k, 0], path[k, 1] = run.x + ahead * run.dx, run.y + ahead * run.dy
+        k += 1

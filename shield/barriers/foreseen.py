@@ -1,0 +1,46 @@
+"""Where boats go that nobody decides for: the game drives them, tagged to a place, or lets them coast, disabled.
+
+They are followed as what they are, by the boat and autopilot model under the game's own commands, instead of as
+pursuers or as boats that hold their course.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..jit import Array, copy_row, lean_kernel
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..platforms.usv import wrap_degrees
+from ..scene import Scene
+
+DRIVEN_MPS, DRIVEN_X, DRIVEN_Y, DRIVEN_S = range(4)
+"""What drives a boat: speed m/s (NaN: not driven), place it is steered at, m (NaN: none, the heading error is 0), and
+the time, s, for which that is sure to last."""
+
+
+@lean_kernel
+def error_to(row: Array, x: float, y: float) -> float:
+    """Heading error, deg, of a boat (its state row) that is to steer at (x, y), m; 0 where there is no such place."""
+    if math.isnan(x):
+        return 0.0
+    bearing = np.float64(math.degrees(math.atan2(x - row[L.X], y - row[L.Y])))
+    return wrap_degrees(bearing - row[L.HEADING])
+
+
+@lean_kernel
+def foresee(scene: Scene) -> None:
+    """Write the ways of boats of ``work.known`` into ``work.path``: sample 0 is one step of the model from now."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
+    for j in range(state.shape[0]):
+        if not work.known[j]:
+            continue
+        drive, path, row = work.driven[j], work.path[j], work.row
+        copy_row(row, state[j])
+        for k in range(path.shape[0]):
+            for _ in range(1 if k == 0 else boats.stride):
+                error = error_to(row, drive[DRIVEN_X], drive[DRIVEN_Y])
+                step_boat(boats.params[j], row, drive[DRIVEN_MPS], error, tuning.model_s)
+            path[k, 0], path[k, 1] = row[L.X], row[L.Y]

@@ -1,0 +1,198 @@
+"""What is sent when the wanted commands do not keep everything, and no answer of the program does: the backups.
+
+A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
+everything from the state one step after it. When neither the wanted commands nor a least change of them have one, the
+plan of the last decision is gone on with, or a better one. So a verified plan, once there, is there at every step,
+unless an opponent does what none was asked to keep clear of.
+
+That is the switching of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..backup.assign import assign_plans
+from ..backup.candidates import candidate, remembered
+from ..backup.effort import all_spent
+from ..backup.laying import lay_path
+from ..backup.rank import PAIR_SAFE, STATIC, STATIC_LOST, rank_path, worst_rank
+from ..barriers.boats import reported_margin
+from ..barriers.clearance import MARGIN
+from ..barriers.neighbours import could_meet
+from ..barriers.static import clear_of_near_obstacles
+from ..barriers.value_function import run_opponents
+from ..jit import BoolArray, lean_kernel
+from ..plan import BACKUP, BEST_EFFORT, Plan, unchanged
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn, full_turn
+from ..scene import Scene
+from .easing import ease
+from .linearised import check, list_movers
+
+
+@lean_kernel
+def opposed(ours: BoolArray, plan: Plan) -> bool:
+    """Whether an opponent is what some boat's wanted command is short of.
+
+    Least changes are for those who stand still or decide with us. An opponent that is only just kept off is so again in
+    the next step, and a boat that gives way as little as it may in each gives way for longer.
+    """
+    found = False
+    for i in range(ours.shape[0]):
+        found = found or (plan.cause[i] >= 0 and not ours[plan.cause[i]])
+    return found
+
+
+@lean_kernel
+def _alone(ours: BoolArray, plan: Plan) -> bool:
+    """Whether static constraints are all that any boat's wanted command is short of."""
+    found = True
+    for i in range(ours.shape[0]):
+        found = found and plan.cause[i] < 0
+    return found
+
+
+@lean_kernel
+def mark_answer(count: int, reason: int, plan: Plan) -> None:
+    """Give the reason to the movers whose command changed."""
+    for m in range(count):
+        i = plan.movers[m]
+        if not unchanged(i, plan):
+            plan.reason[i] = reason
+
+
+@lean_kernel
+def _given_up(i: int, scene: Scene) -> float:
+    """What boat i is short of its distance from boats and static constraints, m."""
+    state, work = scene.state, scene.work
+    least = min(reported_margin(i, state, work), work.static[i, MARGIN])
+    if work.rank[i] < STATIC_LOST and work.bound[i] == STATIC:  # of an obstacle near in time nothing is noted
+        clear_of_near_obstacles(i, i, scene, work.spare2)
+        least = min(least, work.spare2[MARGIN])
+    return max(0.0, -least)
+
+
+@lean_kernel
+def set_off(i: int, scene: Scene) -> None:
+    """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
+    state, boats, tuning, work, plan = scene.state, scene.boats, scene.tuning, scene.work, scene.plan
+    side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
+    plan.held[i, 0], plan.held[i, 1], plan.held[i, 2] = side, np.nan, speed
+    if togo > 0.0:
+        plan.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side)
+        togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
+    plan.commands[i, 0] = speed
+    plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
+
+
+@lean_kernel
+def _could_keep(i: int, slot: int, scene: Scene) -> float:
+    """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
+    for j in range(ours.shape[0]):
+        if ours[j] and not plan.moving[j]:
+            work.near[i, j] = False
+    rank = rank_path(i, slot, -1e9, scene)
+    for j in range(ours.shape[0]):
+        if ours[j] and not plan.moving[j]:
+            work.near[i, j] = work.near[j, i]
+    return rank
+
+
+@lean_kernel
+def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
+    """Whether some mover would keep more if team-mates whose wanted commands passed were not there.
+
+    A boat that opponents or static constraints leave no way out is helped by nobody who gives up what was wanted.
+    """
+    state, memory, work, plan = scene.state, scene.memory, scene.work, scene.plan
+    trial = state.shape[0]
+    for m in range(count):
+        i = plan.movers[m]
+        if work.rank[i] >= PAIR_SAFE:
+            continue
+        if _could_keep(i, i, scene) > work.rank[i]:
+            return True
+        heading = state[i, L.HEADING]
+        if not remembered(i, 0, heading, memory):
+            continue
+        side, togo, speed = candidate(i, 0, 0.0, heading, scene)
+        lay_path(i, trial, side, togo, speed, 0, scene)
+        if _could_keep(i, trial, scene) > work.rank[i]:
+            return True
+    return False
+
+
+@lean_kernel
+def _join(scene: Scene) -> int:
+    """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
+    ours, plan = scene.ours, scene.plan
+    for i in range(ours.shape[0]):
+        for m in range(ours.shape[0]):
+            if ours[i] and plan.place[m] >= 0 and could_meet(i, m, scene):
+                plan.moving[i] = True
+    return list_movers(plan)
+
+
+@lean_kernel
+def _assign_backups(count: int, scene: Scene) -> bool:
+    """Backups of the movers from the present state; whether all boats of ours then keep clear.
+
+    Opponents are left where boats with tables look them up on such manoeuvres.
+    """
+    ours, boats, work, plan = scene.ours, scene.boats, scene.work, scene.plan
+    table_steps = 1
+    for i in range(ours.shape[0]):
+        work.target[i] = 0.0
+        work.mate_target_m[i] = 0.0
+    for m in range(count):
+        i = plan.movers[m]
+        work.threat_target_m[i, :] = 0.0
+        work.joint_target_m[i] = 0.0
+        work.static_target_m[i] = 0.0
+        table_steps = max(table_steps, boats.table_steps[i])
+    run_opponents(table_steps, scene)
+    return assign_plans(scene, 0, True, plan.moving)
+
+
+@lean_kernel
+def _find_backups(count: int, scene: Scene) -> int:
+    """Make the candidate of all movers' backups and check it; returns how many movers there are.
+
+    All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
+    fit what boats have whose wanted commands passed: where these are in the way, they take part, too.
+    """
+    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
+    for _ in range(ours.shape[0]):
+        good = _assign_backups(count, scene)
+        movers = count
+        if not good and _passed_are_in_the_way(count, scene):
+            movers = _join(scene)
+        if movers == count or all_spent(tuning, work):
+            break
+        count = movers
+    run_opponents(1, scene)
+    for m in range(count):
+        set_off(plan.movers[m], scene)
+    check(count, scene)
+    return count
+
+
+@lean_kernel
+def back_up(count: int, scene: Scene) -> None:
+    """Send the backups where neither the wanted commands nor an answer of the program keeps everything.
+
+    Where static constraints are all that is in the way, as little of them as keeps off these. The reason is BACKUP, of
+    boats that are short of something all the same BEST_EFFORT: avoidance does not switch itself off.
+    """
+    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
+    count = _find_backups(count, scene)
+    for m in range(count):
+        i = plan.movers[m]
+        plan.reason[i] = BACKUP if work.rank[i] >= STATIC_LOST else BEST_EFFORT
+        plan.slack_m[i] = _given_up(i, scene)
+    if _alone(ours, plan) and worst_rank(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
+        ease(count, scene)

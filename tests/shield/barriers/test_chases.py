@@ -1,0 +1,135 @@
+"""Opponents no faster than a boat are followed for half a minute, over a straight run that is not stepped through."""
+
+import math
+
+import numpy as np
+import pytest
+from stages import stages_of
+from steerclear.shield import ShieldConfig
+from steerclear.shield.backup.laying import lay_path
+from steerclear.shield.backup.paths import Manoeuvre, Span, sail, trace_path
+from steerclear.shield.barriers.clearance import MARGIN
+from steerclear.shield.barriers.neighbours import find_neighbours
+from steerclear.shield.barriers.opponents import clear_of_pursuer
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import fresh_state
+from steerclear.shield.setup import CHASE_S, boats_of
+
+TOP_MPS = 2.0
+STEP_S = 0.02
+
+
+def boats(own, other, **settings):
+    return boats_of(ShieldConfig(**settings), (own, other), (0, 1))
+
+
+def chase_s(at, i=0, j=1):
+    """Time boat i is followed for by boat j, s."""
+    return (at.pursuit_samples[i] + at.chase_samples[i, j]) * at.sample_s
+
+
+def test_who_is_no_faster_is_followed_for_longer():
+    alike, faster = boats("heron", "heron"), boats("heron", "surveyor")
+    assert chase_s(alike) == pytest.approx(CHASE_S, abs=0.5)
+    assert chase_s(faster) < 8.0
+    assert faster.chased_samples[0] == 0
+    assert chase_s(boats("surveyor", "heron")) > 45.0  # as long as a surveyor takes to gain its speed
+
+
+def test_nobody_is_followed_for_longer_who_only_holds_its_course():
+    assert chase_s(boats("heron", "heron", adversary_s=0.0)) < 8.0
+
+
+def any_boat(random, params):
+    """State and commanded speed, m/s: drawn at random, or of a boat that has held a speed for a while."""
+    top = float(params[L.MAX_SPEED])
+    row = fresh_state(0.0, 0.0, random.uniform(0.0, 360.0), random.uniform(0.0, top))
+    row[L.THRUST] = random.uniform(0.0, 100.0)
+    if random.random() < 0.5:
+        row[[L.SPEED_ERROR, L.HEADING_ERROR]] = 0.0
+        held_mps = random.uniform(0.0, top)
+        for _ in range(random.integers(300)):
+            sail(params, row, 1.0, 0.0, held_mps, 0.1)
+    return row, random.choice([top, 0.0, random.uniform(0.0, top)])
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, seed):
+    """The speed of what is left of the way settles geometrically: no step of the model is needed for it."""
+    random, params = np.random.default_rng(seed), get_platform(platform).pack()
+    span = Span(0.1, 1, 2, 217, 28, 151, 30, 0, 85.0)
+    for _ in range(80):
+        row, speed = any_boat(random, params)
+        togo = random.choice([0.0, 30.0, 90.0, 180.0])
+        path, ready = np.full((400, 2), np.nan), np.zeros(4)
+        trace_path(params, row.copy(), Manoeuvre(1.0, togo, speed), span, path, ready)
+        last = 217 if ready[0] < 0 else min(217, max(28, int(ready[0]) + 151))
+        assert np.isfinite(path[: last + 1]).all()
+        for k in range(last + 1):
+            np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=2e-2)
+            for _ in range(2):
+                togo = sail(params, row, 1.0, togo, speed, 0.1)
+
+
+def sailed_m(bearing_deg, far_m, lead_s, lasts_s):
+    """Least distance to a boat that sails north at top speed of one that steers at where it will be, in fine steps."""
+    bearing, turn = math.radians(bearing_deg), math.radians(get_turn_dps()) * STEP_S
+    x, y, heading, own, least = far_m * math.sin(bearing), far_m * math.cos(bearing), 0.0, 0.0, math.inf
+    for _ in range(int(lasts_s / STEP_S)):
+        lead = min(lead_s, meeting_s(x, y - own))
+        wanted = math.atan2(-x, own + lead * TOP_MPS - y)
+        error = (wanted - heading + math.pi) % (2.0 * math.pi) - math.pi
+        heading += max(-turn, min(turn, error))
+        x, y = x + TOP_MPS * STEP_S * math.sin(heading), y + TOP_MPS * STEP_S * math.cos(heading)
+        own += TOP_MPS * STEP_S
+        least = min(least, math.hypot(x, y - own))
+    return least
+
+
+def meeting_s(x, y):
+    """When one at (x, y), as fast as a boat at the origin that sails north, can meet it, s: never from behind."""
+    return (x * x + y * y) / (2.0 * TOP_MPS * y) if y > 0.0 else math.inf
+
+
+def get_turn_dps():
+    return float(boats("heron", "heron").granted_turn_dps[1])
+
+
+def table_m(bearing_deg, far_m, **settings):
+    """Margin from the same pursuer on a straight run, beyond what has to be kept, as the certificate sees it."""
+    bearing = math.radians(bearing_deg)
+    own = fresh_state(0.0, 0.0, 0.0, TOP_MPS)
+    other = fresh_state(far_m * math.sin(bearing), far_m * math.cos(bearing), 0.0, TOP_MPS)
+    own[L.THRUST] = other[L.THRUST] = 100.0
+    rows = np.array([own, other])
+    at = stages_of(ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, **settings}), rows, ["heron"] * 2, [0, 1])
+    find_neighbours(at.scene, np.zeros(2))
+    lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
+    clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+    return float(at.work.out[MARGIN])
+
+
+@pytest.mark.parametrize(
+    ("bearing_deg", "far_m"), [(95.0, 9.0), (100.0, 7.0), (110.0, 8.0), (120.0, 6.0), (90.0, 20.0)]
+)
+def test_who_closes_in_from_the_quarter_is_seen_coming_for_half_a_minute(bearing_deg, far_m):
+    """Against a pursuit of its own, in steps a tenth as long, that leads the boat as much."""
+    reached = sailed_m(bearing_deg, far_m, 0.3 * CHASE_S, CHASE_S)
+    margin = table_m(bearing_deg, far_m)
+    if margin >= 0.0:
+        assert margin == pytest.approx(reached - 2.5, abs=0.2)
+    else:
+        assert reached < 2.6
+    assert (
+        margin
+        <= table_m(bearing_deg, far_m, adversary_s=9.0) + 0.05
+        <= table_m(bearing_deg, far_m, adversary_s=1.0) + 0.1
+    )
+
+
+def test_that_decides_of_an_all_but_parallel_course():
+    assert table_m(97.0, 7.0, adversary_s=0.0) > 0.5  # it holds its course
+    assert table_m(97.0, 7.0) < 0.0
+    assert sailed_m(97.0, 7.0, 0.3 * CHASE_S, CHASE_S) < 2.5

@@ -1,0 +1,210 @@
+"""The rows' coefficients against finite differences of the exact certificate, the manoeuvre held fixed."""
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed
+from stages import built, screened, stages_of
+from steerclear.shield import ShieldConfig, Surroundings
+from steerclear.shield.backup.laying import lay_path
+from steerclear.shield.barriers.boats import clear_of_boat
+from steerclear.shield.barriers.clearance import FAR, MARGIN
+from steerclear.shield.barriers.static import clear_of_near_obstacles, clear_of_static
+from steerclear.shield.barriers.value_function import WAYS, set_place, table_margin
+from steerclear.shield.filter import rows, screening
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.actuator import command_for_turn
+
+STEP = 1e-4
+
+
+def meeting(random, name, gap_m):
+    """Two boats about to meet."""
+    state = np.zeros((2, L.N_STATE))
+    state[:, [L.SPEED_ERROR, L.HEADING_ERROR]] = 0.0
+    bearing = random.uniform(-180.0, 180.0)
+    state[1, L.X], state[1, L.Y] = gap_m * np.sin(np.radians(bearing)), gap_m * np.cos(np.radians(bearing))
+    state[0, L.HEADING] = bearing + random.uniform(-25.0, 25.0)
+    state[1, L.HEADING] = bearing + 180.0 + random.uniform(-25.0, 25.0)
+    state[:, L.SPEED] = get_platform(name).max_speed_mps * random.uniform(0.5, 1.0, 2)
+    state[:, L.THRUST] = np.nan
+    fill(state, packed([name, name]))
+    return state
+
+
+class Linearised:
+    """One program about the wanted commands, with its first row and the margin that row stands for."""
+
+    def __init__(self, at, count, rows_built):
+        self.at, self.count = at, count
+        self.row = next(r for r in range(rows_built) if at.plan.label[r, 1] != rows.LIMITS)
+        self.manoeuvres = at.work.plan[: len(at.state)].copy()
+        self.z = at.plan.z_now[: 2 * count].copy()
+
+    def move(self, z):
+        """Lay the paths of the movers under inputs z, their manoeuvres as they are."""
+        at = self.at
+        commands = at.plan.commands.copy()
+        for m in range(self.count):
+            i = at.plan.movers[m]
+            params = at.boats.params[i]
+            speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
+            turn = z[2 * m] * at.plan.gain[i, 2]
+            commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
+            screening.predict(i, commands, at.scene)
+            lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
+
+    def margin(self, z):
+        """Exact margin of the row's boat from what the row is about."""
+        at = self.at
+        self.move(z)
+        i, j = at.plan.label[self.row]
+        if j >= 0:
+            clear_of_boat(i, j, at.work.path[i], at.scene, -FAR, FAR)
+        elif j == rows.NEAR_OBSTACLES:
+            clear_of_near_obstacles(i, i, at.scene, at.work.out)
+        else:
+            clear_of_static(i, i, at.scene, at.work.out)
+        return at.work.out[MARGIN]
+
+    def gradients(self):
+        """(coefficients of the row before it was scaled, finite differences), each (2 movers,)."""
+        at, r, n = self.at, self.row, 2 * self.count
+        C, d = at.plan.C[r, :n].copy(), at.plan.d[r]
+        target = at.work.target[at.plan.label[r, 0]] if at.plan.label[r, 1] != rows.ALL_STATIC else 0.0
+        aim_m = rows.AIM_M if at.plan.label[r, 1] >= 0 else rows.STATIC_AIM_M
+        lack = target + aim_m - self.margin(self.z)
+        scale = lack / (d - C @ self.z)
+        steps = STEP * np.eye(n)
+        slopes = [(self.margin(self.z + step) - self.margin(self.z - step)) / (2.0 * STEP) for step in steps]
+        return scale * C, np.array(slopes)
+
+
+def linearised(random, name, team, gap_m, tries, surroundings=None):
+    """Programs of that many scenes in which the wanted commands are not safe."""
+    config = ShieldConfig(adversary_s=0.0)
+    for _ in range(tries):
+        at = stages_of(config, meeting(random, name, gap_m * random.uniform(0.6, 1.2)), [name] * 2, team, surroundings)
+        top = get_platform(name).max_speed_mps
+        wanted = np.column_stack([random.uniform(0.3, 0.95, 2) * top, random.uniform(-2.0, 2.0, 2)])
+        if screened(at, wanted) or at.work.breach.any():
+            continue
+        count, found = built(at)
+        if found > 4 * count:
+            yield Linearised(at, count, found)
+
+
+@pytest.mark.parametrize(
+    ("name", "gap_m", "error"), [("surveyor", 10.0, 0.05), ("heron", 5.0, 0.15), ("si", 12.0, 0.2)]
+)
+def test_a_turn_does_to_the_margin_what_the_row_says(name, gap_m, error):
+    pairs = [task.gradients() for task in linearised(np.random.default_rng(1), name, [0, 1], gap_m, 150)]
+    told, measured = np.array([[a[0], b[0]] for a, b in pairs]).T
+    assert len(told) > 25
+    assert np.mean(np.sign(told) == np.sign(measured)) > 0.95
+    assert np.median(np.abs(told - measured) / np.abs(measured)) < error
+
+
+@pytest.mark.parametrize(("name", "gap_m", "error"), [("surveyor", 10.0, 0.1), ("heron", 5.0, 0.3)])
+def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
+    pairs = [task.gradients() for task in linearised(np.random.default_rng(2), name, [0, 0], gap_m, 150)]
+    both = [(a[[0, 2]], b[[0, 2]]) for a, b in pairs if len(a) == 4]
+    assert len(both) > 25
+    told, measured = np.array(both).transpose(1, 0, 2).reshape(2, -1)
+    assert np.mean(np.sign(told) == np.sign(measured)) > 0.8
+    assert np.median(np.abs(told - measured) / np.abs(measured)) < error
+
+
+def table_row_gradients(task, way):
+    """As `Linearised.gradients`, of the row about an opponent that is looked up and moves on in one way, or None."""
+    at, n = task.at, 2 * task.count
+
+    def margin(z):
+        task.move(z)
+        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.scene)
+        return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
+
+    now = margin(task.z)
+    if now >= FAR or not rows._table_row(0, 0, 1, way, task.count, at.scene):
+        return None
+    C, d = at.plan.C[0, :n].copy(), at.plan.d[0]
+    scale = (at.work.threat_target_m[0, 1] + rows.AIM_M - now) / (d - C @ task.z)
+    steps = STEP * np.eye(n)
+    return scale * C, np.array([(margin(task.z + step) - margin(task.z - step)) / (2.0 * STEP) for step in steps])
+
+
+def test_turn_and_speed_do_to_the_margin_by_table_what_its_row_says():
+    random, found = np.random.default_rng(5), []
+    config = ShieldConfig(separation_m=2.0, table_margin_m=0.2)
+    for _ in range(400):
+        state = meeting(random, "surveyor", random.uniform(8.0, 30.0))
+        state[:, L.THRUST] = 100.0
+        at = stages_of(config, state, ["surveyor"] * 2, [0, 1])
+        if screened(at, np.column_stack([random.uniform(1.0, 2.9, 2), random.uniform(-2.0, 2.0, 2)])):
+            continue
+        task = Linearised(at, *built(at))
+        found += [pair for way in range(WAYS) if (pair := table_row_gradients(task, way)) is not None]
+    pairs = np.array(found)
+    told, measured = pairs[np.isfinite(pairs).all(axis=(1, 2))].transpose(1, 2, 0)
+    assert told.shape[1] > 40
+    turns, speeds = np.abs(told - measured)
+    assert np.median(np.abs(measured[0])) > 0.02
+    assert np.mean(turns < 0.002 + 0.05 * np.abs(measured[0])) > 0.9
+    assert np.mean(speeds < 0.002) > 0.9  # at full thrust a step's speed command has next to no effect on the speed
+
+
+def edge(y):
+    return Surroundings(field=(-200.0, -200.0, 200.0, y))
+
+
+def wall(y):
+    return Surroundings(polygons=[[(-90.0, y + 1.0), (90.0, y + 1.0), (90.0, y + 9.0), (-90.0, y + 9.0)]])
+
+
+def rule(y):
+    return Surroundings(keep_out=[(3.0, y + 30.0, 30.0)])
+
+
+def flag(y):
+    return Surroundings(stops=[(3.0, y + 30.0, 30.0)])
+
+
+@pytest.mark.parametrize(
+    ("around", "about"),
+    [
+        (edge, rows.ALL_STATIC),
+        (rule, rows.ALL_STATIC),
+        (wall, rows.NEAR_OBSTACLES),
+        (flag, rows.NEAR_OBSTACLES),
+    ],
+)
+def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around, about):
+    random, told, measured = np.random.default_rng(3), [], []
+    for _ in range(60):
+        state = np.zeros((1, L.N_STATE))
+        state[0, [L.HEADING, L.SPEED, L.THRUST]] = random.uniform(-40.0, 40.0), 3.0, 100.0
+        at = stages_of(ShieldConfig(), state, ["surveyor"], [0], around(random.uniform(2.0, 6.0)))
+        if screened(at, np.array([[2.9, 1.0]])):
+            continue
+        task = Linearised(at, *built(at))
+        if at.plan.label[task.row, 1] == about:
+            a, b = task.gradients()
+            told.append(a[0])
+            measured.append(b[0])
+    assert len(told) > 10
+    assert np.sign(told).tolist() == np.sign(measured).tolist()
+    np.testing.assert_allclose(told, measured, rtol=0.1, atol=0.003)
+
+
+def test_rows_are_of_unit_length_and_limits_are_exact():
+    task = next(linearised(np.random.default_rng(4), "heron", [0, 0], 5.0, 50))
+    plan, n = task.at.plan, 2 * task.count
+    count, found = built(task.at)
+    norms = np.linalg.norm(plan.C[:found, :n], axis=1)
+    np.testing.assert_allclose(norms, 1.0, atol=1e-12)
+    boxes = plan.label[:found, 1] == rows.LIMITS
+    assert boxes.sum() == 4 * count
+    root = np.sqrt(task.at.tuning.speed_weight)
+    for z, inside in (([0.5, 0.5 * root] * 2, True), ([1.01, 0.0] * 2, False), ([0.0, 1.01 * root] * 2, False)):
+        assert (plan.C[:found][boxes][:, :n] @ np.array(z[:n]) >= plan.d[:found][boxes]).all() == inside
+    assert not (plan.C[:found][boxes][:, :n] @ np.tile([0.0, -0.01], count) >= plan.d[:found][boxes]).all()

@@ -1,0 +1,252 @@
+"""Boats whose thrust is not full: run through until it is, then looked up."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shield_loops import step_all
+from stages import stages_of
+from steerclear.shield import ShieldConfig
+from steerclear.shield.backup.laying import NO_PURSUERS, PURSUERS, PURSUERS_TILL_READY, lay_path, pursuers_run
+from steerclear.shield.backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
+from steerclear.shield.barriers.clearance import MARGIN
+from steerclear.shield.barriers.neighbours import find_neighbours
+from steerclear.shield.barriers.opponents import _run_pursuer, clear_of_pursuer, pursuit_of
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.limits import limits_of
+from steerclear.shield.platforms.usv import fresh_state
+from steerclear.shield.setup import boats_of
+from steerclear.shield.tables.files import load_table, stack_tables
+from steerclear.shield.tables.lookup import WHOLE_S, table_value
+
+SURVEYOR = get_platform("surveyor")
+
+
+def slow_boat(speed_mps=1.0, thrust=20.0):
+    row = fresh_state(0.0, 0.0, 0.0, speed_mps)
+    row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 0.0, 0.0
+    return row
+
+
+def opponent(x, y, heading_deg):
+    row = fresh_state(x, y, heading_deg, 3.0)
+    row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = 100.0, 0.0, 0.0
+    return row
+
+
+def stages(*rows, other="surveyor", **settings):
+    at = stages_of(
+        ShieldConfig(**{"profile": "rammers", **settings}),
+        np.array(rows),
+        ["surveyor"] + [other] * (len(rows) - 1),
+        [0] + [1] * (len(rows) - 1),
+    )
+    find_neighbours(at.scene, np.zeros(len(rows)))
+    return at
+
+
+def laid(at, side=1.0, turn_deg=90.0, speed_mps=3.0, done=0):
+    lay_path(0, 0, side, turn_deg, speed_mps, done, at.scene)
+
+
+@pytest.mark.parametrize(("side", "turn_deg"), [(1.0, 0.0), (-1.0, 90.0), (0.5, 180.0)])
+def test_it_is_noted_where_thrust_is_full_by_the_full_model(side, turn_deg):
+    at = stages(slow_boat(), opponent(0.0, 40.0, 180.0))
+    laid(at, side, turn_deg)
+    row, togo, step, params = slow_boat(), turn_deg, 0, SURVEYOR.pack()
+    while row[L.THRUST] < 90.0 or (step - 1) % at.boats.stride or step < at.boats.table_steps[0]:
+        togo = sail(params, row, side, togo, 3.0, 0.1)
+        step += 1
+    k = (step - 1) // at.boats.stride
+    assert at.work.ready[0, READY_SAMPLE] == k > 0
+    np.testing.assert_allclose(at.work.path[0, k], row[:2], atol=1e-9)
+    assert at.work.ready[0, READY_SPEED] == pytest.approx(row[L.SPEED], abs=1e-9)
+    turned = math.degrees(at.work.ready[0, READY_HEADING]) - row[L.HEADING]
+    assert (turned + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-7)
+
+
+def value_margin(at, tables):
+    """Margin by the table where the boat's thrust is full and the pursuer's run ended, None beyond the table."""
+    ready, pursuer = at.work.ready[0], at.work.pursuer
+    there = pursuer[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
+    headings = ready[READY_HEADING], math.atan2(pursuer[2], pursuer[3])
+    value = table_value(tables, 0, WHOLE_S, *there, *headings, ready[READY_SPEED], pursuer[4])
+    return value - at.work.radius[0, 1] - at.boats.table_margin_m if value < 6.0 - 1e-9 else None
+
+
+def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends():
+    tables, from_value, from_run = stack_tables([load_table("surveyor", "surveyor")]), 0, 0
+    random = np.random.default_rng(2)
+    for _ in range(300):
+        angle, far = random.uniform(-math.pi, math.pi), random.uniform(15.0, 60.0)
+        at = stages(
+            slow_boat(),
+            opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + random.uniform(90.0, 270.0)),
+        )
+        laid(at, 1.0, 90.0)
+        lasts = int(at.boats.pursuit_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
+        runs, values, pursuit = [], [], pursuit_of(0, 1, 0, lasts, lasts, True, at.scene)
+        for manner in range(6):
+            faded = _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, 1e6)
+            runs.append(at.work.spare[MARGIN])
+            margin = value_margin(at, tables)
+            if margin is not None:
+                values.append(margin if margin >= 0.0 else margin * faded)
+        clear_of_pursuer(0, 1, 0, at.scene, -1e6, 1e6)
+        assert at.work.out[MARGIN] == pytest.approx(min(runs + values), abs=1e-9)
+        from_value += bool(values) and min(values) < min(runs)
+        from_run += not values or min(runs) < min(values)
+    assert from_value > 2 < from_run
+
+
+def test_pursuers_are_run_through_only_as_far_as_needed():
+    ahead = opponent(0.0, 30.0, 180.0)
+    for rows, other, how in [
+        ((opponent(0.0, 0.0, 0.0), ahead), "surveyor", NO_PURSUERS),
+        ((slow_boat(), ahead), "surveyor", PURSUERS_TILL_READY),
+        ((slow_boat(), ahead), "large_usv", PURSUERS),
+    ]:
+        at = stages(*rows, other=other)
+        laid(at)
+        assert pursuers_run(0, 0, at.boats, at.work) == how
+
+
+def nimble(thrust, speed_mps, *others):
+    """A heron with that thrust and others about it, and what is looked at of it."""
+    row = fresh_state(0.0, 0.0, 0.0, speed_mps)
+    row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
+    rows = np.array([row, *others])
+    at = stages_of(ShieldConfig(profile="rammers"), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
+    find_neighbours(at.scene, np.zeros(len(rows)))
+    return at
+
+
+def herons_samples(at):
+    """Path samples that pursuers are followed for at full thrust, and until thrust is back from rest."""
+    return int(at.boats.pursuit_samples[0] + at.boats.chase_samples[0, 1]), int(at.boats.thrust_samples[0])
+
+
+@pytest.mark.parametrize(("thrust", "speed_mps"), [(0.0, 0.0), (40.0, 1.0), (80.0, 1.6), (86.0, 1.7), (100.0, 2.0)])
+def test_nimble_boats_are_followed_until_their_thrust_is_back_and_as_long_again_as_with_all_of_it(thrust, speed_mps):
+    at = nimble(thrust, speed_mps, fresh_state(0.0, 12.0, 180.0, 2.0))
+    pursuit, build = herons_samples(at)
+    at.work.path[0] = np.nan
+    laid(at, 1.0, 30.0, 2.0)
+    row, togo, step, params = at.state[0].copy(), 30.0, 0, get_platform("heron").pack()
+    while step == 0 or row[L.THRUST] < 85.0 or (step - 1) % at.boats.stride:
+        togo = sail(params, row, 1.0, togo, 2.0, 0.1)
+        step += 1
+    ready = (step - 1) // at.boats.stride
+    last = min(ready + pursuit, pursuit + build)
+    assert np.isfinite(at.work.path[0, : last + 1]).all()
+    assert np.isnan(at.work.path[0, last + 1 :]).all()
+
+
+def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
+    """Straight on from rest against a boat 11.5 m astern at 2 m/s: still 5 m away after 6 s, 2 m after 19 s."""
+    for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
+        at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
+        laid(at, 1.0, 0.0, 2.0)
+        clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+        assert (at.work.out[MARGIN] < 0.0) == fails
+
+
+@pytest.mark.parametrize("wanted_mps", [2.0, 0.0])
+def test_it_makes_no_difference_on_which_side_of_enough_the_thrust_is(wanted_mps):
+    """Else margins would drop in the step in which a boat that slows down comes to have less."""
+    random, drops = np.random.default_rng(5), []
+    enough = stages_of(ShieldConfig(profile="rammers"), np.array([slow_boat()]), ["heron"], [0]).boats.ready_thrust[0]
+    for _ in range(300):
+        angle, far, heading = (
+            random.uniform(-math.pi, math.pi),
+            random.uniform(6.0, 40.0),
+            random.uniform(-180.0, 180.0),
+        )
+        other = fresh_state(far * math.sin(angle), far * math.cos(angle), heading, random.uniform(0.5, 2.0))
+        more, less = (
+            certificate_m(nimble(thrust, 1.7, other).state, wanted_mps) for thrust in (enough + 0.1, enough - 0.1)
+        )
+        drops.append(abs(more - less))
+    assert np.median(drops) < 0.06
+    assert np.percentile(drops, 90) < 0.3
+
+
+def certificate_m(state, wanted_mps):
+    """What a batch of one game tells of its first boat."""
+    shield = BatchedShield(ShieldConfig(profile="rammers"), 1, ("heron", "heron"), (0, 1))
+    wanted = np.array([[[wanted_mps, 0.0], [2.0, 0.0]]])
+    shield.decide(state[None].copy(), wanted, np.array([[True, False]]))
+    return min(float(shield.certificate_m[0, 0]), 2.0)
+
+
+def test_a_boat_that_is_always_slow_is_at_full_thrust_with_what_it_has():
+    slow = replace(get_platform("heron"), name="slow_heron", max_speed_mps=1.7)
+    steady = limits_of(slow).thrust
+    assert 80.0 < steady < 85.0
+    boats = boats_of(ShieldConfig(profile="rammers"), (slow, slow), (0, 1))
+    assert boats.ready_thrust[0] == pytest.approx(0.85 * steady)
+
+
+def test_margins_of_long_pursuits_fade_as_much_by_their_end():
+    faded = []
+    for thrust, speed_mps in [(0.0, 0.0), (40.0, 1.0), (100.0, 2.0)]:
+        at = nimble(thrust, speed_mps, fresh_state(0.0, 30.0, 180.0, 2.0))
+        laid(at, 1.0, 0.0, 2.0)
+        pursuit, build = herons_samples(at)
+        lasts = min(int(at.work.ready[0, READY_SAMPLE]) + pursuit, pursuit + build)
+        pursuit = pursuit_of(0, 1, 0, lasts, lasts, False, at.scene)
+        faded.append(_run_pursuer(0, 1, 0, 0, pursuit, at.scene, -1e6, 1e6))
+    np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
+
+
+def test_a_boat_that_never_gets_its_thrust_back_is_run_through_to_the_end():
+    at = stages(slow_boat(), opponent(0.0, 30.0, 180.0))
+    laid(at, 1.0, 0.0, 0.0)
+    assert at.work.ready[0, READY_SAMPLE] == -1.0
+    clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+    assert at.work.out[MARGIN] < 0.0
+
+
+def chased(certificate, count=40, steps=500):
+    """First certificates and closest distances of slow boats without thrust, each with a rammer that leads it."""
+    rng, params = np.random.default_rng(8), SURVEYOR.pack()
+    state = np.zeros((count, 2, L.N_STATE))
+    for game in state:
+        game[0] = slow_boat(rng.uniform(0.5, 2.0), 30.0)
+        angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(10.0, 60.0)
+        game[1] = opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + 180.0)
+    shield = BatchedShield(ShieldConfig(profile="rammers", certificate=certificate), count, ("surveyor",) * 2, (0, 1))
+    ours, closest, first = np.tile([True, False], (count, 1)), np.full(count, math.inf), None
+    for _ in range(steps):
+        wanted = np.zeros((count, 2, 2))
+        wanted[:, :, 0] = 3.0
+        wanted[:, 1, 1] = bearing_to_quarry(state)
+        sent = shield.decide(state, wanted, ours)
+        first = shield.certificate_m[:, 0].copy() if first is None else first
+        step_all(np.array([params, params]), state, sent, 0.1)
+        closest = np.minimum(closest, np.linalg.norm(state[:, 0, :2] - state[:, 1, :2], axis=1))
+    return first, closest
+
+
+def bearing_to_quarry(state):
+    """Turn, deg, of each rammer to where the boat will be when it gets there at 3 m/s."""
+    heading = np.radians(state[:, 0, L.HEADING])
+    way = state[:, 0, :2] - state[:, 1, :2]
+    ahead_s = np.linalg.norm(way, axis=1) / 3.0
+    way = way + (state[:, 0, L.SPEED] * ahead_s)[:, None] * np.column_stack([np.sin(heading), np.cos(heading)])
+    return (np.degrees(np.arctan2(way[:, 0], way[:, 1])) - state[:, 1, L.HEADING] + 180.0) % 360.0 - 180.0
+
+
+def test_who_is_promised_a_backup_gets_it():
+    first, closest = chased("auto")
+    assert (first >= 0.0).sum() > 10
+    assert (closest[first >= 0.0] >= 2.5).all()
+
+
+def test_more_are_promised_one_than_by_running_pursuers_through_for_minutes():
+    first, _ = chased("auto", steps=1)
+    minutes, _ = chased("turning_circle", steps=1)
+    assert (first >= 0.0).sum() > (minutes >= 0.0).sum()
