@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear import policies
+from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.entries.onboard import program
 from steerclear.experiments.entries.wrapping.facts import facts_for
@@ -38,7 +39,7 @@ class Noting(Shield):
 
 
 def noted_in(opponent, seed, settings):
-    env = MctfEnv("mctf2026")
+    env = MctfEnv(GameConfig.preset("mctf2026", default_start=False))
     observations, infos = env.reset(seed=seed)
     shield, ids = Noting(settings), list(env.possible_agents)
     teams = [(shield.wrap(policies.make("medium")), ids[:3]), (policies.make(opponent), ids[3:])]
@@ -68,9 +69,7 @@ def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
         shield = plain["shield"].Shield(plain["config"].ShieldConfig.of(**facts["shield"]))
         for fleet, wanted, around, sent in noted_in(opponent, seed, settings):
             names = tuple(kind if isinstance(kind, str) else kind.name for kind in fleet.platforms)
-            seen = plain["fleet"].Fleet(
-                fleet.state, fleet.team, names, fleet.controlled, fleet.names, driven=fleet.driven
-            )
+            seen = plain["fleet"].Fleet(**{**vars(fleet), "platforms": names})
             edge = plain["surroundings"].Surroundings(around.field)
             begun = time.process_time()
             found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).sent.values
