@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -80,7 +81,7 @@ JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="A
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
-    """Read ``KEY=VALUE`` options; a value is JSON or a tuple of numbers where it can be read so, else text.
+    """Read ``KEY=VALUE`` options; a value is inf, JSON or a tuple of numbers where it can be read so, else text.
 
     Raises:
         ConfigError: an entry without ``=``, or a key given twice.
@@ -97,6 +98,8 @@ def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
+    if text.strip().lower() in ("inf", "+inf"):  # as settings are told everywhere; JSON says Infinity
+        return math.inf
     try:
         return json.loads(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,5 @@
 import json
+import math
 import os
 import re
 import signal
@@ -14,6 +15,7 @@ from steerclear.experiments import campaign, cli, keys
 from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
@@ -72,6 +74,14 @@ def test_a_key_given_twice_is_refused():
 @pytest.mark.parametrize("text", ["medium_attack,rammer", "heron", "1.5.2", "f(x)", "{1, 2}", "b'a'", "1j", 9999 * "("])
 def test_what_is_no_number_stays_text(text):
     assert options.key_values([f"a={text}"], "--set") == {"a": text}
+
+
+@pytest.mark.parametrize("name", ["adversary_s", "table_response_per_s", "search_limit"])
+@pytest.mark.parametrize("text", ["inf", " Inf", "Infinity"])
+def test_a_setting_without_bound_is_given_as_inf(name, text):
+    """As the page of settings has it."""
+    given = options.shield_settings(None, None, None, None, [f"{name}={text}"])
+    assert getattr(ShieldConfig.of(**given), name) == math.inf
 
 
 def test_a_table_file_that_is_not_there_is_bad_input():
