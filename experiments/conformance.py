@@ -1,10 +1,12 @@
-"""What a policy, a boat or a reader must be to be registered; each check raises with the first thing that is not so.
+"""What a policy, a boat, a reader or a barrier must be; each check raises with the first thing that is not so.
 
-Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mine")``, ``check_reader(make_env)``.
+Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mine")``, ``check_reader(make_env)``,
+``check_barrier("mine")``.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +14,7 @@ import numpy as np
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
+from steerclear.shield.barriers.registry import Barrier, get_barrier
 from steerclear.shield.exceptions import SteerclearError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array
@@ -21,6 +24,10 @@ from steerclear.shield.platforms.files import PlatformFile, parse_platform, to_t
 from steerclear.shield.wrappers import reader_of
 
 STEPS = 20
+FALL = 1.05
+"""Most a margin may fall by in a metre: 1, as a distance, and a little for curves."""
+SLOPE_OFF = 0.05
+"""Most a slope may be off the differences of its margin, m per m, at nine of ten places: elsewhere there are edges."""
 
 
 class NotConforming(SteerclearError):
@@ -122,3 +129,45 @@ def check_reader(make_env: Callable[[], Any]) -> None:
 def _hold_same(plain: Fleet, filtered: Fleet, n: int) -> None:
     _hold(len(plain.names) == n and bool(np.isfinite(plain.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
     _hold(np.array_equal(plain.state, filtered.state), "the game is another one under a filter that changes nothing")
+
+
+def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0, -100.0, 100.0, 100.0)) -> None:
+    """A barrier gives the same margins again, none that is no number, falls as a distance does, and so its slope says.
+
+    Args:
+        name: of the barrier.
+        area_m: (xmin, ymin, xmax, ymax) where it is tried, up to a minute ahead.
+
+    Raises:
+        NotConforming: it does not.
+        ConfigError: there is no such barrier, or its values are none.
+    """
+    barrier, random = get_barrier(name), np.random.default_rng(1)
+    values, h, off = barrier.now(), 0.05, list[bool]()
+    _hold(len(values) == len(barrier.now()), f"values of barrier {name!r} are not as many each time; give as many")
+    for x, y, ahead in random.uniform((*area_m[:2], 0.0), (*area_m[2:], 60.0), (300, 3)).tolist():
+        where = f"at ({x:.1f}, {y:.1f}) m, {ahead:.1f} s ahead"
+        row = [_margin(barrier, x + dx, y + dy, ahead, values, where) for dx, dy in _places_round(h)]
+        _hold(row[0] == _margin(barrier, x, y, ahead, values, where), f"barrier {name!r} gives another margin {where}")
+        if not all(map(math.isfinite, row)):
+            continue
+        slopes = (row[1] - row[2]) / (2.0 * h), (row[3] - row[4]) / (2.0 * h)
+        fall = math.hypot(*slopes)
+        _hold(fall <= FALL, f"barrier {name!r} falls by {fall:.3g} m in a metre {where}; divide its margin by that")
+        if barrier.slope is not None:
+            given = barrier.slope(x, y, ahead, values)
+            off.append(not math.dist(given, slopes) <= SLOPE_OFF)
+    _hold(10 * sum(off) <= len(off), f"the slope of barrier {name!r} is not its margin's; mend it, or leave it out")
+
+
+def _places_round(h: float) -> tuple[tuple[float, float], ...]:
+    return (0.0, 0.0), (h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)
+
+
+def _margin(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> float:
+    try:
+        margin = float(barrier.margin(x, y, ahead_s, values))
+    except Exception as error:  # foreign code may raise anything
+        raise NotConforming(f"barrier {barrier.name!r} raises {where}: {type(error).__name__}: {error}") from error
+    _hold(not math.isnan(margin), f"barrier {barrier.name!r} is no number {where}; give +inf where nothing is kept")
+    return margin

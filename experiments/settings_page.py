@@ -64,6 +64,7 @@ COSTS = {
     ),
     "edge_m": Cost("m", "None: the field's edge is not kept", _METHOD),
     "hull_m": Cost("m", "distance from walls", _METHOD),
+    "barriers": Cost("names", "time of a decision: a call for every sample of a path", "[extend](extend.md)"),
 }
 """Keyed by the setting; a test holds them to the settings there are."""
 HEAD = f"""# Settings

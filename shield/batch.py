@@ -17,6 +17,7 @@ from .filter.flow import decide_compiled
 from .fleet import LARGEST, LARGEST_SPEED_MPS, usable_drives
 from .game_facts import facts_of_games, warn_of_distances
 from .jit import Array, BoolArray, IntArray, copy_row, kernel, lean_kernel
+from .kept_barriers import KeptBarriers
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
@@ -173,9 +174,10 @@ class BatchedShield:
         boats, self._granted = _boats_of_its_own(boats_of(config, self.platforms, self.team))
         self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
         self._memory = new_memory(games, n)
+        self._barriers = KeptBarriers(config)
         self._scene = new_scene(
             boats=boats,
-            static=surroundings.pack(config),
+            around=(surroundings.pack(config), self._barriers.arrays),
             plans=plans_of(config),
             tuning=tuning_of(config),
             memory=new_memory(n),
@@ -244,7 +246,9 @@ class BatchedShield:
         asked = Asked(state, wanted, ours, fear_s, driven, known)
         decided = Decided(self.sent, self.reason, self.certificate_m, self.cut_short)
         scene = self._scene, self._granted, self._memory
+        self._barriers.renew()
         decide_games(asked, decided, *scene, self._pending, self._margin, self._late_m)
+        self._barriers.tell()
         return self.sent
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:

@@ -73,6 +73,8 @@ class ShieldConfig:
         edge_m: distance to keep from the field edge, m; None: the edge is not kept.
         hull_m: distance to keep from walls of obstacles, m. Where nobody gives it, a wrapper or `games_shield` takes
             the radius of its game's boats, if that is larger and there are obstacles.
+        barriers: names of registered barriers that are kept as obstacles are, see `barriers.registry.register_barrier`;
+            in one text joined by "+".
 
     Raises:
         ConfigError: a value is of the wrong type, not finite or out of range.
@@ -107,11 +109,13 @@ class ShieldConfig:
     delay_s: float = 0.0
     edge_m: float | None = 0.2
     hull_m: float = Unsaid(1.0)
+    barriers: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         from .backup.families import CERTIFICATES
         from .filter.program import check_solver
 
+        object.__setattr__(self, "barriers", _names(self.barriers))
         for entry in fields(self):
             value = getattr(self, entry.name)
             _check_number(entry.name, value)
@@ -169,6 +173,18 @@ class ShieldConfig:
         return cls(**settings)
 
 
+def _names(barriers: object) -> tuple[str, ...]:
+    """Names of registered barriers, each once."""
+    from .barriers.registry import get_barrier
+
+    names = [name for name in barriers.split("+") if name] if isinstance(barriers, str) else barriers
+    if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
+        raise ConfigError(f"barriers is {barriers!r}; give names of registered barriers, as ('ferry',)")
+    for name in names:
+        get_barrier(name)
+    return tuple(dict.fromkeys(names))
+
+
 _TEXTS = {"certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
 _POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "move_s", "speed_weight", "horizon_s"}
@@ -190,6 +206,8 @@ _MAY_BE_INFINITE = _RATES | {"adversary_s", "visitor_s", "max_track_age_s", "giv
 
 def _check_number(name: str, value: object) -> None:
     """Numbers are finite (where not said otherwise) and >= 0, or > 0 where zero makes no sense."""
+    if name == "barriers":
+        return
     if name in _TEXTS:
         if not isinstance(value, str):
             raise ConfigError(f"{name} is {value!r}; give a name")

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import plan
-from .backup.rank import STATIC
+from .barriers.static import STATIC
 from .commands import Commands
 from .fleet import FIELD, Fleet
 from .jit import Array, BoolArray, IntArray
@@ -58,7 +58,7 @@ class Decision:
         sent_heading_rad, sent_speed_mps: command to send.
         intervened: whether the two differ in any bit.
         reason: why.
-        binding: names of the boats (or "field") that bind.
+        binding: names of the boats, or registered barriers, or "field", that bind.
         certificate_m: verified margin beyond the separation, m; inf when nobody is near.
         slack_m: margin given up, m.
         fallback: name of the fallback used, or None.
@@ -111,11 +111,12 @@ class Decisions(Sequence[Decision]):
         reason: (n,) values of `Reason`.
         certificate_m: (n,) margins, m.
         slack_m: (n,) m.
-        bound: (n,) index of the binding neighbour, -1 none, -2 static constraints.
+        bound: (n,) index of the binding neighbour, -1 none, -2 static constraints, -3 and below ``barriers``.
         solve_time_s: time of the whole decision, s.
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
         feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
+        barriers: names of the registered barriers that are kept.
     """
 
     fleet: Fleet
@@ -130,6 +131,7 @@ class Decisions(Sequence[Decision]):
     no_table: BoolArray | None = None
     cut_short: BoolArray | None = None
     feared_s: Array | None = None
+    barriers: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -175,6 +177,8 @@ class Decisions(Sequence[Decision]):
     def _binding(self, bound: int) -> tuple[str, ...]:
         if bound == STATIC:
             return (FIELD,)
+        if bound < STATIC:
+            return (self.barriers[STATIC - 1 - bound],)
         return (self.fleet.names[bound],) if bound >= 0 else ()
 
     def _feared_s(self, i: int) -> float | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from .compiled.kept_code import KeptCode
@@ -63,9 +63,20 @@ def _compiled(function: F, counted: bool) -> F:
     """
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": counted}
     compiled: Any = njit(**options)(function)
+    if hasattr(compiled, "get_call_template"):  # there is none where NUMBA_DISABLE_JIT is set
+        compiled.get_call_template = _for_any_constant(compiled.get_call_template)
     compiled._cache = kept = KeptCode(function)
     kept.stamp = _tree_stamp()
     return cast(F, compiled)
+
+
+def _for_any_constant(ask: Callable[..., Any]) -> Callable[..., Any]:
+    """What a compiled caller asks for, without the values of constants: numba would compile anew for each of them."""
+
+    def asked(args: Any, kws: Any) -> Any:
+        return ask(tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()})
+
+    return asked
 
 
 def kept_in() -> str:

@@ -112,6 +112,26 @@ class Static(NamedTuple):
     current_mps: float
 
 
+class Registered(NamedTuple):
+    """Barriers of other people's that are kept, k of them, see `barriers.registry`; written before every decision.
+
+    Attributes:
+        address: (k,) where their functions are, in this process.
+        values: (k, `MOST_VALUES`) the numbers they are given now, NaN beyond.
+        size: (k,) how many those are; -1: they could not be had, and nothing is known of the barrier.
+        faults: (k,) how often they gave no usable margin in this decision.
+        off_m: how far off a boat may be, m, and how much a margin may fall short between two samples of a path.
+        late_s: time until the moment that is decided for, s.
+    """
+
+    address: IntArray
+    values: Array
+    size: IntArray
+    faults: IntArray
+    off_m: float
+    late_s: float
+
+
 class Tuning(NamedTuple):
     """Scalar settings in the form compiled code takes them.
 
@@ -154,6 +174,7 @@ class Scene(NamedTuple):
         ours: (n,) boats that it decides for.
         boats: their constants.
         static: things that do not move.
+        registered: barriers of other people's.
         plans: the family of backup manoeuvres.
         tuning: the settings.
         memory: what is kept from one decision to the next.
@@ -165,6 +186,7 @@ class Scene(NamedTuple):
     ours: BoolArray
     boats: Boats
     static: Static
+    registered: Registered
     plans: Array
     tuning: Tuning
     memory: Memory
@@ -173,12 +195,18 @@ class Scene(NamedTuple):
 
 
 def new_scene(
-    boats: Boats, static: Static, plans: Array, tuning: Tuning, memory: Memory, work: Work, plan: Plan
+    boats: Boats,
+    around: tuple[Static, Registered],
+    plans: Array,
+    tuning: Tuning,
+    memory: Memory,
+    work: Work,
+    plan: Plan,
 ) -> Scene:
     """A scene that nothing is to be decided about yet."""
     n = len(boats.team)
     return share(
-        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, static, plans, tuning, memory, work, plan)
+        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, *around, plans, tuning, memory, work, plan)
     )
 
 

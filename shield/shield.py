@@ -22,11 +22,12 @@ from .filter.limiting import tell_of_limits, within_limits
 from .filter.program import Program, solve
 from .fleet import Fleet, usable_drives
 from .jit import Array, BoolArray
+from .kept_barriers import KeptBarriers
 from .memory import Memory, new_memory
 from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
-from .scene import Boats, Scene, Static, Tuning, new_scene, path_samples
+from .scene import Boats, Registered, Scene, Static, Tuning, new_scene, path_samples
 from .setup import boats_of, missing_tables, plans_of, tuning_of, without_pursuers
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.autopilots import Autopilots, all_known, unknown_memory
@@ -48,10 +49,10 @@ class _Seat:
     plan: Plan
     scene: Scene | None = None
 
-    def scene_of(self, boats: Boats, static: Static, plans: Array, tuning: Tuning) -> Scene:
+    def scene_of(self, boats: Boats, static: Static, registered: Registered, plans: Array, tuning: Tuning) -> Scene:
         """The scene with these boats and static constraints; manoeuvres and settings are always the shield's."""
         if self.scene is None or self.scene.boats is not boats or self.scene.static is not static:
-            self.scene = new_scene(boats, static, plans, tuning, self.memory, self.work, self.plan)
+            self.scene = new_scene(boats, (static, registered), plans, tuning, self.memory, self.work, self.plan)
         return self.scene
 
 
@@ -92,6 +93,7 @@ class Shield:
         self.surroundings = surroundings
         self._tuning = tuning_of(self.config)
         self._plans = plans_of(self.config)
+        self._barriers = KeptBarriers(self.config)
         self._packed: dict[Surroundings, Static] = {}
         self._last_around: tuple[Surroundings, Static] | None = None
         self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
@@ -186,6 +188,7 @@ class Shield:
         turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
         asked = less_turn(within.as_relative_deg(fleet.state[:, L.HEADING]), turned)
         static = self._around(self.surroundings if surroundings is None else surroundings)
+        self._barriers.renew()
         if self.config.coordination == "team":
             seat = self._seats[0]
             self._run(seat, state, asked, margin, fleet.controlled, boats, static)
@@ -193,6 +196,7 @@ class Shield:
         else:
             answer = self._each(state, asked, margin, fleet.controlled, boats, static)
         sent, changed, bound = to_send(fleet, within, asked, turned, answer)
+        self._barriers.tell()
         if cut is not None:
             changed = tell_of_limits(cut, changed, answer)
         self._note_sent(seen, unknown, sent, boats)
@@ -209,6 +213,7 @@ class Shield:
             no_table=self._missing,
             cut_short=answer.cut_short,
             feared_s=feared_s,
+            barriers=self.config.barriers,
         )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
@@ -345,7 +350,7 @@ class Shield:
         self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, static: Static
     ) -> None:
         """The stages of `flow` with the QP backend in between."""
-        scene = seat.scene_of(boats, static, self._plans, self._tuning)
+        scene = seat.scene_of(boats, static, self._barriers.arrays, self._plans, self._tuning)
         todo = begin(scene, state, wanted, margin, ours)
         if todo == PASSES:
             return

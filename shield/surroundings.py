@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import NoNumbersError, numbers
-from .barriers.static import LEAVE_S
+from .barriers.obstacles import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
 from .jit import Array
@@ -73,18 +73,18 @@ class Surroundings:
         Raises:
             ConfigError: nothing of the field is left.
         """
-        off_m = _off_m(config)
-        circles = [(x, y, r + config.hull_m + off_m) for x, y, r in self.circles]
-        circles += [(x, y, r + off_m) for x, y, r in self.stops]
+        wider_m = off_m(config)
+        circles = [(x, y, r + config.hull_m + wider_m) for x, y, r in self.circles]
+        circles += [(x, y, r + wider_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return share(
             Static(
                 field=self._edge(config),
-                keep_out=np.array([(x, y, r + off_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
+                keep_out=np.array([(x, y, r + wider_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
                 circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
                 segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
-                segment_m=config.hull_m + off_m,
-                side_m=off_m,
+                segment_m=config.hull_m + wider_m,
+                side_m=wider_m,
                 current_mps=float(config.current_mps),
             )
         )
@@ -93,7 +93,7 @@ class Surroundings:
         """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""
         if self.field is None or config.edge_m is None:
             return np.array([-np.inf, -np.inf, np.inf, np.inf])
-        inside_m = config.edge_m + _off_m(config)
+        inside_m = config.edge_m + off_m(config)
         edge = np.array(self.field, np.float64) + inside_m * np.array([1.0, 1.0, -1.0, -1.0])
         if not (edge[0] < edge[2] and edge[1] < edge[3]):
             raise ConfigError(
@@ -103,7 +103,7 @@ class Surroundings:
         return edge
 
 
-def _off_m(config: ShieldConfig) -> float:
+def off_m(config: ShieldConfig) -> float:
     """How far off a boat may be a step on, m, with room to turn about; what drifts later is added to paths."""
     return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from steerclear.policies.entrants import catalogue
+from steerclear.shield.barriers import registry
 from steerclear.shield.platforms.registry import PLATFORMS
 from steerclear.shield.wrappers import readers
 
@@ -17,6 +18,7 @@ SAYS = {
     "batched_training": "24 learners",
     "count_collisions": "judged in hindsight: ",
     "first_decision": "BACKUP 111.1 deg",
+    "own_barrier": "nearest: 0.",
     "own_encounter": "without a shield 0.03 m",
     "own_platform": "launch turns to",
     "own_policy": "every boat straight to the flag",
@@ -31,6 +33,7 @@ SAYS = {
 def nothing_stays_registered(monkeypatch):
     monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
     monkeypatch.setattr(readers, "_REGISTERED", dict(readers._REGISTERED))
+    monkeypatch.setattr(registry, "BARRIERS", dict(registry.BARRIERS))
     before = set(PLATFORMS)
     yield
     for name in set(PLATFORMS) - before:

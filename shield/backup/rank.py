@@ -39,9 +39,6 @@ LATER_WORTH = 0.1
 DEEP_M = 10.0
 """Depth in an obstacle, m, at whose half rank begins to fall off more slowly; it never ends, behind walls."""
 
-STATIC = -2
-"""In the place of the neighbour that binds: a static constraint does."""
-
 
 @lean_kernel
 def _level_to_beat(best: float) -> float:
@@ -69,7 +66,7 @@ def _rank_touching(i: int, slot: int, share: float, best: float, scene: Scene) -
     wall the depth is how far behind it the manoeuvre goes, which is least for the one that meets it most gently.
     """
     work = scene.work
-    clear_of_near_obstacles(i, slot, scene, work.spare2)
+    touched = clear_of_near_obstacles(i, slot, scene, work.spare2)
     depth_m = -work.spare2[MARGIN]
     shallow = 1.0 - depth_m / DEEP_M if depth_m < 0.5 * DEEP_M else 0.25 * DEEP_M / depth_m
     rank = OBSTACLE_BASE * shallow + LATER_WORTH * share
@@ -79,7 +76,7 @@ def _rank_touching(i: int, slot: int, share: float, best: float, scene: Scene) -
     if rank <= best:
         return rank
     worst_pursuer(i, slot, scene, -FAR)
-    work.bound[slot], work.decided[slot] = STATIC, np.inf
+    work.bound[slot], work.decided[slot] = touched, np.inf
     return rank
 
 
@@ -121,12 +118,12 @@ def rank_path(i: int, slot: int, best: float, scene: Scene) -> float:
             work.decided[slot] = np.inf
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
     work.decided[slot] = np.inf
-    clear_of_static(i, slot, scene, work.static[slot])
+    nearest = clear_of_static(i, slot, scene, work.static[slot])
     to_spare_m = work.static[slot, MARGIN] - work.static_target_m[i]
     spare = SPARE_WORTH * min(clear[MARGIN], tuning.margin_cap_m)
     if to_spare_m >= 0.0:
         return PAIR_SAFE + spare
-    work.bound[slot] = STATIC
+    work.bound[slot] = nearest
     return max(STATIC_LOST, PAIR_SAFE + to_spare_m - SPARE_WORTH * tuning.margin_cap_m) + spare
 
 

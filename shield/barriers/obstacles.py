@@ -13,8 +13,21 @@ from __future__ import annotations
 import math
 
 from ..jit import Array, lean_kernel
-from ..scene import Static
+from ..scene import Boats, Static
 from .clearance import FAR, MARGIN, lower
+
+LEAVE_S = 0.5
+"""Time constant with which a boat too near to an obstacle has to come away from it, s."""
+
+
+@lean_kernel
+def grace(boats: Boats, static: Static) -> float:
+    """Factor per sample on what a boat too near to an obstacle is excused.
+
+    Where there may be a current that is less than 1: asked only to come no nearer than it is, a boat would be carried
+    in a little in every step.
+    """
+    return math.exp(-boats.sample_s / LEAVE_S) if static.current_mps > 0.0 else 1.0
 
 
 @lean_kernel

@@ -8,17 +8,22 @@ pursuers.
 
 from __future__ import annotations
 
-import math
-
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Scene, Static
+from ..scene import Boats, Scene
 from .clearance import MARGIN
-from .obstacles import clear_of_obstacles, first_touch
+from .obstacles import clear_of_obstacles, first_touch, grace
+from .registered import clear_of_registered, first_registered_touch
 from .rules import clear_of_rules
 
-LEAVE_S = 0.5
-"""Time constant with which a boat too near to an obstacle has to come away from it, s."""
+STATIC = -2
+"""In the place of the neighbour that binds: an obstacle, an edge or a circle does; below, registered barriers."""
+
+
+@lean_kernel
+def about(barrier: int) -> int:
+    """What binds, in the place of a neighbour: the registered barrier of that number; -1: something else static."""
+    return STATIC - 1 - barrier
 
 
 @lean_kernel
@@ -28,20 +33,10 @@ def way_per_sample(i: int, state: Array, boats: Boats) -> float:
 
 
 @lean_kernel
-def grace(boats: Boats, static: Static) -> float:
-    """Factor per sample on what a boat too near to an obstacle is excused.
+def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
+    """Clearance row of boat i on the path in ``slot`` from obstacles and registered barriers at any time, and rules.
 
-    Where there may be a current that is less than 1: asked only to come no nearer than it is, a boat would be carried
-    in a little in every step.
-    """
-    return math.exp(-boats.sample_s / LEAVE_S) if static.current_mps > 0.0 else 1.0
-
-
-@lean_kernel
-def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> None:
-    """Clearance row of boat i on the path in ``slot`` from obstacles at any time, field edge and keep-out circles.
-
-    ``work.spare2`` is overwritten.
+    ``work.spare2`` is overwritten. Returns what the least is from: `STATIC`, or below it the barrier, see `about`.
     """
     state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
@@ -51,21 +46,23 @@ def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> None:
     clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, static), static, work.spare2)
     if work.spare2[MARGIN] < out[MARGIN]:
         copy_row(out, work.spare2)
+    return about(clear_of_registered(i, slot, last, drift_m, scene, out))
 
 
 @lean_kernel
-def clear_of_near_obstacles(i: int, slot: int, scene: Scene, out: Array) -> None:
-    """The same from obstacles alone until a half turn could be over."""
+def clear_of_near_obstacles(i: int, slot: int, scene: Scene, out: Array) -> int:
+    """The same from obstacles and registered barriers alone until a half turn could be over."""
     state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.static_samples[i]
     clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, static), static, out)
+    return about(clear_of_registered(i, slot, last, 0.0, scene, out))
 
 
 @lean_kernel
 def share_before_touch(i: int, slot: int, scene: Scene) -> float:
-    """Share of the time of a half turn after which boat i first touches an obstacle, 1 when it does not."""
+    """Share of the time of a half turn until boat i touches an obstacle or a registered barrier fails; 1: never."""
     state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
     last = boats.static_samples[i]
     way_m = way_per_sample(i, state, boats)
     first = first_touch(state[i], work.path[slot], last, way_m, 0.0, grace(boats, static), static)
-    return first / (last + 1.0)
+    return first_registered_touch(i, slot, first, scene) / (last + 1.0)

@@ -82,6 +82,8 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
     if settings.get("adversary_s") is None:  # a real hull is at stake, and nobody knows who is out there
         settings.setdefault("profile", "rammers")
     settings.setdefault("mate_cap_m", settings.get("margin_cap_m", ShieldConfig.margin_cap_m))
+    if settings.get("barriers"):
+        raise FleetFileError("shield.barriers: what they are given is not in the black box; leave them out on boats")
     try:
         config = ShieldConfig.of(**settings)
     except (ConfigError, TypeError) as error:

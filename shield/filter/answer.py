@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..backup.rank import STATIC
 from ..barriers.boats import reported_margin
+from ..barriers.static import STATIC
 from ..commands import Commands
 from ..fleet import Fleet
 from ..jit import Array, BoolArray, IntArray, lean_kernel
@@ -71,7 +71,7 @@ def to_send(
     if not mark_changed(answer.commands, asked, answer.reason, changed):
         return wanted, changed, answer.bound
     sent = wanted.replaced(changed, less_turn(answer.commands, -turned), fleet.state[:, L.HEADING])
-    alone = changed & (answer.bound < 0) & (answer.reason != HELD)
+    alone = changed & (answer.bound == -1) & (answer.reason != HELD)
     return sent, changed, np.where(alone, STATIC, answer.bound)  # nothing else changes commands
 
 

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from ..backup.effort import all_spent
-from ..backup.rank import PAIR_SAFE, STATIC, STATIC_LOST
+from ..backup.rank import PAIR_SAFE, STATIC_LOST
 from ..barriers.clearance import MARGIN
+from ..barriers.static import STATIC
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
 from ..plan import BACKUP, BEST_EFFORT, QP, unchanged
@@ -82,8 +83,8 @@ def _name_static(scene: Scene) -> None:
     """Say of a command that was changed for static constraints, and keeps them now, that these bind and no boat."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        if ours[i] and plan.cause[i] == STATIC and work.rank[i] >= PAIR_SAFE and not unchanged(i, plan):
-            work.bound[i] = STATIC
+        if ours[i] and plan.cause[i] <= STATIC and work.rank[i] >= PAIR_SAFE and not unchanged(i, plan):
+            work.bound[i] = plan.cause[i]
 
 
 @lean_kernel

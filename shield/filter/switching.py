@@ -18,11 +18,11 @@ from ..backup.assign import assign_plans
 from ..backup.candidates import candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
-from ..backup.rank import PAIR_SAFE, STATIC, STATIC_LOST, rank_path, worst_rank
+from ..backup.rank import PAIR_SAFE, STATIC_LOST, rank_path, worst_rank
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.neighbours import could_meet
-from ..barriers.static import clear_of_near_obstacles
+from ..barriers.static import STATIC, clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
 from ..jit import BoolArray, lean_kernel
 from ..plan import BACKUP, BEST_EFFORT, Plan, unchanged
@@ -69,7 +69,7 @@ def _given_up(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and static constraints, m."""
     state, work = scene.state, scene.work
     least = min(reported_margin(i, state, work), work.static[i, MARGIN])
-    if work.rank[i] < STATIC_LOST and work.bound[i] == STATIC:  # of an obstacle near in time nothing is noted
+    if work.rank[i] < STATIC_LOST and work.bound[i] <= STATIC:  # of an obstacle near in time nothing is noted
         clear_of_near_obstacles(i, i, scene, work.spare2)
         least = min(least, work.spare2[MARGIN])
     return max(0.0, -least)

@@ -4,7 +4,7 @@ import inspect
 
 import pytest
 from numba import njit
-from numba.core import caching, cgutils, config, imputils
+from numba.core import caching, cgutils, config, dispatcher, imputils
 from numba.core.registry import cpu_target
 from numba.core.typing import templates
 from steerclear.shield.compiled.kept_code import KeptCode, SealedFile
@@ -29,6 +29,7 @@ def parameters(function):
         (caching.IndexDataCacheFile._save_data, ["self", "name", "data"]),
         (caching.InTreeCacheLocator.from_function, ["py_func", "py_file"]),
         (caching.UserWideCacheLocator.__init__, ["self", "py_func", "py_file"]),
+        (dispatcher.Dispatcher.get_call_template, ["self", "args", "kws"]),
     ],
     ids=lambda value: getattr(value, "__qualname__", None),
 )
@@ -61,6 +62,13 @@ def test_a_cache_has_the_attributes_that_are_replaced():
 
 def test_lean_kernels_are_compiled_without_counting():
     assert lean_kernel(lambda x: x).targetoptions["_nrt"] is False
+
+
+def test_a_callee_is_compiled_once_whatever_constants_it_is_called_with():
+    inner = lean_kernel(lambda x, k, deep: x + k if deep else x - k)
+    outer = njit(lambda x: inner(x, 1, True) + inner(x, 2, deep=False))
+    assert outer(1.5) == 2.0
+    assert len(inner.signatures) == 1
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from steerclear.shield.config import COORDINATION, PROFILES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 
 TEXTS = ("certificate", "coordination", "profile", "solver")
-NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in TEXTS]
+NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in (*TEXTS, "barriers")]
 NOT_ZERO = [
     "move_s",
     "separation_m",
@@ -113,7 +113,7 @@ def test_a_misspelt_key_is_told_the_nearest_known_one(entry):
 
 
 def test_a_key_like_no_other_is_told_all():
-    with pytest.raises(ConfigError, match=r"known settings: separation_m, .*hull_m"):
+    with pytest.raises(ConfigError, match=r"known settings: separation_m, .*barriers"):
         Shield(zzz=1)
 
 
@@ -169,7 +169,7 @@ def test_numbers_no_float_holds_are_refused():
 
 def test_whole_numbers_are_kept_as_floats_for_compiled_code():
     config = ShieldConfig(separation_m=3, margin_cap_m=0, response_per_s=1, horizon_s=6, edge_m=None, hull_m=1)
-    numbers = [value for value in vars(config).values() if not isinstance(value, str) and value is not None]
+    numbers = [value for value in vars(config).values() if not isinstance(value, str | tuple) and value is not None]
     assert {type(value) for value in numbers} == {float}
     assert config == ShieldConfig(
         separation_m=3.0, margin_cap_m=0.0, response_per_s=1.0, horizon_s=6.0, edge_m=None, hull_m=1.0

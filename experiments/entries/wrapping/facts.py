@@ -34,6 +34,9 @@ def facts_for(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
     move_s = float(rules.decision_s) / config.decision_steps
     times = {"dt_s": float(rules.decision_s), "move_s": move_s if config.decision_steps > 1 else None}
     settings = ShieldConfig.of(**{**times, **shield})
+    if settings.barriers:
+        names = ", ".join(settings.barriers)
+        raise ConfigError(f"a shielded zip cannot carry registered barriers ({names}); wrap without them")
     kinds = config.platforms if isinstance(config.platforms, (tuple, list)) else (config.platforms,) * core.n_boats
     stops = [list(map(list, surroundings_of(core, team).stops)) for team in range(2)]
     return {

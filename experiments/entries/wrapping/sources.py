@@ -17,6 +17,8 @@ ROOTS = (f"{SHIELD}.shield", f"{SHIELD}.actions", f"{SHIELD}.tracking.driving")
 STAND_INS = {
     f"{SHIELD}.jit": "jit",
     f"{SHIELD}.shared": "shared",
+    f"{SHIELD}.barriers.pointer": "barriers",
+    f"{SHIELD}.barriers.registry": "barriers",
     f"{SHIELD}.filter.program": "program",
     f"{SHIELD}.platforms.registry": "registry",
 }

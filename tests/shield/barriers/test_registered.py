@@ -1,0 +1,260 @@
+"""Barriers of other people's: boats keep them as they keep off obstacles, and what is broken there fails closed."""
+
+import copy
+import json
+import logging
+import math
+import pickle
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed, sail, sail_games
+from steerclear.experiments.conformance import NotConforming, check_barrier
+from steerclear.experiments.entries.wrapping.facts import facts_for
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, hints
+from steerclear.shield.barriers import Barrier, register_barrier, registry
+from steerclear.shield.barriers.pointer import _interpreted, address_of
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.exceptions import ConfigError
+
+FERRY = (0.0, 45.0, 0.0, -1.5, 10.0)
+"""Place, m, velocity, m/s, and radius of its domain, m: it comes straight at a boat that runs north from the origin."""
+NEAR = (0.0, 11.0, 0.0, 0.0, 10.0)
+"""A domain that lies still, a metre before the boat."""
+
+
+def ferrys(x_m, y_m, ahead_s, ferry):
+    return math.hypot(x_m - ferry[0] - ahead_s * ferry[2], y_m - ferry[1] - ahead_s * ferry[3]) - ferry[4]
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays_registered(monkeypatch):
+    monkeypatch.setattr(registry, "BARRIERS", {})
+    monkeypatch.setattr(hints, "_said", set())
+
+
+class Ferry:
+    """A ferry under way, which moves by the step after each time it was looked at."""
+
+    def __init__(self, dt_s=0.1, place=FERRY):
+        self.seen, self.dt_s = np.array(place), dt_s
+
+    def now(self):
+        values = self.seen.copy()
+        self.seen[:2] += self.dt_s * self.seen[2:4]
+        return values
+
+
+def lone(speed_mps=1.5, y_m=0.0):
+    return Fleet.of(position_m=[[0.0, y_m]], heading_rad=[0.0], speed_mps=[speed_mps], team=[0], platforms="heron")
+
+
+def north(step, state):
+    """Everybody wants to go north at once."""
+    return np.stack([np.full(state.shape[:-1], 1.5), -state[..., 2]], axis=-1)
+
+
+def gaps(run, step=0.1):
+    """Distance from the ferry's domain at every moment, m."""
+    at = np.arange(len(run.position)) * step
+    ferry = np.stack([FERRY[0] + at * FERRY[2], FERRY[1] + at * FERRY[3]], axis=-1)
+    while ferry.ndim < run.position.ndim:
+        ferry = ferry[:, None]
+    return np.linalg.norm(run.position - ferry, axis=-1) - FERRY[4]
+
+
+def test_a_boat_keeps_out_of_a_moving_domain():
+    register_barrier(Barrier("ferry", ferrys, values=Ferry().now))
+    free = gaps(sail(Shield(), lone(), north, 300)).min()
+    run = sail(Shield(barriers=("ferry",)), lone(), north, 300)
+    kept = gaps(run)
+    assert free < -5.0
+    assert kept.min() >= 0.0
+    assert kept.min() < 4.0, "it does not stay farther off than it has to"
+    assert (run.reason == Reason.PASSED).any()
+
+
+def test_a_batch_keeps_out_of_it_too():
+    register_barrier(Barrier("ferry", ferrys, values=Ferry().now))
+    state = np.stack([lone().state, lone(1.0, -3.0).state])
+    fill(state.reshape(2, -1), packed(["heron"] * 2))
+    run = sail_games(ShieldConfig(barriers=("ferry",)), state, ["heron"], [0], north, 300)
+    kept = gaps(run)
+    assert kept.min() >= 0.0
+    assert (kept.min(axis=0) < 6.0).all()
+
+
+def test_a_single_decision_and_a_batch_say_the_same():
+    values = NEAR
+    register_barrier(Barrier("ferry", ferrys, values=values))
+    config, fleet = ShieldConfig(barriers=("ferry",)), lone()
+    fill(fleet.state, packed(["heron"]))
+    decisions = Shield(config).decide(fleet, Commands.game_deg([[1.5, 0.0]]))
+    batch = BatchedShield(config, 1, ("heron",), (0,))
+    sent = batch.decide(fleet.state[None], np.array([[[1.5, 0.0]]]), np.array([[True]]))
+    assert decisions.count_intervened == 1
+    assert np.allclose(sent[0], decisions.sent.values, atol=1e-6)
+    assert batch.reason[0, 0] == decisions.reason[0]
+
+
+def test_what_binds_is_named():
+    far = Barrier("far", lambda x, y, ahead, values: 1e3)
+    register_barrier(far)
+    register_barrier(Barrier("ferry", ferrys, values=NEAR))
+    decision = Shield(barriers=("far", "ferry")).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert decision.intervened
+    assert decision.binding == ("ferry",)
+
+
+def test_a_barrier_counts_as_an_obstacle_of_the_same_place_does():
+    """A circle as an obstacle without a hull, and as a barrier: every command is the same, to rounding."""
+    register_barrier(Barrier("rock", ferrys, values=(1.0, 20.0, 0.0, 0.0, 4.0)))
+    round_it = sail(Shield(barriers=("rock",)), lone(), north, 250)
+    stopped = sail(Shield(surroundings=Surroundings(stops=((1.0, 20.0, 4.0),))), lone(), north, 250)
+    assert (stopped.reason != Reason.PASSED).any()
+    assert np.allclose(round_it.position, stopped.position, atol=0.05)
+
+
+def test_where_it_does_not_matter_commands_pass_bit_for_bit():
+    register_barrier(Barrier("ferry", ferrys, values=(500.0, 500.0, 0.0, 0.0, 10.0)))
+    decision = Shield(barriers=("ferry",)).decide(lone(), Commands.relative_deg([[1.234567, 1.0]]))[0]
+    assert decision.reason is Reason.PASSED
+    assert not decision.intervened
+
+
+def test_its_own_slope_is_taken():
+    asked = []
+
+    def slope(x_m, y_m, ahead_s, values):
+        asked.append((x_m, y_m))
+        return 0.0, -1.0
+
+    shore = Barrier("shore", lambda x, y, ahead, values: 12.0 - y + 0.0 * len(asked), slope)
+    register_barrier(shore)
+    run = sail(Shield(barriers=("shore",)), lone(), north, 120)
+    assert asked
+    assert run.position[..., 1].max() < 12.01
+    assert run.position[..., 1].max() > 10.0
+
+
+def wrong_value(x, y, ahead, values):
+    return math.nan
+
+
+def raises(x, y, ahead, values):
+    raise ValueError("no chart")
+
+
+def beyond_its_values(x, y, ahead, values):
+    return values[3]
+
+
+def cliff(x, y, ahead, values):
+    return 1e4 * (5.0 - y)
+
+
+def of_no_type(x, y, ahead, values):
+    return "deep"
+
+
+@pytest.mark.parametrize("margin", [wrong_value, raises, beyond_its_values, cliff, of_no_type])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_what_gives_no_usable_margin_counts_as_violated_and_the_log_says_so(margin, compiled, caplog, monkeypatch):
+    if not compiled:
+        monkeypatch.setattr("steerclear.shield.barriers.pointer._compiled", lambda barrier: None)
+    monkeypatch.setattr("steerclear.shield.barriers.pointer._MADE", {})
+    register_barrier(Barrier("chart", margin))
+    with caplog.at_level(logging.WARNING):
+        decision = Shield(barriers=("chart",)).decide(lone(y_m=4.0), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert decision.reason in (Reason.BACKUP, Reason.BEST_EFFORT)
+    assert decision.binding == ("chart",)
+    assert math.isfinite(decision.sent_speed_mps)
+    assert "'chart' gave no usable margin" in caplog.text
+
+
+@pytest.mark.parametrize("broken", ["raises", "nan"])
+def test_values_that_cannot_be_had_count_as_violated(broken, caplog):
+    answers = [[1.0]]
+
+    def now():
+        if not answers:
+            raise OSError("no AIS") if broken == "raises" else ValueError
+        return answers.pop() if broken == "raises" or answers else [math.nan]
+
+    register_barrier(Barrier("ais", lambda x, y, ahead, values: 1e3 + values[0], values=now))
+    shield, wanted = Shield(barriers=("ais",)), Commands.relative_deg([[1.5, 0.0]])
+    assert shield.decide(lone(), wanted)[0].reason is Reason.PASSED
+    with caplog.at_level(logging.WARNING):
+        decision = shield.decide(lone(), wanted)[0]
+    assert decision.binding == ("ais",)
+    assert decision.reason is Reason.BEST_EFFORT
+    assert "no values now" in caplog.text
+
+
+def test_an_interpreted_barrier_decides_as_a_compiled_one(monkeypatch):
+    barrier = Barrier("ferry", ferrys, values=NEAR)
+    register_barrier(barrier)
+    first = Shield(barriers=("ferry",)).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert address_of(barrier) == address_of(barrier)
+    monkeypatch.setattr("steerclear.shield.barriers.pointer._MADE", {barrier: _interpreted(barrier)})
+    second = Shield(barriers=("ferry",)).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert first.intervened
+    assert second.sent_heading_rad == pytest.approx(first.sent_heading_rad, abs=1e-9)
+    assert second.reason is first.reason
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda shield: pickle.loads(pickle.dumps(shield))])
+def test_copies_of_a_shield_find_their_barriers(again):
+    register_barrier(Barrier("ferry", ferrys, values=NEAR))
+    shield, wanted = Shield(barriers=("ferry",)), Commands.relative_deg([[1.5, 0.0]])
+    shield.decide(lone(y_m=-9.0), wanted)
+    other = again(shield)
+    other._barriers.arrays.address[:] = 0  # as in another process
+    assert other.decide(lone(), wanted)[0] == shield.decide(lone(), wanted)[0]
+
+
+def test_names_are_checked_when_a_shield_is_built():
+    with pytest.raises(ConfigError, match=r"unknown barrier 'fery'.*register_barrier"):
+        Shield(barriers=("fery",))
+    with pytest.raises(ConfigError, match="give names"):
+        Shield(barriers=3)
+    register_barrier(Barrier("a", ferrys, values=FERRY))
+    register_barrier(Barrier("b", ferrys, values=FERRY))
+    assert ShieldConfig(barriers="a+b").barriers == ("a", "b") == ShieldConfig(barriers=["a", "b", "a"]).barriers
+    assert ShieldConfig(barriers="").barriers == ()
+    assert hash(ShieldConfig(barriers="a")) == hash(ShieldConfig(barriers=("a",)))
+    with pytest.raises(ConfigError, match="another's"):
+        register_barrier(Barrier("a", ferrys))
+    with pytest.raises(ConfigError, match="is no barrier"):
+        register_barrier(3)
+    for values in ([math.nan], [[1.0]], ["x"], [0.0] * 65):
+        with pytest.raises(ConfigError, match="values of barrier"):
+            Barrier("c", ferrys, values=values)
+    with pytest.raises(ConfigError, match="cannot be named"):
+        Barrier("no name", ferrys)
+
+
+def test_a_zip_refuses_them_by_name():
+    register_barrier(Barrier("ferry", ferrys, values=FERRY))
+    with pytest.raises(ConfigError, match="cannot carry registered barriers \\(ferry\\)"):
+        facts_for("mctf2026", {"barriers": ("ferry",)})
+    assert json.dumps(facts_for("mctf2026", {})["shield"]["barriers"]) == "[]"
+
+
+def test_a_good_barrier_conforms_and_others_are_told_why():
+    register_barrier(Barrier("ferry", ferrys, values=FERRY))
+    check_barrier("ferry")
+    for name, margin, why in [
+        ("steep", lambda x, y, ahead, values: 3.0 * y, "falls by 3 m"),
+        ("raising", raises, "raises"),
+        ("unknown", wrong_value, "no number"),
+        ("moody", lambda x, y, ahead, values: np.random.default_rng().random(), "another margin|falls by"),
+    ]:
+        register_barrier(Barrier(name, margin))
+        with pytest.raises(NotConforming, match=why):
+            check_barrier(name)
+    register_barrier(Barrier("sloping", ferrys, lambda x, y, ahead, values: (0.0, 0.0), FERRY))
+    with pytest.raises(NotConforming, match="slope"):
+        check_barrier("sloping")
+    register_barrier(Barrier("free", lambda x, y, ahead, values: math.inf))
+    check_barrier("free")
