@@ -192,6 +192,7 @@ class BatchedShield:
         self.sent = np.zeros((games, n, 2))
         self._undriven = np.full((games, n, 4), np.nan)
         self.cut_short = np.zeros(games, np.bool_)
+        self.serves: int | None = None
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
@@ -200,6 +201,7 @@ class BatchedShield:
             FleetError: the mask is no such array.
         """
         which = slice(None) if mask is None else _mask(mask, len(self.reason))
+        self.serves = None if mask is None else self.serves
         self._memory.kept[which] = False
         self._memory.backing_up[which] = False
         self._pending[which] = np.nan
@@ -295,11 +297,14 @@ class GamesFilter:
         """Safe commands (B, n, 2) for games that the shield was built for.
 
         Raises:
-            ConfigError: they are others.
+            ConfigError: they are others, or it has begun to serve the other team.
         """
         if self._checked is not core:
             self.shield.check_games(core, self.team)
             self._checked = core
+        if self.shield.serves not in (None, self.team):
+            raise ConfigError("this shield has begun to serve the other team; build one for each, or reset() it")
+        self.shield.serves = self.team
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
         return self.shield.decide(core.state, commands, ours, ~core.on_side, driven_boats(core))

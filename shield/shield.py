@@ -76,6 +76,9 @@ class Shield:
         surroundings: field edge, obstacles and keep-out circles.
         **settings: single settings by name, instead of ``config``.
 
+    Attributes:
+        serves: whom it has decided for since `reset`, where wrappers use it; None: nobody yet.
+
     Raises:
         ConfigError: a setting is unknown or out of range, or leaves nothing of the field.
     """
@@ -103,6 +106,7 @@ class Shield:
         self._foreseen: dict[bytes, Boats] = {}
         self._missing: BoolArray | None = None
         self._known: Known | None = None
+        self.serves: object | None = None
         self._pending = np.zeros((0, 0, 2))
         self._autopilots: Autopilots | None = None
 
@@ -125,6 +129,7 @@ class Shield:
     def reset(self) -> None:
         """Forget all backups, as before a new game."""
         self._known = None
+        self.serves = None
 
     def warm_up(self, fleet: Fleet | None = None) -> None:
         """Compile what decisions run, so that the first one is as quick as any; the shield's memory is left alone.

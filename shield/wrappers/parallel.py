@@ -14,6 +14,7 @@ from ..shield import Shield
 from .checks import check_unchanged, facts_now, refuse_second, shield_for
 from .readers import reader_of
 from .reading import GameReader, one_game_shield, parallel_game, team_number
+from .serving import begin_serving, check_serving
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
@@ -63,6 +64,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self.shield_autopilot = shield_autopilot
         self.keep_out = keep_out
         self.decisions: Decisions | None = None
+        self._holder: object = None
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start a game with a shield that remembers nothing.
@@ -72,7 +74,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         """
         self.shield = shield_for(self.shield, self._reader, self.team)
         self._facts = facts_now(self._reader)
-        self.shield.reset()
+        self._holder = begin_serving(self.shield)
         self.decisions = None
         return self.env.reset(seed=seed, options=options)
 
@@ -80,9 +82,10 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         """One step; commands of the shielded team that are not safe are changed before the boats move.
 
         Raises:
-            ConfigError: the env was set since its reset to what the shield is not for.
+            ConfigError: the env was set since its reset to what the shield is not for, or it has begun to serve others.
         """
         check_unchanged(self._facts, self._reader)
+        check_serving(self.shield, self._holder)
         with self._reader.filtering(self._safe):
             outcome = self.env.step(actions)
         self._tell(outcome[-1])
@@ -115,5 +118,5 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
                 infos[agent]["shield"] = self.decisions[i]
 
 
-_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader", "_facts")
+_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader", "_facts", "_holder")
 """Attributes of the wrapper itself."""

@@ -17,6 +17,7 @@ from ..shield import Shield
 from .checks import check_unchanged, facts_now, shield_for
 from .readers import reader_of
 from .reading import GameReader, one_game_shield
+from .serving import begin_serving, check_serving
 
 logger = logging.getLogger(__name__)
 
@@ -51,6 +52,7 @@ class ShieldedTeamPolicy:
         self._team = 0
         self._agent_ids: tuple[str, ...] = ()
         self._facts: GameFacts | None = None
+        self._holder: object = None
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
@@ -65,7 +67,7 @@ class ShieldedTeamPolicy:
         self.shield = shield_for(self.shield, reader, self._team, held=True)
         self._reader, self._agent_ids, self._facts = reader, tuple(agent_ids), facts_now(reader)
         self._shown = None
-        self.shield.reset()
+        self._holder = begin_serving(self.shield)
         self.policy.reset(env, agent_ids, seed)
 
     def act(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,11 +75,12 @@ class ShieldedTeamPolicy:
 
         Raises:
             PolicyError: `reset` has not been called, or another game is played than the one it was called with.
-            ConfigError: the env was set since then to what the shield is not for.
+            ConfigError: the env was set since then to what the shield is not for, or it has begun to serve others.
         """
         if self._reader is None or self._facts is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
         check_unchanged(self._facts, self._reader)
+        check_serving(self.shield, self._holder)
         self._check_game(self._reader, observations)
         answer = self.policy.act(observations, infos)
         if not isinstance(answer, Mapping):
