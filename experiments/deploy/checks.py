@@ -86,5 +86,6 @@ def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] 
         grounds=grounds_of(fleet),
         sinks=(drill, *sinks),
     )
-    Loop(fleet, parts, operator, station.clock).run(drill.seconds + 2.0 * fleet.dt_s)
-    return drill_checks(drill, dict(fleet.platform_of), fleet.dt_s)
+    loop = Loop(fleet, parts, operator, station.clock)
+    loop.run(drill.seconds + 2.0 * fleet.dt_s)
+    return drill_checks(drill, dict(fleet.platform_of), fleet.dt_s, loop.foresight)

@@ -20,7 +20,7 @@ LOG = logging.getLogger(__name__)
 VALID_S = 12.0 * 3600.0
 """A drill counts for a day on the water, s."""
 
-DRILLED = ("course", "response")
+DRILLED = ("course", "response", "model")
 """Checks that only a drill can make."""
 
 

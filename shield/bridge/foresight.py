@@ -129,6 +129,11 @@ class Foresight:
             return 0.0
         return float(np.partition(errors, int(share * (len(errors) - 1)))[int(share * (len(errors) - 1))])
 
+    @property
+    def outside_m(self) -> float:
+        """A boat farther than this from where it was foreseen 2 s ago is far outside its model, m."""
+        return self._limit.outside_m
+
     def outside_s(self, boat: str) -> float:
         """How long a boat has been far outside its model, s."""
         return float(self._outside_s[self._boats.index(boat)])

@@ -109,7 +109,7 @@ def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, e
     seen = []
     first = preflight(orders_of(fleet_file, accept=BUSY), Surface(seen.append))
     assert [result.text for result in first.refused] == []
-    assert {"disk", "known", "geofence", "certificate", "course:blue_1", "response:blue_1"} <= {r.name for r in seen}
+    assert {"disk", "known", "geofence", "certificate", "course:blue_1", "response:blue_1", "model:blue_1"} <= {r.name for r in seen}
     fleet = load_fleet(fleet_file)
     with referee(fleet):
         outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
@@ -269,16 +269,16 @@ def test_a_drill_counts_for_the_same_file_for_a_while_and_when_it_passed(fleet_f
         return check_drill(fleet, file_text, None, ["blue_1"])
 
     assert "no preflight" in check().text
-    keep(fleet, text, None, [good("course"), good("response", delay_s=0.23)], [])
+    keep(fleet, text, None, [good("course"), good("response", delay_s=0.23), good("model")], [])
     assert check().passed
     assert measured_delay_s(fleet, None) == 0.23
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.23
     assert "changed" in check(text + "\n").text
-    keep(fleet, text, None, [good("course"), good("response", False)], ["response:blue_1"])
+    keep(fleet, text, None, [good("course"), good("response", False), good("model")], ["response:blue_1"])
     assert "turns slower" in check().text
-    keep(fleet, text, None, [good("course"), good("response", False)], [])
+    keep(fleet, text, None, [good("course"), good("response", False), good("model")], [])
     assert check().passed, "it was accepted at the preflight"
-    keep(fleet, text, None, [good("course")], [])
+    keep(fleet, text, None, [good("course"), good("model")], [])
     assert "lacks response:blue_1" in check().text
     monkeypatch.setattr("time.time", lambda: 4e9)
     assert "h old" in check().text

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.foresight import Foresight
 from steerclear.shield.bridge.link import BoatReading, Sent
 from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
-from steerclear.shield.bridge.preflight.response import check_course, check_response, drill_checks
+from steerclear.shield.bridge.preflight.response import check_course, check_model, check_response, drill_checks
 from steerclear.shield.bridge.preflight.result import run_checks
 from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.bridge.wanted import Snapshot
@@ -66,15 +67,18 @@ class Water:
 def driven(boats=("blue_1",), bend=None, **water):
     """A drill that has been driven, and the water it was driven on; ``bend(s into it, values)`` stands for a shield."""
     drill, water = Drill(FLEET, boats), Water(**water)
+    water.foresight = Foresight(FLEET, boats)
     for k in range(round(drill.seconds / DT_S) + 5):
         now = 50.0 + DT_S * k
         readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}
+        water.foresight.update({name: water.rows[i].copy() for i, name in enumerate(boats)}, readings)
         drill.offer(Snapshot(k, now, water.seen()))
         values = drill.latest().commands.values
         values = values if bend is None else bend(DT_S * k, values.copy())
         sent = {
             name: Sent(name, now, values[i][1], values[i][0], "fake", True) for i, name in enumerate(FLEET.names[:2])
         }
+        water.foresight.sent(sent)
         drill.take(Tick(k, now, now, now, readings, (), None, None, None, None, False, sent, 0.0))
         water.step(values)
     return drill, water
@@ -86,8 +90,10 @@ def good():
 
 
 def test_boats_that_are_what_the_file_says_pass(good):
-    results = run_checks(drill_checks(good[0], dict(FLEET.platform_of), DT_S))
-    assert [r.name for r in results] == ["course:blue_1", "response:blue_1", "course:blue_2", "response:blue_2"]
+    results = run_checks(drill_checks(good[0], dict(FLEET.platform_of), DT_S, good[1].foresight))
+    assert [r.name for r in results] == [
+        f"{kind}:{boat}" for boat in ("blue_1", "blue_2") for kind in ("course", "response", "model")
+    ]
     assert all(r.passed for r in results), [r.text for r in results]
 
 
@@ -200,9 +206,21 @@ def test_a_compass_that_is_off_is_found():
 def test_a_boat_that_does_not_move_passes_nothing():
     with reference_models():
         aground = replace(HERON, name="aground", max_speed_mps=0.01)
-    drill, _ = driven(platform=aground)
-    for check in drill_checks(drill, dict(FLEET.platform_of), DT_S):
+    drill, water = driven(platform=aground)
+    for check in drill_checks(drill, dict(FLEET.platform_of), DT_S, water.foresight):
         assert not check.run().passed
+
+
+def test_a_boat_far_from_where_it_is_foreseen_is_to_be_fitted_first():
+    """As the loop would slow it: the words name the trial and the fit, the figures what is missed."""
+    _, off = driven(reverse=True)
+    result = check_model("blue_1", HERON, off.foresight)
+    assert not result.passed
+    assert "steerclear sea-trial" in result.text
+    assert "steerclear fit" in result.text
+    assert result.figures["missed_2s_m"] > 1.5
+    _, same = driven()
+    assert check_model("blue_1", HERON, same.foresight).figures["missed_2s_m"] < 0.05
 
 
 def test_going_astern_is_found():
