@@ -169,5 +169,5 @@ def _margin(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array,
         margin = float(barrier.margin(x, y, ahead_s, values))
     except Exception as error:  # foreign code may raise anything
         raise NotConforming(f"barrier {barrier.name!r} raises {where}: {type(error).__name__}: {error}") from error
-    _hold(not math.isnan(margin), f"barrier {barrier.name!r} is no number {where}; give +inf where nothing is kept")
+    _hold(not math.isnan(margin), f"barrier {barrier.name!r} is no number {where}; give +inf far from what is kept")
     return margin

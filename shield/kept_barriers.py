@@ -40,6 +40,8 @@ class KeptBarriers:
 
         A copy in another process has its barriers elsewhere.
         """
+        if not self.names:
+            return
         arrays = self.arrays
         for b, name in enumerate(self.names):
             barrier = get_barrier(name)
@@ -55,6 +57,8 @@ class KeptBarriers:
 
     def tell(self) -> None:
         """Log, once for each, which barriers gave no usable margin in the last decision."""
+        if not self.names:
+            return
         for name, faults in zip(self.names, self.arrays.faults, strict=True):
             if faults:
                 say_once(

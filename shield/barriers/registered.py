@@ -19,6 +19,9 @@ from .pointer import call
 LOST_M = -100.0
 """Margin, m, where a barrier gives none that can be used."""
 
+BEYOND_M = 50.0
+"""Margins beyond this are not looked at closely, m: no step of a boat brings them down to what it keeps."""
+
 STEEPEST = 10.0
 """Slopes beyond this, m per m, are no distance's: what is said of a sample then says nothing of the way to the next."""
 
@@ -84,7 +87,7 @@ def clear_of_registered(i: int, slot: int, samples: int, drift_m: float, scene: 
             if margin < out[MARGIN]:
                 lower(out, margin, k, 0.0, 0.0)
                 least = b
-    if least >= 0:
+    if least >= 0 and out[MARGIN] < BEYOND_M:
         k = int(out[SAMPLE])
         _write_slope(least, path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s, registered, out)
     return least

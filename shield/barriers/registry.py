@@ -33,7 +33,7 @@ class Barrier:
     Attributes:
         name: what it is known by.
         margin: h(x_m, y_m, ahead_s, values), m, of a boat's centre at a place, m east and north, so many seconds from
-            now. It falls by no more than 1 m in a metre, as a distance does; +inf where nothing is to be kept.
+            now. It falls by no more than 1 m in a metre, as a distance does; beyond 50 m it may be anything, as +inf.
         slope: (dh/dx, dh/dy) of the same; None: central differences of the margin.
         values: numbers both are given, as a float64 array: where the ferry is, say. Or a function, asked before every
             decision, that gives as many each time. All that changes has to come by them: the compiler takes whatever

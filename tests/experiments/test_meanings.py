@@ -32,3 +32,8 @@ def test_the_report_says_what_reversals_and_scores_are_in_their_rows(results, tm
     for name in ("reversals_per_boat_minute", "primary", "secondary"):
         row = text[text.index(f"<td>{name}") :]
         assert FIGURES[name] in row[: row.index("</tr>")]
+
+
+def test_the_old_name_of_a_reason_is_still_read():
+    assert Reason["ESCAPE"] is Reason.BACKUP
+    assert Reason(3).name == "BACKUP"

@@ -122,6 +122,14 @@ def test_where_it_does_not_matter_commands_pass_bit_for_bit():
     assert not decision.intervened
 
 
+@pytest.mark.parametrize("settings", [{}, {"current_mps": 0.2, "delay_s": 0.2}])
+def test_where_nothing_is_kept_a_margin_may_be_infinite(settings):
+    """Also beside it, where the slope of an infinite margin would be none."""
+    register_barrier(Barrier("chart", lambda x, y, ahead, values: math.inf if y > 0.03 else 60.0 - y))
+    decision = Shield(barriers=("chart",), **settings).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert decision.reason is Reason.PASSED
+
+
 def test_its_own_slope_is_taken():
     asked = []
 

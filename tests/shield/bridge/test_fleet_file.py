@@ -57,6 +57,7 @@ def test_a_good_file_says_what_follows():
         ("team: blue", "team: blue\nrate_hz: .nan", "rate_hz"),
         ("team: blue", "team: blue\nshield: {dellay_s: 1}", "did you mean 'delay_s'"),
         ("team: blue", "team: blue\nshield: {dt_s: 0.5}", "leave shield.dt_s out"),
+        ("team: blue", "team: blue\nshield: {barriers: ferry}", "shield.barriers: what they are given is not in"),
         ("team: blue", "team: blue\nshield: {coordination: per_boat}", "leave shield.coordination out"),
         ("team: blue", "team: blue\nshield: {max_track_age_s: 1.0}", "leave shield.max_track_age_s out"),
         ("team: blue", "team: blue\nlimits: {policy: {then: jump}}", "hold_course"),
