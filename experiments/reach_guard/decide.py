@@ -33,16 +33,6 @@ def predict(setup: Setup, state: Array, ours: BoolArray, commands: Array, later:
 
 
 @kernel
-def _holds(near: BoolArray, margin: Array, target: Array) -> bool:
-    n = near.shape[0]
-    for i in range(n):
-        for j in range(n):
-            if near[i, j] and not margin[i, j] >= target[i, j]:
-                return False
-    return True
-
-
-@kernel
 def _command(setup: Setup, state: Array, turn: float, speed: float, full_deg: float, i: int) -> tuple[float, float]:
     """Command that yields the inputs, through the autopilot's inverse."""
     params = setup.params[i]
@@ -52,13 +42,7 @@ def _command(setup: Setup, state: Array, turn: float, speed: float, full_deg: fl
 
 @kernel
 def _program(
-    setup: Setup,
-    state: Array,
-    ours: BoolArray,
-    pairs: Pairs,
-    asked: Array,
-    commands: Array,
-    later: Array,
+    setup: Setup, state: Array, ours: BoolArray, pairs: Pairs, asked: Array, commands: Array, later: Array
 ) -> bool:
     """Nearest inputs to those asked for that keep all targets, linearised and checked; True when the check holds."""
     n = state.shape[0]
@@ -88,29 +72,9 @@ def _program(
                     commands[i, 0], commands[i, 1] = _command(setup, state[i], answer[k], answer[k + 1], z[i, 2], i)
         predict(setup, state, ours, commands, later)
         fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
-        if _holds(pairs.near, pairs.margin, pairs.target):
+        if mark_failing(setup, ours, pairs.near, pairs.margin, pairs.target, np.zeros(n, np.bool_)):
             return True
     return False
-
-
-@kernel
-def _ladder(
-    setup: Setup,
-    state: Array,
-    ours: BoolArray,
-    pairs: Pairs,
-    commands: Array,
-    later: Array,
-    side: Array,
-    movers: BoolArray,
-) -> None:
-    """Boats short of a target take their backup, and so do those that then fall short by it, until nobody is added."""
-    for _ in range(state.shape[0]):
-        take_backups(setup, state, ours, pairs.near, movers, commands, side)
-        predict(setup, state, ours, commands, later)
-        fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
-        if mark_failing(setup, ours, pairs.near, pairs.margin, pairs.target, movers):
-            return
 
 
 @kernel
@@ -134,17 +98,10 @@ def decide_game(
     reason: IntArray,
     certificate_m: Array,
 ) -> None:
-    """Decide for the boats of ours in one game.
+    """Decide for the boats of ours in one game, (n, ...) each.
 
-    Args:
-        setup: constants.
-        state: (n, N_STATE).
-        wanted: (n, 2) speed m/s, relative heading deg.
-        ours: (n,).
-        side: (n,) side of each boat's backup under way, kept between decisions.
-        sent: (n, 2) written.
-        reason: (n,) written.
-        certificate_m: (n,) written: least margin after the step, inf where nobody is near.
+    ``side`` of each boat's backup under way is kept between decisions; ``sent``, ``reason`` and ``certificate_m``, the
+    least margin after the step, inf where nobody is near, are written.
     """
     n = state.shape[0]
     _ask(wanted, ours, sent, reason)
@@ -165,7 +122,12 @@ def decide_game(
                     reason[i] = QP
         else:
             sent[:] = asked
-            _ladder(setup, state, ours, pairs, sent, later, side, movers)
+            for _ in range(n):  # who falls short by what others do now backs away, too, until nobody is added
+                take_backups(setup, state, ours, near, movers, sent, side)
+                predict(setup, state, ours, sent, later)
+                fill_margins(setup, ours, near, later, ways, margin)
+                if mark_failing(setup, ours, near, margin, target, movers):
+                    break
     for i in range(n):
         certificate_m[i] = least_margin(setup, ours, near, margin, i) if ours[i] else np.inf
         if movers[i]:

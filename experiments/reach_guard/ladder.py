@@ -28,7 +28,7 @@ def share_of(k: int) -> float:
 
 
 @kernel
-def escape(setup: Setup, i: int, k: int, row: Array) -> tuple[float, float]:
+def backup(setup: Setup, i: int, k: int, row: Array) -> tuple[float, float]:
     """Speed and relative heading that make boat i begin or go on with backup k from state ``row``."""
     params = setup.params[i]
     speed = 0.0 if k == BRAKE else params[L.MAX_SPEED]
@@ -37,15 +37,12 @@ def escape(setup: Setup, i: int, k: int, row: Array) -> tuple[float, float]:
 
 
 @kernel
-def try_escape(setup: Setup, i: int, k: int, state: Array, end: Array) -> tuple[float, float]:
-    """Write the state after ``look`` steps of backup k; returns its first command."""
+def try_backup(setup: Setup, i: int, k: int, state: Array, end: Array) -> None:
+    """Write the state after ``look`` steps of backup k."""
     end[:] = state
-    first = escape(setup, i, k, end)
-    step_boat(setup.params[i], end, first[0], first[1], setup.dt_s)
-    for _ in range(1, setup.look):
-        speed, heading = escape(setup, i, k, end)
+    for _ in range(setup.look):
+        speed, heading = backup(setup, i, k, end)
         step_boat(setup.params[i], end, speed, heading, setup.dt_s)
-    return first
 
 
 @kernel
@@ -68,13 +65,13 @@ def _choose(
     best, chosen = -math.inf, 0
     for turn in range(RUDDERS + 1):
         k = (RUDDERS // 2 + turn) % (RUDDERS + 1)
-        try_escape(setup, i, k, state[i], later[i])
+        try_backup(setup, i, k, state[i], later[i])
         value = _least(setup, ours, near, i, later, ways)
         if share_of(k) * side[i] < 0.0:
             value -= setup.hysteresis_m
         if value > best:
             best, chosen = value, k
-    try_escape(setup, i, chosen, state[i], later[i])
+    try_backup(setup, i, chosen, state[i], later[i])
     return chosen
 
 
@@ -82,17 +79,7 @@ def _choose(
 def take_backups(
     setup: Setup, state: Array, ours: BoolArray, near: BoolArray, movers: BoolArray, commands: Array, side: Array
 ) -> None:
-    """Give every mover its best backup's first command; other boats of ours go by ``commands``.
-
-    Args:
-        setup: constants.
-        state: (n, N_STATE) present states.
-        ours: (n,) boats decided for.
-        near: (n, n) pairs that count.
-        movers: (n,) boats that are to have one.
-        commands: (n, 2) changed for the movers.
-        side: (n,) side of each boat's backup, -1, 0 or 1; changed for the movers.
-    """
+    """Give every mover, (n,), its best backup's first command and ``side``, -1, 0 or 1; others go by ``commands``."""
     n = state.shape[0]
     later, ways = state.copy(), np.empty((n, WAYS, L.N_STATE))
     run_on(setup, state, setup.look, ways)
@@ -105,5 +92,5 @@ def take_backups(
             if movers[i]:
                 chosen = _choose(setup, ours, near, i, state, later, ways, side)
                 if sweep == SWEEPS - 1:
-                    commands[i, 0], commands[i, 1] = escape(setup, i, chosen, state[i])
+                    commands[i, 0], commands[i, 1] = backup(setup, i, chosen, state[i])
                     side[i] = np.sign(share_of(chosen))

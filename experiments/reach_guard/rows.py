@@ -109,15 +109,7 @@ def _pair_rows(
 
 @kernel
 def build_rows(setup: Setup, ours: BoolArray, pairs: Pairs, later: Array, program: Program) -> int:
-    """Stack the rows of all near pairs and the limits of the inputs; returns how many rows there are.
-
-    Args:
-        setup: constants.
-        ours: (n,) boats decided for.
-        pairs: what is to be kept.
-        later: (n, N_STATE) states after the candidate commands.
-        program: its rows are written.
-    """
+    """Stack the rows of all near pairs and the limits of the inputs; returns how many rows there are."""
     near, z_now, C, d = pairs.near, program.z_now, program.C, program.d
     n, r = near.shape[0], 0
     for i in range(n):

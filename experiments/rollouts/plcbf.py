@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
@@ -36,7 +37,7 @@ from steerclear.shield.platforms.usv import clamp, wrap_degrees
 
 from ..jit import kernel
 from ..textbook.inputs import command_of_inputs, inputs_of_command
-from ..textbook.program import TOLERANCE, holds
+from ..textbook.program import TOLERANCE
 from .area import share_left
 from .paths import NO_PLAN, Around, Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
 from .settings import AREA

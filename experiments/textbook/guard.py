@@ -48,7 +48,16 @@ class TextbookGuard(BatchGuard):
         if name not in KINDS:
             raise ConfigError(f"unknown filter {name!r}; choose one of {', '.join(NAMES)}")
         super().__init__(name, config, games, platforms, team)
-        self._setup = _setup(name, config, self._platforms, gains)
+        kinds, widened = self._platforms, INFLATION if KINDS[name] == PARABOLIC else 1.0
+        radius_m = widened * (config.separation_m + config.buffer_m + 2.0 * config.position_error_m)
+        self._setup = Setup(
+            kind=KINDS[name],
+            gains=np.array([(gains or gains_of(name, kind.name)).pack(radius_m) for kind in kinds]),
+            radius_m=radius_m,
+            dt_s=config.dt_s,
+            params=np.array([kind.pack() for kind in kinds]),
+            limits=np.array([input_limits(kind, config.dt_s).pack() for kind in kinds]),
+        )
 
     def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
         super()._check(state, wanted, ours)
@@ -57,20 +66,6 @@ class TextbookGuard(BatchGuard):
 
     def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
         decide_games(self._setup, state, wanted, ours, self.sent, self.reason, self.certificate_m)
-
-
-def _setup(name: str, config: ShieldConfig, platforms: list[Platform], gains: Gains | None) -> Setup:
-    radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
-    if KINDS[name] == PARABOLIC:
-        radius_m *= INFLATION
-    return Setup(
-        kind=KINDS[name],
-        gains=np.array([(gains or gains_of(name, kind.name)).pack(radius_m) for kind in platforms]),
-        radius_m=radius_m,
-        dt_s=config.dt_s,
-        params=np.array([kind.pack() for kind in platforms]),
-        limits=np.array([input_limits(kind, config.dt_s).pack() for kind in platforms]),
-    )
 
 
 def make_guard(

@@ -9,8 +9,8 @@ is commanded as the speed v + T a with T = top speed / braking, which spans the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.jit import Array
@@ -25,14 +25,11 @@ from ..jit import kernel
 LONGEST_S = 60.0
 
 
-@dataclass(frozen=True)
-class InputLimits:
-    """What the model of a boat may ask for.
+class InputLimits(NamedTuple):
+    """What the model of a boat may ask for: top speed, m/s, and two accelerations, m/s^2.
 
-    Attributes:
-        top_speed_mps: top speed, m/s.
-        gain_mps2: acceleration, mean of a start from rest to 90 % of top speed, m/s^2.
-        brake_mps2: deceleration that stops from top speed within the boat's real stopping distance, m/s^2.
+    ``gain_mps2`` is the mean of a start from rest to 90 % of top speed, ``brake_mps2`` what stops from top speed within
+    the boat's real stopping distance.
     """
 
     top_speed_mps: float
@@ -41,24 +38,25 @@ class InputLimits:
 
     def pack(self) -> Array:
         """(3,) top speed, gain, brake."""
-        return np.array([self.top_speed_mps, self.gain_mps2, self.brake_mps2])
+        return np.array(self)
 
 
 @lru_cache(maxsize=64)
 def input_limits(platform: Platform, dt_s: float) -> InputLimits:
     """Limits of a platform, by running its own model with step ``dt_s``, s."""
-    top = platform.max_speed_mps
+    top, steps = platform.max_speed_mps, 0
     params, state = cruise(platform, dt_s)
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, 0.0, 0.0, dt_s)
         if state[L.SPEED] < 0.02 * top:
             break
-    way_m = math.hypot(state[L.X], state[L.Y])
-    start, steps = fresh_state(0.0, 0.0, 0.0), 0
+    start = fresh_state(0.0, 0.0, 0.0)
     while start[L.SPEED] < 0.9 * top and steps * dt_s < LONGEST_S:
         actuate(params, start, top, 0.0, dt_s)
         steps += 1
-    return InputLimits(top, float(start[L.SPEED]) / (steps * dt_s), 0.5 * top * top / way_m)
+    return InputLimits(
+        top, float(start[L.SPEED]) / (steps * dt_s), 0.5 * top * top / math.hypot(state[L.X], state[L.Y])
+    )
 
 
 @kernel
@@ -73,8 +71,7 @@ def inputs_of_command(
     step_boat(params, now, speed_mps, relative_deg, dt_s)
     turn = math.radians(wrap_degrees(now[L.HEADING] - state[L.HEADING])) / dt_s
     most = max(math.radians(largest_turn(params, state, dt_s)) / dt_s, abs(turn))
-    aim = clamp(speed_mps, 0.0, limits[0])
-    acceleration = (aim - state[L.SPEED]) * limits[2] / limits[0]
+    acceleration = (clamp(speed_mps, 0.0, limits[0]) - state[L.SPEED]) * limits[2] / limits[0]
     return clamp(acceleration, -limits[2], limits[1]), turn, most
 
 

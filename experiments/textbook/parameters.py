@@ -14,16 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from steerclear.shield.jit import Array
 
-from .barriers import COLLISION_CONE, DISTANCE, EXPONENTIAL, N_GAIN, PARABOLIC
+from .barriers import COLLISION_CONE, DISTANCE, EXPONENTIAL, PARABOLIC
 
-KINDS = {
-    "velocity_cbf": DISTANCE,
-    "exponential_cbf": EXPONENTIAL,
-    "collision_cone": COLLISION_CONE,
-    "parabolic": PARABOLIC,
-}
+KINDS = dict(velocity_cbf=DISTANCE, exponential_cbf=EXPONENTIAL, collision_cone=COLLISION_CONE, parabolic=PARABOLIC)
 NAMES = tuple(KINDS)
-
 INFLATION = 1.05
 """The parabolic filter's widening of the radius, s in its authors' library."""
 
@@ -47,17 +41,10 @@ class Gains:
     def pack(self, radius_m: float) -> Array:
         """(N_GAIN,) for compiled code, at the radius to keep."""
         unit = math.sqrt(INFLATION**2 - 1.0) / radius_m
-        row = np.empty(N_GAIN)
-        row[:] = self.first_per_s, self.alpha_per_s, self.lambda_share * unit, self.mu_share * unit
-        return row
+        return np.array([self.first_per_s, self.alpha_per_s, self.lambda_share * unit, self.mu_share * unit])
 
 
-PUBLISHED = {
-    "velocity_cbf": Gains(1.0),
-    "exponential_cbf": Gains(1.0, first_per_s=1.0),
-    "collision_cone": Gains(1.0),
-    "parabolic": Gains(1.0),
-}
+PUBLISHED = dict.fromkeys(NAMES, Gains(1.0))
 """Where a platform was not swept: rates of 1 per s; the parabola as in its authors' library."""
 
 TUNED: dict[tuple[str, str], Gains] = {

@@ -13,28 +13,14 @@ import math
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array
 
 from ..jit import kernel
 
-SOLVED = 1
-RELAXED = 2
-UNSOLVED = 3
-
+SOLVED, RELAXED, UNSOLVED = 1, 2, 3
 TOLERANCE = 1e-7
 SLACK_WEIGHT = 1e6
-
-
-@kernel
-def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
-    """Whether every row of ``C z >= d`` holds; a row that is not made of numbers does not."""
-    for r in range(C.shape[0]):
-        total = 0.0
-        for k in range(C.shape[1]):
-            total += C[r, k] * z[k]
-        if not total >= d[r] - tolerance:
-            return False
-    return True
 
 
 @kernel
@@ -52,25 +38,15 @@ def solve(C: Array, d: Array, hard: int, z0: Array, z: Array, slack: Array) -> i
     Returns:
         `SOLVED`, `RELAXED` or `UNSOLVED`.
     """
+    (rows, n), unit = C.shape, 1.0 / math.sqrt(SLACK_WEIGHT)
     slack[:] = 0.0
     if project(C, d, z0, z) == OPTIMAL and holds(C, d, z, TOLERANCE):
         return SOLVED
-    return _relaxed(C, d, hard, z0, z, slack)
-
-
-@kernel
-def _relaxed(C: Array, d: Array, hard: int, z0: Array, z: Array, slack: Array) -> int:
-    rows, n = C.shape
-    unit = 1.0 / math.sqrt(SLACK_WEIGHT)
-    wide = np.zeros((rows, n + rows - hard))
-    wide[:, :n] = C
+    wide, start, answer = np.zeros((rows, n + rows - hard)), np.zeros(n + rows - hard), np.zeros(n + rows - hard)
+    wide[:, :n], start[:n], z[:] = C, z0, z0
     for r in range(hard, rows):
         wide[r, n + r - hard] = unit
-    start, answer = np.zeros(wide.shape[1]), np.zeros(wide.shape[1])
-    start[:n] = z0
     if project(wide, d, start, answer) != OPTIMAL or not holds(wide, d, answer, TOLERANCE):
-        z[:] = z0
         return UNSOLVED
-    z[:] = answer[:n]
-    slack[:] = unit * answer[n:]
+    z[:], slack[:] = answer[:n], unit * answer[n:]
     return RELAXED

@@ -2,7 +2,9 @@
 
 Every boat of ours has two inputs z: its velocity (east, north, m/s) for the velocity filter; for the others its
 acceleration and turn rate as shares of its braking and of its largest turn rate now. Opponents keep their present
-velocity; team-mates share a row, which both of them answer.
+velocity; team-mates share a row, which both of them answer. A row reads, with alpha h the class-K function,
+
+    dh/dp v + dh/dv (u_j' - u_i') >= -alpha h,   u' = a e + v w n per boat; of velocities dh/dp (u_j - u_i) >= -alpha h.
 """
 
 from __future__ import annotations
@@ -34,15 +36,6 @@ class Setup(NamedTuple):
 
 
 @kernel
-def wanted_velocity(setup: Setup, state: Array, command: Array, i: int) -> tuple[float, float]:
-    """Velocity that the single integrator takes a command for, m/s east and north."""
-    top = setup.limits[i, 0]
-    speed = max(min(command[0], top), 0.0)
-    heading = math.radians(state[L.HEADING] + command[1])
-    return speed * math.sin(heading), speed * math.cos(heading)
-
-
-@kernel
 def reach(setup: Setup, state: Array, i: int) -> tuple[float, float]:
     """Least and greatest acceleration in this step, as shares of braking: a boat neither reverses nor tops its top."""
     step = setup.limits[i, 2] * setup.dt_s
@@ -53,47 +46,14 @@ def reach(setup: Setup, state: Array, i: int) -> tuple[float, float]:
 @kernel
 def wanted_inputs(setup: Setup, state: Array, command: Array, i: int) -> tuple[float, float, float, float]:
     """Inputs z that a command amounts to (2) and the units of z (2)."""
-    if setup.kind == DISTANCE:
-        east, north = wanted_velocity(setup, state, command, i)
-        return east, north, 1.0, 1.0
     limits = setup.limits[i]
+    if setup.kind == DISTANCE:
+        speed, heading = max(min(command[0], limits[0]), 0.0), math.radians(state[L.HEADING] + command[1])
+        return speed * math.sin(heading), speed * math.cos(heading), 1.0, 1.0
     gain, turn, most = inputs_of_command(setup.params[i], limits, state, command[0], command[1], setup.dt_s)
     unit = most if most > 0.0 else 1.0
     low, high = reach(setup, state, i)
     return clamp(gain / limits[2], low, high), turn / unit, limits[2], unit
-
-
-@kernel
-def input_rows(
-    setup: Setup, first: Array, second: Array, unit_i: Array, unit_j: Array, gains: Array
-) -> tuple[float, float, float, float, float]:
-    """Row of a second-order barrier: dh/dp v + dh/dv (u_j' - u_i') >= -alpha h, u' = a e + v w n per boat."""
-    a, b = math.radians(first[L.HEADING]), math.radians(second[L.HEADING])
-    v, w = first[L.SPEED], second[L.SPEED]
-    ea, na, eb, nb = math.sin(a), math.cos(a), math.sin(b), math.cos(b)
-    vx, vy = w * eb - v * ea, w * nb - v * na
-    px, py = second[L.X] - first[L.X], second[L.Y] - first[L.Y]
-    h, gpx, gpy, gvx, gvy = barrier(setup.kind, gains, px, py, vx, vy, setup.radius_m)
-    return (
-        -(gvx * ea + gvy * na) * unit_i[0],
-        -(gvx * na - gvy * ea) * v * unit_i[1],
-        (gvx * eb + gvy * nb) * unit_j[0],
-        (gvx * nb - gvy * eb) * w * unit_j[1],
-        -gains[1] * h - gpx * vx - gpy * vy,
-    )
-
-
-@kernel
-def velocity_row(
-    setup: Setup, first: Array, second: Array, both: bool, gains: Array
-) -> tuple[float, float, float, float, float]:
-    """Row of the single integrator: 2 p (u_j - u_i) >= -alpha (|p|^2 - R^2); u_j is given unless both are ours."""
-    px, py = second[L.X] - first[L.X], second[L.Y] - first[L.Y]
-    need = -gains[1] * (px * px + py * py - setup.radius_m * setup.radius_m)
-    if not both:
-        course = math.radians(second[L.HEADING])
-        need -= 2.0 * second[L.SPEED] * (px * math.sin(course) + py * math.cos(course))
-    return -2.0 * px, -2.0 * py, 2.0 * px, 2.0 * py, need
 
 
 @kernel
@@ -104,16 +64,24 @@ def pair_row(
 
     A pair on which no input has any effect gives zero coefficients and its right-hand side as it is.
     """
+    first, second = state[i], state[j]
+    one, two, v, w = math.radians(first[L.HEADING]), math.radians(second[L.HEADING]), first[L.SPEED], second[L.SPEED]
+    ei, ni, ej, nj = math.sin(one), math.cos(one), math.sin(two), math.cos(two)
+    px, py, vx, vy = second[L.X] - first[L.X], second[L.Y] - first[L.Y], w * ej - v * ei, w * nj - v * ni
+    h, gpx, gpy, gvx, gvy = barrier(setup.kind, gains, px, py, vx, vy, setup.radius_m)
     if setup.kind == DISTANCE:
-        a, b, c, e, d = velocity_row(setup, state[i], state[j], both, gains)
+        a, b, c, e = -gpx, -gpy, gpx, gpy
+        need = -gains[1] * h - (0.0 if both else w * (gpx * ej + gpy * nj))
     else:
-        a, b, c, e, d = input_rows(setup, state[i], state[j], unit[i], unit[j], gains)
+        a, b = -(gvx * ei + gvy * ni) * unit[i, 0], -(gvx * ni - gvy * ei) * v * unit[i, 1]
+        c, e = (gvx * ej + gvy * nj) * unit[j, 0], (gvx * nj - gvy * ej) * w * unit[j, 1]
+        need = -gains[1] * h - gpx * vx - gpy * vy
     if not both:
         c, e = 0.0, 0.0
     length = math.sqrt(a * a + b * b + c * c + e * e)
     if length <= 1e-9:
-        return 0.0, 0.0, 0.0, 0.0, d
-    return a / length, b / length, c / length, e / length, d / length
+        return 0.0, 0.0, 0.0, 0.0, need
+    return a / length, b / length, c / length, e / length, need / length
 
 
 @kernel
@@ -132,12 +100,9 @@ def limit_rows(setup: Setup, state: Array, i: int, column: int, C: Array, d: Arr
         fastest = setup.limits[i, 0] * math.cos(math.pi / FACETS)
         for k in range(FACETS):
             angle = math.radians(heading_deg) + (2 * k + 1) * math.pi / FACETS
-            C[at, column], C[at, column + 1], d[at] = -math.sin(angle), -math.cos(angle), -fastest
-            at += 1
-        return at
+            C[at + k, column], C[at + k, column + 1], d[at + k] = -math.sin(angle), -math.cos(angle), -fastest
+        return at + FACETS
     low, high = reach(setup, state, i)
-    C[at, column], d[at] = 1.0, low
-    C[at + 1, column], d[at + 1] = -1.0, -high
-    C[at + 2, column + 1], d[at + 2] = 1.0, -1.0
-    C[at + 3, column + 1], d[at + 3] = -1.0, -1.0
+    C[at, column], C[at + 1, column], C[at + 2, column + 1], C[at + 3, column + 1] = 1.0, -1.0, 1.0, -1.0
+    d[at], d[at + 1], d[at + 2], d[at + 3] = low, -high, -1.0, -1.0
     return at + 4
