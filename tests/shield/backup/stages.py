@@ -8,6 +8,7 @@ from steerclear.shield.backup.assign import assign_plans
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.filter import flow, linearised, screening
 from steerclear.shield.filter.program import Program, solve
+from steerclear.shield.kept_barriers import KeptBarriers
 from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.scene import Scene, path_samples
@@ -23,6 +24,7 @@ class Stages(NamedTuple):
     ours: np.ndarray
     boats: object
     static: object
+    registered: object
     plans: np.ndarray
     tuning: object
     memory: object
@@ -46,6 +48,7 @@ def stages_of(config, state, platforms, team, surroundings=None):
         np.array(team) == 0,
         boats,
         (surroundings or Surroundings()).pack(config),
+        KeptBarriers(config).arrays,
         plans_of(config),
         tuning_of(config),
         new_memory(n),
