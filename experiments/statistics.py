@@ -100,6 +100,28 @@ def mean_interval(values: ArrayLike, seed: int = 0, confidence: float = CONFIDEN
     return bootstrap_interval(kept[:, None], _mean_of_first, seed, confidence)
 
 
+def student_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> Interval:
+    """Student's t interval of a mean of few values, such as one per training; limits are NaN below two.
+
+    Args:
+        values: shape (n,).
+        confidence: probability that the interval covers the true mean, where the values are normal.
+
+    Raises:
+        ConfigError: a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    found = np.asarray(values, dtype=np.float64).ravel()
+    nan = float("nan")
+    if len(found) == 0:
+        return Interval(nan, nan, nan)
+    mean = float(found.mean())
+    if len(found) < 2:
+        return Interval(mean, nan, nan)
+    reach = float(stats.t.ppf(0.5 + 0.5 * confidence, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return Interval(mean, mean - reach, mean + reach)
+
+
 def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
     """Bootstrap interval of the mean of ``on - off``, games paired by position (same seeds).
 

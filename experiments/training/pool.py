@@ -40,11 +40,13 @@ class Pool:
         names: of the members; "self" stands for the snapshots added by `add_snapshot`.
         league: the matching rule and how many snapshots are kept.
         seed: of the draw.
+        cooldown_s: time between tags of its boats where it is longer than the rules'.
     """
 
-    def __init__(self, names: tuple[str, ...], league: League, seed: int) -> None:
+    def __init__(self, names: tuple[str, ...], league: League, seed: int, cooldown_s: float | None = None) -> None:
         self.name = ",".join(names)
         self.league = league
+        self.cooldown_s = cooldown_s
         self.members = {name: opponent_of(name) for name in names if name != SELF}
         self.learns = SELF in names
         if not self.members and not self.learns:
@@ -87,6 +89,8 @@ class Pool:
 
     def act(self, core: Any, team: int) -> Array:
         """Commands (B, n_team, 2); the array is reused by the next call."""
+        if self.cooldown_s is not None:
+            hold_back(core, team, self.cooldown_s)
         for name, member in self.members.items():
             mine = self.playing == name
             if mine.any():
@@ -112,3 +116,15 @@ class Pool:
         weights = self.weights()
         share = np.array(list(weights.values()))
         return str(self._rng.choice(list(weights), p=share / share.sum()))
+
+
+def hold_back(core: Any, team: int, cooldown_s: float) -> None:
+    """Slow the clocks that a team's boats recharge by, so that a whole cool-down takes ``cooldown_s``.
+
+    Boats see the share of the cool-down that is over, so what they see means the same.
+    """
+    boats = np.flatnonzero(core.team == team)
+    elapsed_s, whole_s = core.tagging_cooldown_s, core.config.tagging_cooldown_s
+    share = min(1.0, whole_s / max(cooldown_s, 1e-9))
+    rests = (elapsed_s[:, boats] > 0.0) & (elapsed_s[:, boats] < whole_s)
+    elapsed_s[:, boats] -= rests * (1.0 - share) * core.config.decision_s

@@ -34,6 +34,8 @@ class Stage:
         most: decisions.
         tag_probability: chance that a tag of either team succeeds in this stage, so that boats learn to bring flags
             home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
+        cooldown_s: time in which an opponent that has tagged cannot tag again in this stage, at least the rules'; with
+            more, a team learns to draw a tag first and to use the time after it. None: as in the rules.
     """
 
     opponents: tuple[str, ...] = ("medium",)
@@ -41,6 +43,7 @@ class Stage:
     games: int = 30
     most: int = 0
     tag_probability: float | None = None
+    cooldown_s: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
@@ -49,6 +52,8 @@ class Stage:
         count("most", self.most, 0, 10**12)
         if self.tag_probability is not None:
             number("tag_probability", self.tag_probability, 0.0, 1.0)
+        if self.cooldown_s is not None:
+            number("cooldown_s", self.cooldown_s, 0.0, 1e6)
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,20 @@ Trainings with the same games are made once: without a shield and with one at de
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..json_file import read_json
 from ..provenance import machine, versions
 from ..store import write_json
 from .algorithms import training_of
+from .curve import CURVE
 from .playing import play_games, summary_of
 from .settings import SHIELDS, TrainingSettings
 
@@ -86,13 +89,38 @@ def _cell_rows(base: TrainingSettings, cell: Cell, folder: Path, games: int) -> 
     if not (place / "final.npz").exists():
         training_of(settings, place, resume=True).run()
     network = read_weights(place / "final.npz")
+    curve = read_json(place / CURVE, "the curve of a training", "delete its folder to train it again")
+    learning = learning_of(curve["rows"])
     rows = []
     for opponent in base.evaluation.opponents:
         played = play_games(settings, network, opponent, games, base.evaluation.seed, cell.shield != "none")
-        rows.append(
-            {**asdict(cell), "opponent": opponent, **summary_of(played), "nets": [one["net"] for one in played]}
-        )
+        each = {"nets": [one["net"] for one in played], "hit_counts": [one["hits"] for one in played]}
+        rows.append({**asdict(cell), "opponent": opponent, **summary_of(played), **each, **learning})
     return rows
+
+
+def learning_of(curve: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """How fast a training learned, and what it cost: means per game that ended in it.
+
+    Args:
+        curve: rows of a training.
+
+    Returns:
+        ``learned``: captures for less against in each quarter of its decisions, None where no game ended;
+        ``training_hits``: over all of it.
+    """
+    ended = [row for row in curve if row["games"]]
+    end = curve[-1]["decisions"]
+    quarters: list[list[Mapping[str, Any]]] = [[] for _ in range(4)]
+    for row in ended:
+        quarters[min(3, int(4 * row["decisions"] / (end + 1)))].append(row)
+    learned = [_mean(rows, "captures") - _mean(rows, "captures_against") if rows else None for rows in quarters]
+    return {"learned": learned, "training_hits": _mean(ended, "hits") if ended else None}
+
+
+def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
+    """Mean per game."""
+    return float(np.average([row[name] for row in rows], weights=[row["games"] for row in rows]))
 
 
 def _results(base: TrainingSettings, seeds: int, games: int, rows: list[dict[str, Any]]) -> dict[str, Any]:

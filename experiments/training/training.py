@@ -164,7 +164,8 @@ class Training:
         stagger(self.batch, self.settings.seed + more)
 
     def _pool(self) -> Pool:
-        return Pool(self.settings.stages[self.stage].opponents, self.settings.league, self.settings.seed)
+        stage = self.settings.stages[self.stage]
+        return Pool(stage.opponents, self.settings.league, self.settings.seed, stage.cooldown_s)
 
     def _checked_opponents(self) -> None:
         """Build every pool once, so that a missing opponent is found before long work."""

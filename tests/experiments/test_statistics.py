@@ -14,6 +14,7 @@ from steerclear.experiments.statistics import (
     paired_difference,
     paired_ratio,
     share_interval,
+    student_interval,
 )
 from steerclear.shield.exceptions import ConfigError
 
@@ -163,3 +164,13 @@ def test_scaling_moves_all_three_numbers():
 def test_bad_input_is_one_clear_error(call, words):
     with pytest.raises(ConfigError, match=words):
         call()
+
+
+def test_students_interval_of_few_values():
+    values = [1.0, 2.0, 6.0]
+    low, high = stats.t.interval(0.95, 2, loc=3.0, scale=stats.sem(values))
+    found = student_interval(values)
+    assert (found.value, found.low, found.high) == pytest.approx((3.0, low, high))
+    assert student_interval([4.0]).value == 4.0
+    assert math.isnan(student_interval([4.0]).low)
+    assert math.isnan(student_interval([]).value)

@@ -1,6 +1,6 @@
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.training.settings import settings_of
-from steerclear.experiments.training.study import cells, settings_of_cell
+from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
 
 
 def test_a_deployed_shield_shares_the_training_without_one():
@@ -15,17 +15,31 @@ def test_a_deployed_shield_shares_the_training_without_one():
     assert settings_of_cell(base, with_term).rewards["collision"] == 0.25
 
 
+def test_what_a_training_tells_of_its_learning():
+    def row(decisions, games, net):
+        if not games:
+            return {"decisions": decisions, "games": 0, "captures": None, "captures_against": None, "hits": None}
+        return {"decisions": decisions, "games": games, "captures": net + 1, "captures_against": 1.0, "hits": net}
+
+    found = learning_of([row(10, 1, 0.0), row(20, 1, 2.0), row(30, 0, None), row(35, 1, 4.0), row(40, 3, 8.0)])
+    assert found == {"learned": [0.0, 2.0, None, 7.0], "training_hits": 5.0}
+
+
 def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     rows = []
-    for cell in cells(seeds=1):
+    for cell in cells(seeds=2):
         nets = [1.0, 2.0, 3.0] if cell.shield == "none" else [2.0, 2.0, 3.0]
-        figures = {"captures": 2.0, "captures_against": 0.0, "hits": 1.5, "interventions": 4.0}
-        about = {"shield": cell.shield, "collision": cell.collision, "seed": cell.seed, "opponent": "medium"}
-        rows.append({**about, **figures, "nets": nets})
-    training = {"decisions": 1000, "interval": 10, "preset": "aamas2024"}
-    settings = {"seeds": 1, "games": 3, "training": training}
+        hits = [4.0, 5.0, 3.0] if cell.shield == "none" else [0.0, 0.0, 0.0]
+        figures = {"captures": 2.0, "captures_against": 0.0, "interventions": 4.0, "nets": nets, "hit_counts": hits}
+        about = {"shield": cell.shield, "collision": cell.collision, "seed": cell.seed, "opponent": "hard"}
+        rows.append({**about, **figures, "learned": [None, 0.0, 1.0, 2.0], "training_hits": 3.0})
+    training = {"decisions": 1000, "interval": 10, "preset": "aamas2024", "stages": [{"opponents": ["medium"]}]}
+    settings = {"seeds": 2, "games": 3, "training": training}
     write_pages([{"command": "train-study", "settings": settings, "rows": rows}], tmp_path)
     page = (tmp_path / "learning.md").read_text()
-    assert page.count("| training+intervention |") == 2
-    assert "| none | off | 1 | 3 | +2.00 (+1.00 to +3.00) | 2.00 | 0.00 | 1.50 | 4.00 |" in page
+    assert "game steps against medium, on aamas2024;" in page
+    assert page.count("| training+intervention |") == 4
+    assert "| none | off | +2.00 (+1.33 to +2.67) | +2.00, +2.00 | 2.00 | 0.00 | 4.00 (2.56 to 5.95) | 4.00 |" in page
     assert "net captures +0.33" in page
+    assert "| nothing to shield, deployment | +0.33 (+0.33 to +0.33) | -4.00 (-4.00 to -4.00) |" in page
+    assert "| training | on | - | +0.00 | +1.00 | +2.00 | 3.00 |" in page

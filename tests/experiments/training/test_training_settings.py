@@ -1,6 +1,7 @@
+import numpy as np
 import pytest
 from steerclear.experiments.training.config_file import read_config
-from steerclear.experiments.training.games import learners_of
+from steerclear.experiments.training.games import core_of, learners_of
 from steerclear.experiments.training.pool import Pool
 from steerclear.experiments.training.settings import League, settings_of
 from steerclear.shield.exceptions import ConfigError, PolicyError
@@ -17,6 +18,7 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
         ({"shield": "always"}, "shield is 'always'; choose one of none, deployment"),
         ({"games": True}, "games is True; give a whole number from 1"),
         ({"ppo": {"learning_rate": float("nan")}}, "learning_rate is nan; give a number"),
+        ({"stages": [{"cooldown_s": -1.0}]}, "a stage in the config: cooldown_s is -1.0; give a number"),
         ({"net": {"hidden": []}}, r"hidden is \[\]; give a list of widths"),
         ([], "the config is list; give keys and values"),
     ],
@@ -53,3 +55,22 @@ def test_those_who_beat_the_learner_come_more_often():
     assert pool.weights() == pytest.approx({"hold": 0.1, "easy": 1.1})
     draws = [pool._draw() for _ in range(600)]
     assert 0.85 < draws.count("easy") / 600 < 0.97
+
+
+def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_rules_say():
+    core = core_of(settings_of({"rules": {"tagging_cooldown_s": 10.0}}), 1, 0)
+    pool = Pool(("hold",), League(), 0, cooldown_s=40.0)
+    core.reset(seed=0)
+    pool.reset(core, 1, 0)
+    core.tagging_cooldown_s[:] = 0.0
+    ready = core.config.tagging_cooldown_s
+    waited = {0: [], 1: []}
+    for k in range(420):
+        commands = np.zeros((1, core.n_boats, 2))
+        commands[:, 3:] = pool.act(core, 1)
+        core.step(commands)
+        for team in waited:
+            if (core.tagging_cooldown_s[0, core.team == team] == ready).all():
+                waited[team].append((k + 1) * core.config.decision_s)
+    assert min(waited[0]) == pytest.approx(10.0, abs=0.11)
+    assert min(waited[1]) == pytest.approx(40.0, abs=0.5)
