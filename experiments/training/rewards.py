@@ -37,6 +37,15 @@ class Tags(Sparse):
         return np.repeat(net[:, None], len(batch.boats), axis=1)
 
 
+class Tagging(Sparse):
+    """+1 to a boat that has just tagged an opponent: credit for defending, to who did it."""
+
+    def reward(self, batch: Any, changed: BoolArray) -> Array:
+        """(B, n) of the last game step."""
+        made: Array = (batch.core.made_tag[:, batch.boats] >= 0).astype(float)
+        return made
+
+
 class Collision(Sparse):
     """-1 for each new collision of the boat itself; the paper's Table 1 weighs it 0.025, its Table 3 fits 0.25."""
 
@@ -166,6 +175,7 @@ TERMS: dict[str, Callable[[], Any]] = {
     "advance": Advance,
     "own": Own,
     "tags": Tags,
+    "tagging": Tagging,
     "tagged": Tagged,
     "collision": Collision,
     "intervention": Intervention,

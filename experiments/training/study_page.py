@@ -41,8 +41,8 @@ def _study(content: Mapping[str, Any]) -> list[str]:
         f"{training['interval']} game steps{learned}, on {line(training['preset'])}"
         f"{line(f' with {rules}') if rules else ''}; in training the shield is asked every "
         f"{training.get('shield_every', 1)} game step(s), afterwards in each. Then {settings['games']} games a "
-        "training and opponent from the same seeds. Means per game; brackets are 95 % intervals, over games for what each "
-        "training brought (bootstrap; hits: exact Poisson limits), over trainings (Student's t) for what another "
+        "training and opponent from the same seeds. Means per game; brackets are 95 % intervals, over games for what "
+        "each training brought (bootstrap; hits: exact Poisson limits), over trainings (Student's t) for what another "
         "training would bring. Hits are counted per boat, at the game's distance.",
         "",
     ]

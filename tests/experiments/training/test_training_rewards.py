@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from steerclear.experiments.training.rewards import Advance, Own, Progress
+from steerclear.experiments.training.rewards import Advance, Own, Progress, Tagging
 from steerclear.shield.platforms.layout import N_STATE, X, Y
 
 NOW = np.ones(1, np.bool_)
@@ -68,3 +68,9 @@ def played_on(term, batch, moments):
 def kept_at_home():
     """What the way to the capture earned: 20 m to the flag, 10 m home with it, in widths."""
     return (20.0 + 10.0) / 80.0
+
+
+def test_who_tags_is_paid_and_nobody_else():
+    made = np.array([[-1, 4, -1, -1, 0, -1]])
+    ours = SimpleNamespace(core=SimpleNamespace(made_tag=made), boats=np.arange(3), team=0)
+    assert Tagging().reward(ours, NOW).tolist() == [[0.0, 1.0, 0.0]]
