@@ -101,7 +101,7 @@ def mean_interval(values: ArrayLike, seed: int = 0, confidence: float = CONFIDEN
 
 
 def student_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> Interval:
-    """Student's t interval of a mean of few values, such as one per training; limits are NaN below two.
+    """Student's t interval of a mean of few values, such as one per training; NaN limits below two, or of equal ones.
 
     Args:
         values: shape (n,).
@@ -116,7 +116,7 @@ def student_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> Inter
     if len(found) == 0:
         return Interval(nan, nan, nan)
     mean = float(found.mean())
-    if len(found) < 2:
+    if len(found) < 2 or np.ptp(found) == 0.0:
         return Interval(mean, nan, nan)
     reach = float(stats.t.ppf(0.5 + 0.5 * confidence, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
     return Interval(mean, mean - reach, mean + reach)

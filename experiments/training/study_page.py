@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ def _study(content: Mapping[str, Any]) -> list[str]:
     learned = f" against {line(', '.join(pool))}" if pool else ""
     rules = ", ".join(f"{name} {value}" for name, value in training.get("rules", {}).items())
     lines = [
-        f"{settings['seeds']} training(s) a cell of {training['decisions']:,} decisions of a boat, each held for "
+        f"{_trainings(rows)} a cell, of {training['decisions']:,} decisions of a boat, each held for "
         f"{training['interval']} game steps{learned}, on {line(training['preset'])}"
         f"{line(f' with {rules}') if rules else ''}; in training the shield is asked every "
         f"{training.get('shield_every', 1)} game step(s), afterwards in each. Then {settings['games']} games a "
@@ -51,6 +52,13 @@ def _study(content: Mapping[str, Any]) -> list[str]:
         lines += [f"## Against {line(opponent)}", "", *table(HEADS, _rows(mine)), ""]
         lines += [*_same_network(mine), *table(CHANGES, _changes(mine)), ""]
     return [*lines, *_learning(rows)]
+
+
+def _trainings(rows: Rows) -> str:
+    """How many trainings the cells have, in words."""
+    counts = Counter((row["shield"], row["collision"], row["opponent"]) for row in rows).values()
+    fewest, most = min(counts, default=0), max(counts, default=0)
+    return f"{most} training(s)" if fewest == most else f"{fewest} or {most} trainings"
 
 
 def _cell(rows: Rows, shield: str, collision: str) -> list[Mapping[str, Any]]:

@@ -173,4 +173,5 @@ def test_students_interval_of_few_values():
     assert (found.value, found.low, found.high) == pytest.approx((3.0, low, high))
     assert student_interval([4.0]).value == 4.0
     assert math.isnan(student_interval([4.0]).low)
+    assert math.isnan(student_interval([4.0, 4.0]).high)
     assert math.isnan(student_interval([]).value)

@@ -37,9 +37,12 @@ def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     settings = {"seeds": 2, "games": 3, "training": training}
     write_pages([{"command": "train-study", "settings": settings, "rows": rows}], tmp_path)
     page = (tmp_path / "learning.md").read_text()
+    assert "2 training(s) a cell, of 1,000 decisions" in page
+    write_pages([{"command": "train-study", "settings": settings, "rows": rows[:-1]}], tmp_path)
+    assert "1 or 2 trainings a cell, of 1,000 decisions" in (tmp_path / "learning.md").read_text()
     assert "game steps against medium, on aamas2024;" in page
     assert page.count("| training+intervention |") == 4
     assert "| none | off | +2.00 (+1.33 to +2.67) | +2.00, +2.00 | 2.00 | 0.00 | 4.00 (2.56 to 5.95) | 4.00 |" in page
     assert "net captures +0.33" in page
-    assert "| nothing to shield, deployment | +0.33 (+0.33 to +0.33) | -4.00 (-4.00 to -4.00) |" in page
+    assert "| nothing to shield, deployment | +0.33 | -4.00 |" in page
     assert "| training | on | - | +0.00 | +1.00 | +2.00 | 3.00 |" in page
