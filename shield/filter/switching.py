@@ -138,6 +138,16 @@ def _join(scene: Scene) -> int:
 
 
 @lean_kernel
+def _join_short(scene: Scene) -> int:
+    """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
+    for i in range(ours.shape[0]):
+        if ours[i] and work.rank[i] < PAIR_SAFE:
+            plan.moving[i] = True
+    return list_movers(plan)
+
+
+@lean_kernel
 def _assign_backups(count: int, scene: Scene) -> bool:
     """Backups of the movers from the present state; whether all boats of ours then keep clear.
 
@@ -163,14 +173,15 @@ def _find_backups(count: int, scene: Scene) -> int:
     """Make the candidate of all movers' backups and check it; returns how many movers there are.
 
     All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
-    fit what boats have whose wanted commands passed: where these are in the way, they take part, too.
+    fit what boats have whose wanted commands passed: where these are in the way, or are themselves too near them, they
+    take part, too.
     """
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     for _ in range(ours.shape[0]):
         good = _assign_backups(count, scene)
         movers = count
-        if not good and _passed_are_in_the_way(count, scene):
-            movers = _join(scene)
+        if not good:
+            movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
         if movers == count or all_spent(tuning, work):
             break
         count = movers
@@ -190,9 +201,10 @@ def back_up(count: int, scene: Scene) -> None:
     """
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     count = _find_backups(count, scene)
-    for m in range(count):
-        i = plan.movers[m]
-        plan.reason[i] = BACKUP if work.rank[i] >= STATIC_LOST else BEST_EFFORT
-        plan.slack_m[i] = _given_up(i, scene)
+    for i in range(ours.shape[0]):
+        keeps = work.rank[i] >= STATIC_LOST
+        if ours[i] and (plan.moving[i] or not keeps):
+            plan.reason[i] = BACKUP if keeps else BEST_EFFORT
+            plan.slack_m[i] = _given_up(i, scene)
     if _alone(ours, plan) and worst_rank(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
         ease(count, scene)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from shield_scenes import bits, finite_commands, fleet_of, fleets, head_on, quick, relative
-from steerclear.shield import Commands, Reason, Shield, ShieldConfig
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 
 ODD = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1.0 + 2**-52, 179.99999999999997, -180.0, 180.0, 359.0]
@@ -53,6 +53,22 @@ def test_a_boat_that_passes_is_certified(data):
     passed = decisions.reason == Reason.PASSED
     assume(passed.any())
     assert (decisions.certificate_m[passed] >= 0.0).all()
+
+
+def test_a_boat_that_passed_takes_part_where_the_best_of_another_would_hit_it():
+    """A large boat that can stop for nobody comes over one that lies still and wants to: it gets out of the way."""
+    fleet = Fleet.of(
+        position_m=[[0, 1], [0, 0], [0, 14], [0, 0]],
+        heading_rad=np.radians([-27.0, 0.0, 0.0, -11.0]),
+        speed_mps=[12, 0, 0, 12],
+        team=[0, 0, 0, 0],
+        platforms=["large_usv", "heron", "heron", "large_usv"],
+        controlled=[False, False, True, True],
+    )
+    decisions = Shield().decide(fleet, Commands.relative_deg(np.zeros((4, 2))))
+    assert decisions[3].reason is Reason.BEST_EFFORT
+    assert decisions[2].reason is Reason.BACKUP
+    assert decisions[2].certificate_m >= 0.0
 
 
 @quick
