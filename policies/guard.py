@@ -20,6 +20,8 @@ from .words import plain_text
 
 Answer = Callable[[str], Any]
 """``answer(agent_id) -> action``."""
+Fault = tuple[str, str]
+"""What is wrong with an answer: kind, explanation."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,10 @@ class ForeignCode(ABC):
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """What answers for each boat in this step. Not guarded: must not run foreign code."""
 
+    def failed_within(self, agent_id: str) -> Fault | None:
+        """What went wrong inside although the boat was answered for, as (kind, explanation); None: nothing."""
+        return None
+
     def around(self) -> contextlib.AbstractContextManager[Any]:
         """What must hold while foreign code runs, such as its working directory."""
         return contextlib.nullcontext()
@@ -84,7 +90,7 @@ class GuardedTeam:
         self.name = name
         self.code = code
         self.held: dict[str, str] = {}
-        """Boats that hold in this step, and why."""
+        """Boats without a usable answer of the policy's own in this step, and why."""
         self._ids: list[str] = []
         self._reporter = Reporter(name)
 
@@ -114,6 +120,7 @@ class GuardedTeam:
         """
         if not self._ids:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        check_observed(observations, self._ids)
         answer = self.code.prepare(observations, infos)
         self.held = {}
         with self.code.around():
@@ -130,25 +137,34 @@ class GuardedTeam:
         """Give back what the code holds, such as temporary files; may be called again."""
         self.code.close()
 
-    def _ask(self, answer: Answer, agent_id: str) -> tuple[Any, BaseException | None]:
+    def _ask(self, answer: Answer, agent_id: str) -> tuple[Any, Fault | None]:
         started_ns = time.perf_counter_ns()
         try:
-            return answer(agent_id), None
+            action = answer(agent_id)
         except (Exception, SystemExit) as error:  # an entry that calls exit() does not end the game; Ctrl-C does
-            return None, error
+            return HOLD, (f"raised {type(error).__name__}", describe_error(error))
         finally:
             self._reporter.timed(agent_id, time.perf_counter_ns() - started_ns)
+        return action, self.code.failed_within(agent_id)
 
-    def _checked(self, agent_id: str, action: Any, error: BaseException | None) -> Action:
-        if error is not None:
-            found: tuple[str, str] | None = (f"raised {type(error).__name__}", describe_error(error))
-        else:
-            found = self._reader.problem(agent_id, action)
-        if found is None:
-            return action
-        self.held[agent_id] = f"{found[0]}: {found[1]}"
-        self._reporter.failed(agent_id, *found)
-        return HOLD
+    def _checked(self, agent_id: str, action: Any, fault: Fault | None) -> Action:
+        unusable = self._reader.problem(agent_id, action)
+        found = unusable or fault
+        if found is not None:
+            self.held[agent_id] = f"{found[0]}: {found[1]}"
+            self._reporter.failed(agent_id, *found)
+        return action if unusable is None else HOLD
+
+
+def check_observed(observations: Mapping[str, Any], agent_ids: Sequence[str]) -> None:
+    """Check that every boat is observed.
+
+    Raises:
+        PolicyError: one is not; an env that was never reset, or whose game is over, observes nobody.
+    """
+    for agent_id in agent_ids:
+        if agent_id not in observations:
+            raise PolicyError(f"no observation of {agent_id}; reset the game first")
 
 
 def describe_error(error: BaseException) -> str:

@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings, spec_of
 from ..ablation import quick as small_version
-from ..entries.checking import check_entry
+from ..entries.checking import check_entry, headline
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrapping.wrap import wrap_entry
@@ -22,10 +22,13 @@ from ..replay_html import write_replay
 from ..spec import ANSWER_S
 from ..store import ResultStore, write_json
 from . import options as o
-from .console import command, out, progress
+from .console import command, err, finish, out, progress
 from .games import check_complete, default_folder, run_games
 
-app = typer.Typer(help="A competition entry: check that it plays, report what the shield does.", no_args_is_help=True)
+app = typer.Typer(
+    help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
+    no_args_is_help=True,
+)
 
 Entry = Annotated[str, typer.Argument(metavar="ENTRY", help="Folder or zip with solution.py, as it is handed in.")]
 Also = Annotated[str | None, typer.Option(metavar="A.zip,B.zip", help="Further opponents: entries or policies.")]
@@ -56,7 +59,7 @@ def check(
 ) -> None:
     """Check an entry: whether it loads, what it imports, how long its actions take, a game against boats that hold.
 
-    Exit status: 0 it plays, 2 it cannot be loaded or gave nothing usable.
+    Exit status: 0 it plays, 1 a boat had no usable action in some step, 2 it cannot be loaded or gave nothing usable.
     """
     check_path(entry)
     found = check_entry(entry, preset, max_time, answer_time)
@@ -65,6 +68,7 @@ def check(
         console.print(line, markup=False, soft_wrap=True)
     if json_file is not None:
         write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
+    finish(not found["failures"])
 
 
 def check_lines(found: dict[str, Any]) -> list[str]:
@@ -72,16 +76,24 @@ def check_lines(found: dict[str, Any]) -> list[str]:
     imports, game = found["imports"], found["game"]
     missing = f"; not installed here: {', '.join(imports['missing'])}" if imports["missing"] else ""
     lines = [
-        f"{found['entry']} loads in {found['load_s']:.1f} s and plays.",
+        f"{headline(found)}.",
         f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}",
-        f"time per action: mean {found['mean_ms']:.2f} ms, longest {found['max_ms']:.1f} ms in {found['calls']} calls; "
-        f"{found['late']} took longer than a decision ({found['decision_ms']:g} ms)",
+        f"time of a decision of the team: mean {time_text(found['mean_decision_ms'])}, longest "
+        f"{time_text(found['max_decision_ms'])} in {found['decisions']} decisions ({found['calls']} actions); "
+        f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
         f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
         f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
     ]
     lines += [f"could not be read as Python: {name}" for name in imports["unread"]]
-    lines += [f"failed: {one['kind']} x {one['count']}: {one['message']}" for one in found["failures"]]
+    for one in found["failures"]:
+        boats = ", ".join(f"{boat} x {count}" for boat, count in one["boats"].items())
+        lines.append(f"failed: {one['kind']} ({boats}): {one['message']}")
     return lines
+
+
+def time_text(time_ms: float) -> str:
+    """A time in ms, in microseconds where it is below 0.1 ms."""
+    return f"{1e3 * time_ms:.1f} us" if time_ms < 0.1 else f"{time_ms:.1f} ms"
 
 
 @app.command()
@@ -148,14 +160,16 @@ def wrap(
     shield_set: o.ShieldSet = None,
     json_file: o.JsonFile = None,
 ) -> None:
-    """Put an entry behind the shield: a zip to hand in, which needs numpy and what the entry itself needs.
+    """Put an entry that plays behind the shield: a zip to hand in, which needs numpy and what the entry itself needs.
 
-    Exit status: 0 written, 2 bad input or an entry that cannot be loaded.
+    Exit status: 0 written, 2 bad input or an entry that cannot be loaded or gave nothing usable.
     """
     check_path(entry)
     asked = o.shield_settings(separation, None, profile, None, shield_set)
     made = wrap_entry(entry, out_file, preset, o.with_distance(asked, preset, {}))
-    settings = made["shield"]
+    tried, settings = made.pop("tried"), made["shield"]
+    if tried["failures"]:
+        err().print(f"warning: {headline(tried)}; its shield tells them to stop", markup=False, soft_wrap=True)
     console = out()
     words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
     console.print(words, markup=False, soft_wrap=True)

@@ -19,6 +19,13 @@ OPPONENT = "hold"
 """Stands still: what goes wrong in the game is the entry's doing."""
 
 
+def headline(found: dict[str, Any]) -> str:
+    """Whether an entry plays, and which boats failed how often; what `check_entry` found in one sentence."""
+    failed = [f"{boat} failed in {count} of {found['steps']} steps" for boat, count in found["failed_steps"].items()]
+    but = f", but {', '.join(failed)}" if failed else ""
+    return f"{found['entry']} loads in {found['load_s']:.1f} s and plays{but}"
+
+
 def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> dict[str, Any]:
     """Load an entry in a process of its own and let it play against boats that hold.
 
@@ -57,8 +64,17 @@ def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> d
         "max_ms": report.max_ms,
         "late": report.late,
         "decision_ms": report.step_ms,
-        "failures": [{"kind": one.kind, "count": one.count, "message": one.message} for one in report.failures],
+        "decisions": report.decisions,
+        "mean_decision_ms": report.mean_decision_ms,
+        "max_decision_ms": report.max_decision_ms,
+        "late_decisions": report.late_decisions,
+        "failures": [
+            {"kind": one.kind, "count": one.count, "boats": one.boats, "message": one.message}
+            for one in report.failures
+        ],
         "held": report.held,
+        "steps": report.steps,
+        "failed_steps": report.failed_by_boat(),
         "game": {
             name: row[name] for name in ("captures", "grabs", "tags", "collisions", "duration_s", "first_failure")
         },

@@ -15,7 +15,7 @@ from typing import Any
 
 from steerclear import policies
 from steerclear.experiments.deploy.frames import read_message, write_message
-from steerclear.policies.guard import GameFacts, GuardedTeam, describe_error
+from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam, describe_error
 from steerclear.shield.exceptions import SteerclearError
 
 from .answers import to_plain
@@ -68,9 +68,9 @@ class Player:
         code = self._code()
         answer = code.prepare(*self._unpacker.unpack(packed))
         with code.around():
-            return {"answers": {agent_id: _ask(answer, agent_id) for agent_id in self._ids}}
+            return {"answers": {agent_id: _ask(code, answer, agent_id) for agent_id in self._ids}}
 
-    def _code(self) -> Any:
+    def _code(self) -> ForeignCode:
         if self._team is None:
             raise SteerclearError("no policy was loaded")
         return self._team.code
@@ -79,13 +79,13 @@ class Player:
         return "" if self._team is None else self._team.name
 
 
-def _ask(answer: Any, agent_id: str) -> dict[str, Any]:
+def _ask(code: ForeignCode, answer: Any, agent_id: str) -> dict[str, Any]:
     """One boat's action, or what was raised instead, and how long that took."""
     started_ns = time.perf_counter_ns()
     try:
         action = answer(agent_id)
         spent_ns = time.perf_counter_ns() - started_ns
-        return {"action": to_plain(action), "ns": spent_ns}
+        return {"action": to_plain(action), "ns": spent_ns, "within": code.failed_within(agent_id)}
     except BaseException as error:
         spent_ns = time.perf_counter_ns() - started_ns
         return {"raised": type(error).__name__, "text": describe_error(error), "ns": spent_ns}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from steerclear import policies
 from steerclear.policies.actions import HOLD, ActionReader
-from steerclear.policies.guard import game_facts
+from steerclear.policies.guard import Fault, check_observed, game_facts
 from steerclear.policies.protocol import Action, TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
@@ -52,7 +52,7 @@ class EntryTeam:
         self._process = EntryProcess(path, limits)
         self._lost = ""
         self.held: dict[str, str] = {}
-        """Boats that hold in this step, and why."""
+        """Boats without a usable answer of the policy's own in this step, and why."""
         self._ids: list[str] = []
         self.name = plain_text(self._first("load", _absolute(path), options).get("name"), 80)
         self._reporter = Reporter(self.name)
@@ -80,6 +80,7 @@ class EntryTeam:
         """
         if not self._ids:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+        check_observed(observations, self._ids)
         self.held = {}
         packed = self._packer.pack(observations, infos)
         answers = {} if self._lost else self._ask(packed)
@@ -122,14 +123,15 @@ class EntryTeam:
         return answers if isinstance(answers, dict) else {}
 
     def _checked(self, agent_id: str, answer: Any) -> Action:
-        action, found = self._read(agent_id, answer if isinstance(answer, dict) else {})
-        if found is None:
-            return action
-        self.held[agent_id] = f"{found[0]}: {found[1]}"
-        self._reporter.failed(agent_id, *found)
-        return HOLD
+        answer = answer if isinstance(answer, dict) else {}
+        action, unusable = self._read(agent_id, answer)
+        found = unusable or _within(answer)
+        if found is not None:
+            self.held[agent_id] = f"{found[0]}: {found[1]}"
+            self._reporter.failed(agent_id, *found)
+        return action if unusable is None else HOLD
 
-    def _read(self, agent_id: str, answer: Mapping[str, Any]) -> tuple[Action, tuple[str, str] | None]:
+    def _read(self, agent_id: str, answer: Mapping[str, Any]) -> tuple[Action, Fault | None]:
         """An action, and what is wrong with it as (kind, explanation)."""
         if self._lost:
             return None, ("process ended", f"{self._lost}; its boats hold for the rest of the game")
@@ -141,6 +143,14 @@ class EntryTeam:
         action = from_plain(answer.get("action"))
         found = self._reader.problem(agent_id, action)
         return action, found and (found[0], plain_text(found[1], 500))
+
+
+def _within(answer: Mapping[str, Any]) -> Fault | None:
+    """What a shielded zip says of the entry in it."""
+    told = answer.get("within")
+    if not isinstance(told, list) or len(told) != 2:
+        return None
+    return plain_text(told[0], 80), plain_text(told[1], 500)
 
 
 def _absolute(path: str) -> str:

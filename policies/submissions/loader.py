@@ -14,6 +14,7 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
 from ..guard import Answer, ForeignCode, GuardedTeam, describe_error
+from ..words import plain_text
 from .history import CONFIG_FILE, History, ObservationSettings
 from .interface import METHOD_NAME, check_interface
 from .sandbox import Sandbox
@@ -22,6 +23,8 @@ from .stage import ENTRY_FILE, MAX_BYTES, Stage
 ALONE = "STEERCLEAR_ENTRY_ALONE"
 """Environment variable of processes that run one submission only: what it sets there concerns nobody else."""
 CLASS_NAME = "solution"
+FAILURE_NAME = "steerclear_failure"
+"""Method of a shielded zip's class: what went wrong inside for a boat that its shield answered for."""
 
 
 class GlobalState(dict[Any, Any]):
@@ -84,6 +87,15 @@ class SubmissionCode(ForeignCode):
         normalized, raw = self._history.push(normalized, raw)
         compute_action = getattr(self._instance, METHOD_NAME)
         return lambda agent_id: compute_action(agent_id, normalized, raw, state)
+
+    def failed_within(self, agent_id: str) -> tuple[str, str] | None:
+        """What a shielded zip says of the entry in it."""
+        told = getattr(self._instance, FAILURE_NAME, None)
+        try:
+            kind, text = told(agent_id) or (None, None) if callable(told) else (None, None)
+        except Exception:  # another's method of that name
+            return None
+        return None if kind is None else (plain_text(kind, 80), plain_text(text, 500))
 
     def around(self) -> contextlib.AbstractContextManager[Any]:
         """Working directory and imports of the submission."""

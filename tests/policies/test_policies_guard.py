@@ -42,6 +42,22 @@ def test_functions_by_agent(game):
         team.reset(game[0], ["agent_3"], 0)
 
 
+@pytest.mark.parametrize("wrap", [policies.from_callable, lambda f: policies.from_agents(lambda name, env: f)])
+def test_a_boat_that_is_not_observed_is_one_line(game, wrap):
+    class Both:
+        def __call__(self, obs):
+            return 4
+
+        def compute_action(self, obs, info):
+            return 4
+
+    team = wrap(Both())
+    team.reset(game[0], ["agent_0"], 0)
+    with pytest.raises(PolicyError, match=r"^no observation of agent_0; reset the game first$"):
+        team.act({}, {})
+    assert team.report().held == 0
+
+
 def test_what_is_not_callable_is_refused():
     for wrong in (4, {}, {"agent_0": 4}):
         with pytest.raises(PolicyError, match=r"f\(obs\)"):

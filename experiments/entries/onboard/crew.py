@@ -2,7 +2,8 @@
 
 Nothing here may end a game. An action that is none, and one that the entry raises instead of, count as a command that
 is not finite: the shield tells that boat to stop, and keeps it clear meanwhile. Where the shield itself cannot decide
-(the state lacks a boat, or is normalised), the team's boats are told to stop. The log (standard error) says so, once.
+(the state lacks a boat, or is normalised), the team's boats are told to stop. The log (standard error) says so, once,
+and `Crew.failure` tells whoever asks for a boat's action.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ logger = logging.getLogger("steerclear")
 
 Ask = Callable[[str], Any]
 STOP = (0.0, 0.0)
+UNDECIDED = "shield could not decide"
+LONGEST = 500
+"""Characters of a failure's text."""
 JUMP_M = 5.0
 """A boat that is farther than this beyond its reach from where it was, m, is in another game."""
 
@@ -68,6 +72,14 @@ class Crew:
         team = int(2 * place >= len(self._facts.agent_ids))
         return np.array(self._deck(team).command(ask, place, state))
 
+    def failure(self, agent_id: Any) -> tuple[str, str] | None:
+        """What went wrong in the latest decision for a boat, as (kind, explanation); None when nothing did."""
+        if agent_id not in self._facts.agent_ids:
+            return UNDECIDED, f"unknown boat {agent_id!r}"
+        place = self._facts.agent_ids.index(agent_id)
+        deck = self._decks.get(int(2 * place >= len(self._facts.agent_ids)))
+        return None if deck is None else deck.failures.get(place)
+
     def _deck(self, team: int) -> Deck:
         if team not in self._decks:
             self._decks[team] = Deck(self._facts, team)
@@ -80,10 +92,14 @@ class Deck:
     Args:
         facts: of the game.
         team: 0 for blue, 1 for red.
+
+    Attributes:
+        failures: by place of a boat, what went wrong in the latest decision: (kind, explanation).
     """
 
     def __init__(self, facts: Facts, team: int) -> None:
         self._facts, self._team = facts, team
+        self.failures: dict[int, tuple[str, str]] = {}
         half = len(facts.agent_ids) // 2
         self._places = range(team * half, (team + 1) * half)
         stops = tuple(tuple(circle) for circle in facts.stops[team])
@@ -99,7 +115,9 @@ class Deck:
         try:
             sight = see(self._facts, state)
         except Exception as error:
-            _say_once(f"the global state cannot be read ({type(error).__name__}: {error}); all boats are told to stop")
+            text = described(error)
+            self.failures[place] = UNDECIDED, f"the global state cannot be read: {text}"
+            _say_once(f"the global state cannot be read ({text}); all boats are told to stop")
             return STOP
         if place not in self._answered or self._sight is None or not np.array_equal(sight.rows, self._sight.rows, True):
             self._answered = self._decide(ask, sight)
@@ -108,6 +126,7 @@ class Deck:
     def _decide(self, ask: Ask, sight: Sight) -> dict[int, Command]:
         """Safe commands of all boats of the team."""
         self._follow(sight)
+        self.failures = {}
         wanted = np.zeros((len(self._facts.agent_ids), 2))
         for place in self._places:
             wanted[place] = self._asked(ask, place, sight)
@@ -115,7 +134,9 @@ class Deck:
             fleet = fleet_of(self._facts, sight, self._team, self._disabled_s)
             sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
         except Exception as error:  # whatever it is, boats that nobody decides for must stop
-            _say_once(f"the shield could not decide ({type(error).__name__}: {error}); all boats are told to stop")
+            text = described(error)
+            self.failures = dict.fromkeys(self._places, (UNDECIDED, text))
+            _say_once(f"the shield could not decide ({text}); all boats are told to stop")
             return dict.fromkeys(self._places, STOP)
         return {
             place: (float(sent[place, 0]), float(sent[place, 1])) if np.isfinite(sent[place]).all() else STOP
@@ -126,12 +147,22 @@ class Deck:
         """The entry's command for a boat; not finite where it has none."""
         name = self._facts.agent_ids[place]
         try:
-            return read_action(self._seat(place, sight), ask(name))
+            action = ask(name)
+        except (Exception, SystemExit) as error:  # an entry that calls exit() does not end the game
+            return self._failed(place, f"raised {type(error).__name__}", described(error))
+        try:
+            command = read_action(self._seat(place, sight), action)
         except Exception as error:
-            _say_once(
-                f"the entry has no usable action for {name} ({type(error).__name__}: {error}); it is told to stop"
-            )
-            return math.nan, math.nan
+            return self._failed(place, "no action", described(error))
+        if not all(map(math.isfinite, command)):
+            return self._failed(place, "not finite", f"{command} is not finite")
+        return command
+
+    def _failed(self, place: int, kind: str, text: str) -> Command:
+        """A command that is none; what is wrong with it is kept and said."""
+        self.failures[place] = kind, text
+        _say_once(f"the entry has no usable action for {name_of(self._facts, place)} ({text}); it is told to stop")
+        return math.nan, math.nan
 
     def _seat(self, place: int, sight: Sight) -> Seat:
         top_mps = float(get_platform(self._facts.platforms[place]).max_speed_mps)
@@ -172,6 +203,19 @@ class Deck:
         fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody, nobody), self._team, self._disabled_s)
         self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
         self._shield.reset()
+
+
+def described(error: BaseException) -> str:
+    """Type, text and place of an error."""
+    try:
+        text = str(error)
+    except Exception:  # its own __str__ may raise, too
+        text = "(no text)"
+    where = error.__traceback__
+    while where is not None and where.tb_next is not None:
+        where = where.tb_next
+    place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
+    return f"{type(error).__name__}: {text}{place}"[:LONGEST]
 
 
 def name_of(facts: Facts, place: int) -> str:

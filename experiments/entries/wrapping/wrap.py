@@ -12,6 +12,7 @@ from typing import Any
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
+from ..checking import check_entry
 from ..team import EntryTeam
 from .facts import facts_for
 from .package import code, data, renamed
@@ -22,11 +23,13 @@ PREFIX = "steerclear_"
 MARK = "crew.py"
 ANSWER_S = 30.0
 """Time an entry has to be built when it is tried, s."""
+TRIED_S = 10.0
+"""Length of the game an entry is tried in, s."""
 EPOCH = (2020, 1, 1, 0, 0, 0)
 
 
 def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> dict[str, Any]:
-    """Write a shielded zip of an entry, and try that it loads.
+    """Write a shielded zip of an entry that plays, and try that it loads.
 
     Args:
         entry: folder or zip with ``solution.py``.
@@ -35,10 +38,10 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         shield: settings of the shield that are not the default.
 
     Returns:
-        What `keys.ENTRY_WRAP` describes.
+        What `keys.ENTRY_WRAP` describes, and as ``tried`` what `checking.check_entry` found of the entry.
 
     Raises:
-        PolicyError: there is no entry, or it cannot be loaded.
+        PolicyError: there is no entry, it cannot be loaded, or it gave nothing usable: a shield would hide that.
         ConfigError: the output exists or is no zip, the entry is shielded already, or a setting is unusable.
     """
     check_out(out)
@@ -46,7 +49,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
     stage = Stage(entry)
     try:
         check_bare(stage.folder, entry)
-        EntryTeam(entry, ANSWER_S).close()
+        tried = check_entry(entry, preset, TRIED_S, ANSWER_S)
         package, added = shielded_files(facts)
         own = own_files(stage.folder, package)
         write_zip(out, {**own, **added})
@@ -58,6 +61,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         out.unlink(missing_ok=True)
         raise
     return {
+        "tried": tried,
         "entry": entry,
         "zip": str(out),
         "bytes": out.stat().st_size,

@@ -8,6 +8,7 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.commands.entry import time_text
 from steerclear.experiments.entries.imports import imports_of
 from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
 from steerclear.experiments.keys import KEYS, undocumented
@@ -37,6 +38,9 @@ def test_a_check_tells_what_an_entry_imports_how_long_it_takes_and_that_it_plays
     content = json.loads(Path("a.json").read_text())
     assert undocumented(content, KEYS["entry check"]) == []
     assert (content["calls"], content["held"], content["decision_ms"]) == (9, 0, 1000.0)
+    assert (content["decisions"], content["steps"], content["failed_steps"]) == (3, 3, {})
+    assert content["mean_decision_ms"] == pytest.approx(3.0 * content["mean_ms"])
+    assert content["max_decision_ms"] >= content["max_ms"]
     assert content["game"]["duration_s"] == pytest.approx(3.0)
 
 
@@ -55,6 +59,21 @@ def test_an_entry_that_does_not_play_is_one_line(write_entry, body, start, words
     assert done.exit_code == ExitCode.BAD_INPUT
     assert words in done.stderr.replace("\n", " ")
     assert "Traceback" not in done.stderr
+
+
+def test_one_boat_that_fails_is_said_first_and_named(write_entry):
+    entry = write_entry("return 4 if agent_id != 'agent_1' else full_obs[agent_id]['nothing']")
+    done = run("check", entry, "--max-time", "3", "--json", "a.json")
+    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert "plays, but agent_1 failed in 3 of 3 steps." in done.stdout.splitlines()[0]
+    assert "failed: raised KeyError (agent_1 x 3): KeyError: 'nothing'" in done.stdout
+    content = json.loads(Path("a.json").read_text())
+    assert undocumented(content, KEYS["entry check"]) == []
+    assert content["failed_steps"] == {"agent_1": 3}
+
+
+def test_times_are_told_in_digits_that_say_something():
+    assert [time_text(ms) for ms in (0.0004, 0.0123, 0.1, 12.34)] == ["0.4 us", "12.3 us", "0.1 ms", "12.3 ms"]
 
 
 def test_what_is_no_entry_is_one_line(tmp_path):

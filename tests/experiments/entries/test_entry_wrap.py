@@ -17,6 +17,8 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.entries.onboard import program
+from steerclear.experiments.entries.onboard.crew import Crew, _tuples
+from steerclear.experiments.entries.onboard.state import Facts
 from steerclear.experiments.entries.wrapping.facts import facts_for
 from steerclear.experiments.entries.wrapping.inline import Inliner, small
 from steerclear.experiments.entries.wrapping.package import code
@@ -139,6 +141,7 @@ def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
         (["{bare}", "--out", "x.zip", "--preset", "mctf2025"], "give --preset mctf2026"),
         (["{zip}", "--out", "x.zip"], "is shielded already"),
         (["broken", "--out", "x.zip"], "no luck"),
+        (["raises", "--out", "x.zip"], "raises gave nothing usable throughout the game"),
     ],
 )
 def test_what_cannot_be_wrapped_is_one_line(arguments, words, wrapped, folder_of_entry, tmp_path, monkeypatch):
@@ -148,6 +151,10 @@ def test_what_cannot_be_wrapped_is_one_line(arguments, words, wrapped, folder_of
         archive.writestr("notes.txt", "nothing")
     Path("broken").mkdir()
     Path("broken/solution.py").write_text("raise RuntimeError('no luck')\n")
+    Path("raises").mkdir()
+    Path("raises/solution.py").write_text(
+        "class solution:\n    def compute_action(self, agent_id, a, b, c):\n        raise ValueError('bad day')\n"
+    )
     given = [one.format(bare=folder_of_entry, zip=wrapped[0]) for one in arguments]
     done = run("wrap", *given)
     assert done.exit_code == ExitCode.BAD_INPUT, done.output
@@ -156,6 +163,46 @@ def test_what_cannot_be_wrapped_is_one_line(arguments, words, wrapped, folder_of
     assert done.stdout == ""
     assert not Path("x.zip").exists()
     assert Path("there.zip").read_text() == "mine"
+
+
+FALTERS = """
+    import os
+    class Mute(Exception):
+        def __str__(self): raise RuntimeError
+    class solution:
+        def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
+            if agent_id == "agent_1": raise Mute
+            if agent_id == "agent_2" and os.path.exists({flag!r}): exit()
+            return 4
+"""
+
+
+def test_what_fails_inside_a_zip_is_counted_as_that_of_a_bare_entry(tmp_path):
+    import textwrap
+
+    (tmp_path / "team").mkdir()
+    flag = tmp_path / "flag"
+    (tmp_path / "team" / "solution.py").write_text(textwrap.dedent(FALTERS.format(flag=str(flag))))
+    done = run("wrap", tmp_path / "team", "--out", tmp_path / "s.zip")
+    assert done.exit_code == ExitCode.OK, done.output
+    assert "plays, but agent_1 failed in 10 of 10 steps; its shield tells them to stop" in done.stderr
+    flag.touch()
+    for entry in ("team", "s.zip"):
+        done = run("check", tmp_path / entry, "--max-time", "2")
+        assert done.exit_code == ExitCode.BAR_FAILED, done.output
+        assert "plays, but agent_1 failed in 2 of 2 steps, agent_2 failed in 2 of 2 steps." in done.stdout
+        assert "failed: raised Mute (agent_1 x 2): Mute: (no text)" in done.stdout
+        assert "failed: raised SystemExit (agent_2 x 2)" in done.stdout
+
+
+def test_a_shield_that_cannot_decide_is_a_failure_of_the_boat():
+    facts = facts_for("mctf2026", {"separation_m": 4.0})
+    crew = Crew(Facts(**{name: _tuples(value) for name, value in facts.items()}))
+    assert crew.failure("agent_0") is None
+    assert crew.action(lambda name: 4, "agent_0", {}).tolist() == [0.0, 0.0]
+    assert crew.failure("agent_0")[0] == "shield could not decide"
+    assert "cannot be read" in crew.failure("agent_0")[1]
+    assert crew.failure("boat")[1] == "unknown boat 'boat'"
 
 
 def test_every_module_of_the_shield_that_is_needed_is_packed_and_is_python():
