@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -75,7 +76,14 @@ def command(function: Command) -> Command:
         except Exception as error:
             leave_failed(error)
 
+    guarded.__doc__ = unbroken(function.__doc__ or "")
     return guarded  # type: ignore[return-value]
+
+
+def unbroken(text: str) -> str:
+    """Paragraphs on one line each: help is broken where the terminal ends, not where the source does."""
+    paragraphs = (" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+    return "\n\n".join(part.replace("``", "") for part in paragraphs)
 
 
 class CompilingBar:

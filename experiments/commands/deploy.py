@@ -57,7 +57,7 @@ def deploy(
     opponents: Opponents = "medium",
     speed: d.Speed = 1.0,
     wait: d.Wait = 15.0,
-    seed: o.Seed = 0,
+    seed: o.DrawSeed = 0,
     plain: Plain = False,
     no_tlog: d.NoTlog = False,
     trust: o.Trust = False,

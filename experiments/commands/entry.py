@@ -110,6 +110,7 @@ def report(
     jobs: o.Jobs = None,
     resume: o.Resume = False,
     separation: o.Separation = None,
+    profile: o.Profile = None,
     shield_set: o.ShieldSet = None,
     max_time: o.MaxTime = None,
     rules: o.RuleSet = None,
@@ -127,7 +128,7 @@ def report(
         raise ConfigError(f"--looks is {looks}; give 0 to 3")
     names = o.split_names(opponents + (f",{also}" if also else ""), "--opponents")
     played = o.game_settings(max_time, None, rules)
-    asked = o.shield_settings(separation, None, None, None, shield_set)
+    asked = o.shield_settings(separation, None, profile, None, shield_set)
     settings = AblationSettings(
         preset=preset,
         own=entry,

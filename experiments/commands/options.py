@@ -21,6 +21,7 @@ Own = Annotated[str, typer.Option(metavar="NAME", help="Policy of the shielded t
 Opponents = Annotated[str, typer.Option(metavar="A,B", help="Policies it meets, separated by commas.")]
 Games = Annotated[int | None, typer.Option(metavar="N", help="Games per pairing and shield state.", show_default="20")]
 Seed = Annotated[int, typer.Option(metavar="N", help="Game g is played from seed + g.")]
+DrawSeed = Annotated[int, typer.Option(metavar="N", help="Seed of what is drawn: the same one, the same draws.")]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for results.", show_default="results/...")]
 Jobs = Annotated[int | None, typer.Option(metavar="N", help="Processes.", show_default="all cores")]
 Engine = Annotated[

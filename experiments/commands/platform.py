@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -87,4 +88,5 @@ def new(
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path} cannot be written ({error.strerror}); choose another place with --out") from None
-    out().print(f"{path}\nnext: steerclear platform check {path}", markup=False, soft_wrap=True)
+    words = shlex.join(["steerclear", "platform", "check", str(path)])
+    out().print(f"{path}\nnext: {words}", markup=False, soft_wrap=True)

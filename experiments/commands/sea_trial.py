@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -56,9 +57,13 @@ def sea_trial(
     if trial is not None:
         _show(trial)
         for name in trial.changed:
-            text = f"next: steerclear fit {outcome.log} --boat {name} --out {name}.yaml"
-            out().print(text, markup=False, soft_wrap=True)
+            out().print(next_words(outcome.log, name), markup=False, soft_wrap=True)
     finish(not outcome.refused)
+
+
+def next_words(log: Path | None, boat: str) -> str:
+    """What to type next, as a shell takes it."""
+    return f"next: {shlex.join(['steerclear', 'fit', str(log), '--boat', boat, '--out', f'{boat}.yaml'])}"
 
 
 def _show(trial: SeaTrial) -> None:

@@ -77,7 +77,7 @@ def sim_boats(
     loss: Loss = 0.0,
     delay: Delay = 0.0,
     jitter: Jitter = 0.0,
-    seed: o.Seed = 0,
+    seed: o.DrawSeed = 0,
     duration: Duration = None,
     boot: Boot = 42.0,
     opponents: Opponents = "medium",

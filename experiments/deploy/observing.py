@@ -14,13 +14,16 @@ from steerclear.env.motion import is_on_side
 from steerclear.shield.bridge.feed import GameState, game_state
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.wanted import Snapshot
-from steerclear.shield.exceptions import FleetError
+from steerclear.shield.exceptions import FleetError, FleetFileError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
-from .rules import game_config
+from .rules import game_config, stand_in_config
 
+NEED_NO_GAME = ("hold", "random", "waypoints")
+"""Policies that look at no flag and at nobody: they also steer boats that play no game."""
+NOBODY = -1
 RESTART_S = 1.0
 """A game whose clock goes back by more than this is a new one."""
 
@@ -32,7 +35,7 @@ class Cast:
     Attributes:
         config: settings of the game.
         names: all boats of the file, in its order.
-        rows: number in ``names`` of each agent's boat, agent_0 first.
+        rows: number in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents of a game without opponents.
         ours: agents the policy plays.
     """
 
@@ -43,25 +46,51 @@ class Cast:
 
     @property
     def players(self) -> tuple[str, ...]:
-        """Names of the boats that play, agent_0 first."""
-        return tuple(self.names[row] for row in self.rows)
+        """Names of the boats that play, agent_0 first; empty for those that are nobody."""
+        return tuple("" if row == NOBODY else self.names[row] for row in self.rows)
+
+    @property
+    def there(self) -> list[int]:
+        """Numbers of the agents that have a boat."""
+        return [i for i, row in enumerate(self.rows) if row != NOBODY]
+
+    @property
+    def boats(self) -> list[int]:
+        """Numbers in ``names`` of their boats."""
+        return [row for row in self.rows if row != NOBODY]
 
 
-def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None) -> Cast:
-    """The cast of a fleet file.
+def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = "") -> Cast:
+    """The cast of a fleet file. Where no boat plays, our boats are a team without opponents.
 
     Args:
         fleet: the file.
         boats: the boats the policy plays; None: all that a process commands for our team, see `FleetFile.commanded`.
+        policy: its name, which says whether it needs a game.
 
     Raises:
-        FleetFileError: the file has no game, or one of the boats does not play.
+        FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
     """
-    config = game_config(fleet)
     wanted = [boat.name for boat in fleet.commanded()] if boats is None else list(boats)
+    if not fleet.agent_ids and policy in NEED_NO_GAME:
+        return _without_game(fleet, wanted)
+    if not fleet.agent_ids:
+        raise FleetFileError(
+            f"no boat plays and policy {policy!r} needs a game: give boats an agent: agent_0, agent_1, ..., blue "
+            f"first; boats without a game are steered by --policy {' or '.join(NEED_NO_GAME)}"
+        )
+    config = game_config(fleet)
     ours = tuple(boat.agent for boat in map(fleet.boat, wanted) if boat.agent is not None)
     rows = tuple(i for i, boat in enumerate(fleet.boats) if boat.agent is not None)
     return Cast(config, fleet.names, rows, ours)
+
+
+def _without_game(fleet: FleetFile, boats: Sequence[str]) -> Cast:
+    config = stand_in_config(fleet, boats)
+    ours, nobody = tuple(fleet.names.index(name) for name in boats), (NOBODY,) * len(boats)
+    first = len(boats) * fleet.team_number
+    agents = tuple(config.agent_ids[first : first + len(boats)])
+    return Cast(config, fleet.names, ours + nobody if first == 0 else nobody + ours, agents)
 
 
 class Observer:
@@ -127,7 +156,8 @@ class Observer:
         seen = np.asarray(snapshot.seen, dtype=np.float64)
         if seen.shape != (len(self.cast.names), 4):
             raise FleetError(f"seen has shape {seen.shape}; give ({len(self.cast.names)}, 4), a row per boat")
-        rows = seen[list(self.cast.rows)]
+        rows = np.full((len(self.cast.rows), 4), np.nan)
+        rows[self.cast.there] = seen[self.cast.boats]
         rows[~np.isfinite(rows).all(axis=1)] = np.nan
         return rows
 

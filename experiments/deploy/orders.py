@@ -118,12 +118,20 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
     if fleet.agent_ids:
         game_config(fleet)
     if not fleet.commanded(orders.boat):
-        raise FleetFileError(f"{orders.fleet_file}: no boat of team {fleet.team} has a link; give one to command it")
+        raise FleetFileError(f"{orders.fleet_file}: {_nothing_to_command(fleet)}")
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)
     if "delay_s" not in fleet.shield:
         fleet = fleet.with_shield(delay_s=_delay_s(fleet, orders.boat))
     return fleet, text
+
+
+def _nothing_to_command(fleet: FleetFile) -> str:
+    """Why, and what to do: a boat outside the game is nobody's until its team is said."""
+    for boat in fleet.boats:
+        if boat.link is not None and boat.commanded and boat.agent is None and boat.team is None:
+            return f"{boat.name} has a link but no agent or team; add team: {fleet.team} to command it"
+    return f"no boat of team {fleet.team} has a link; give one to command it"
 
 
 def _delay_s(fleet: FleetFile, boat: str | None) -> float:

@@ -130,9 +130,9 @@ class Player:
     def _absolute(self, relative: Array) -> Array:
         core = self.observer.env.core
         commands = np.full((len(self._cast.names), 2), np.nan)
-        rows = list(self._cast.rows)
-        commands[rows, 0] = np.clip(relative[:, 0], -core.max_speed_mps, core.max_speed_mps)
-        commands[rows, 1] = np.radians((core.state[0, :, L.HEADING] + relative[:, 1]) % 360.0)
+        headings_rad = np.radians((core.state[0, :, L.HEADING] + relative[:, 1]) % 360.0)
+        speeds_mps = np.clip(relative[:, 0], -core.max_speed_mps, core.max_speed_mps)
+        commands[self._cast.boats] = np.column_stack([speeds_mps, headings_rad])[self._cast.there]
         return commands
 
 

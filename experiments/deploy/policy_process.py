@@ -58,7 +58,7 @@ class PolicyProcess:
         start_within_s: time it has to load, s of the machine.
 
     Raises:
-        FleetFileError: the file has no game, or one of the boats does not play.
+        FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class PolicyProcess:
     ) -> None:
         self.policy = Path(policy).name if looks_like_path(policy) else policy
         """Its short name, for messages."""
-        self._orders = pickle.dumps(Orders(cast_of(fleet, boats), policy, dict(options or {}), seed))
+        self._orders = pickle.dumps(Orders(cast_of(fleet, boats, policy), policy, dict(options or {}), seed))
         self._shape = (len(fleet.names), 2)
         self._deadline_s = fleet.limits.policy.give_up_after_s if deadline_s is None else deadline_s
         self._start_within_s = start_within_s

@@ -16,6 +16,7 @@ from steerclear.shield.bridge.feed import BoatStatus, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
 from steerclear.shield.jit import IntArray
+from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 
 FROM_FILE = {
@@ -39,6 +40,23 @@ def game_config(fleet: FleetFile) -> GameConfig:
     players = [boat for boat in fleet.boats if boat.agent is not None]
     if not players:
         raise FleetFileError("no boat plays; give boats an agent: agent_0, agent_1, ..., blue first")
+    return _config(fleet, tuple(fleet.platform_of[boat.name] for boat in players))
+
+
+def stand_in_config(fleet: FleetFile, boats: Sequence[str]) -> GameConfig:
+    """Settings of a game for boats that play none: they are one team, and nobody is the other.
+
+    Args:
+        fleet: the file.
+        boats: names of the boats.
+
+    Raises:
+        FleetFileError: the preset or a rule is unknown, or a rule contradicts another key.
+    """
+    return _config(fleet, 2 * tuple(fleet.platform_of[name] for name in boats))
+
+
+def _config(fleet: FleetFile, platforms: tuple[Platform, ...]) -> GameConfig:
     for rule, key in FROM_FILE.items():
         if rule in fleet.rules:
             raise FleetFileError(f"rules.{rule} is what {key} says; leave it out")
@@ -48,9 +66,9 @@ def game_config(fleet: FleetFile) -> GameConfig:
             hint = f"did you mean {near[0]!r}?" if near else f"known settings: {', '.join(GameConfig.names())}"
             raise FleetFileError(f"rules: unknown game setting {rule!r}; {hint}")
     given: dict[str, Any] = {
-        "team_size": len(players) // 2,
+        "team_size": len(platforms) // 2,
         "env_bounds_m": tuple(fleet.field.size_m),
-        "platforms": tuple(fleet.platform_of[boat.name] for boat in players),
+        "platforms": platforms,
         "dt_s": fleet.dt_s,
     }
     try:

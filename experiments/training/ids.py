@@ -10,7 +10,22 @@ ID = "steerclear/Mctf-v0"
 
 
 if ID not in registry:
-    register(id=ID, vector_entry_point="steerclear.experiments.training.ids:make_learners")
+    register(
+        id=ID,
+        entry_point="steerclear.experiments.training.ids:make_one",
+        vector_entry_point="steerclear.experiments.training.ids:make_learners",
+    )
+
+
+def make_one(**settings: Any) -> Any:
+    """Refuse it: a game has more than one learner.
+
+    Raises:
+        ConfigError: always.
+    """
+    from steerclear.shield.exceptions import ConfigError
+
+    raise ConfigError(f'{ID} has many learners; call gymnasium.make_vec("{make_one.__module__}:{ID}", num_envs=...)')
 
 
 def make_learners(

@@ -21,6 +21,8 @@ MAX_FILES = 20_000
 """Most files in a zip."""
 WORKING_DIR = "working_dir"
 """Name under which the competition's own template looks for its files; in the stage it leads back to the stage."""
+DEEP = ("*/*", "*/*/*")
+"""Folders that are looked into, no deeper, to say where the file lies: what was given may be somebody's home."""
 _CHUNK = 1 << 20
 
 
@@ -80,9 +82,16 @@ def find_entry(folder: Path, source: Path) -> Path:
         return folder
     inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
     if len(inside) != 1:
-        found = "none there" if not inside else "several: " + ", ".join(path.name for path in inside)
+        found = "several: " + ", ".join(path.name for path in inside) if inside else _deeper(folder)
         raise PolicyError(f"{source} needs one {ENTRY_FILE} at its top, or in its only folder ({found})")
     return inside[0]
+
+
+def _deeper(folder: Path) -> str:
+    """Where the file lies too deep, for a message."""
+    found = [path for levels in DEEP for path in folder.glob(f"{levels}/{ENTRY_FILE}") if path.is_file()]
+    deep = sorted(path.relative_to(folder).as_posix() for path in found)
+    return "none there" if not deep else f"none there, but {', '.join(deep[:3])}; zip what lies beside it"
 
 
 def link_folder(source: Path, top: Path) -> Path:

@@ -130,7 +130,7 @@ def _check_agents(fleet: FleetSettings) -> None:
     if agents != expected or len(agents) % 2:
         raise FleetFileError(
             f"agents are {', '.join(agents)}; give an even number of boats agent_0, agent_1, ... in that "
-            "order, blue first, and boats outside the game no agent"
+            "order, blue first, and boats outside the game no agent; a boat of ours without a game has a team instead"
         )
     for boat in fleet.boats:
         if boat.agent is not None and boat.team is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 from collections.abc import Callable
 from functools import cache
@@ -85,8 +86,10 @@ def get_platform(name: str | Platform) -> Platform:
         return PLATFORMS[name]
     boats = known_platforms()
     if not isinstance(name, str) or name not in boats:
+        near = difflib.get_close_matches(str(name), boats, n=3)
+        hint = f"did you mean {', '.join(near)}? " if near else ""
         known = ", ".join(sorted(boats))
-        raise PlatformError(f"unknown platform {name!r}; known platforms: {known}; or give a file, NAME.yaml")
+        raise PlatformError(f"unknown platform {name!r}; {hint}known platforms: {known}; or give a file, NAME.yaml")
     return boats[name]
 
 

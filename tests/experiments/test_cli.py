@@ -1,3 +1,4 @@
+import itertools
 import json
 import math
 import os
@@ -64,6 +65,17 @@ def test_a_setting_given_twice_is_refused(option, more):
 @pytest.mark.parametrize("text", ["[60, 60]", "(60, 60)", "60,60"])
 def test_pairs_are_read_as_they_are_written(text):
     assert tuple(options.key_values([f"env_bounds_m={text}"], "--set")["env_bounds_m"]) == (60, 60)
+
+
+def test_help_breaks_lines_only_where_the_terminal_ends(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    for name in ("preflight", "sea-trial", "replay", "reach play"):
+        shown = CliRunner().invoke(cli.app, [*name.split(), "--help"]).output.partition("╭")[0]
+        lines = [line.strip() for line in shown.splitlines()]
+        begin = next(k for k, line in enumerate(lines) if "Exit status" in line)
+        words = [line.split() for line in lines[begin:] if line]
+        for line, below in itertools.pairwise(words):
+            assert len(" ".join(line)) + 1 + len(below[0]) > 78, (name, line)
 
 
 def test_a_key_given_twice_is_refused():

@@ -112,6 +112,8 @@ MISTAKES = [
     ("platform show none.yaml", "platform new"),
     ("platform check text.txt", "NAME.yaml"),
     ("platform new tub --from canoe", "heron"),
+    ("platform new tub --from blubot", "did you mean blueboat"),
+    ("platform show herron", "did you mean heron"),
     ("platform new tub --out tub.txt", ".yaml"),
     ("fit text.txt", "is no log"),
     ("fit none.csv", "none.csv"),

@@ -85,6 +85,12 @@ def test_a_zip_without_an_entry_is_named_itself(tmp_path):
         Stage(source)
 
 
+def test_an_entry_that_lies_too_deep_is_shown(tmp_path):
+    source = pack(tmp_path / "mine.zip", **{"a/b/solution.py": SOLUTION})
+    with pytest.raises(PolicyError, match=r"none there, but a/b/solution\.py; zip what lies beside it"):
+        Stage(source)
+
+
 def test_path_traversal_end_to_end(tmp_path):
     source = pack(tmp_path / "evil.zip", **{"solution.py": SOLUTION, "../../evil.txt": "evil"})
     with pytest.raises(PolicyError, match="outside its folder"):

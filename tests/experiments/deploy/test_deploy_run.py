@@ -293,6 +293,13 @@ def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(f
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.4
 
 
+def test_a_boat_that_is_nobodys_is_named(fleet_file):
+    text = fleet_file.read_text().replace("agent: agent_0, ", "").replace("agent: agent_0\n", "\n")
+    fleet_file.write_text(text.replace("agent: agent_1, ", ""))
+    with pytest.raises(FleetFileError, match="blue_1 has a link but no agent or team; add team: blue to command it"):
+        read_fleet(orders_of(fleet_file))
+
+
 def test_nothing_to_command_is_said(fleet_file):
     fleet_file.write_text(fleet_file.read_text().replace("system_id: 1}", "system_id: 1}\n    commanded: false"))
     with pytest.raises(FleetFileError, match="has a link"):

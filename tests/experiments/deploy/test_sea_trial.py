@@ -1,10 +1,13 @@
 """The sea trial's manoeuvres on a boat without sockets: all are driven, inside the geofence, and can be fitted."""
 
 import math
+import shlex
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
+from steerclear.experiments.commands.sea_trial import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
 from steerclear.experiments.fit.runs import runs_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -53,6 +56,12 @@ def test_every_manoeuvre_is_driven_inside_the_geofence(platform):
     assert rows[:, 2].min() > -30.0
     assert rows[:, 2].max() < 70.0
     assert len(rows) * 0.1 < 15 * 60.0
+
+
+def test_what_to_type_next_is_one_command_in_any_folder():
+    words = next_words(Path("/my boat/logs/a.mcap"), "blue_1").removeprefix("next: ")
+    asked = ["steerclear", "fit", "/my boat/logs/a.mcap", "--boat", "blue_1", "--out", "blue_1.yaml"]
+    assert shlex.split(words) == asked
 
 
 def test_the_trial_shows_turns_and_stops_of_both_sides():

@@ -80,6 +80,8 @@ def test_gymnasium_makes_them_by_id():
     assert {"captures", "grabs", "tags", "hits", "interventions"} <= infos.keys()
     with pytest.raises(ConfigError, match="give a multiple of 3"):
         gymnasium.make_vec("steerclear/Mctf-v0", num_envs=4)
+    with pytest.raises(ConfigError, match=r"call gymnasium\.make_vec\("):
+        gymnasium.make("steerclear.experiments.training.ids:steerclear/Mctf-v0")
 
 
 def test_unknown_ways_are_refused():
