@@ -19,6 +19,8 @@ LEGEND_LETTER_IN, LEGEND_MARK_IN, LEGEND_LINE_IN = 0.06, 0.55, 0.17
 """Room in a legend of 8 points, inches: a letter, a mark with its gaps, a line."""
 PANEL_IN, FAMILY_IN = (4.4, 3.6), 0.22
 """Width and least height of a panel, and room for a family's line, inches."""
+SAME_PERCENT = (0.8, 0.02)
+"""Markers nearer than this, changed and breached, cover each other."""
 LINEAR_PERCENT = 0.1
 """Shares below it are drawn to scale, beyond it by their logarithm: 0 has a place."""
 
@@ -69,17 +71,28 @@ def _alone(contest: Contest) -> bool:
 
 
 def _draw_guards(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, str]]) -> None:
-    for guard, one in contest.totals.items():
+    order = [guard for guard in contest.totals if guard != "shield"]
+    drawn: list[tuple[float, float]] = []
+    for guard in [*(["shield"] if "shield" in contest.totals else []), *order]:
+        one = contest.totals[guard]
         share, above = _share(one["breached"], one["encounters"])
         colour, mark = looks[guard]
-        # the default smaller and on top: a guard that does the same shows around it
-        size, order = (4, 4) if guard == "shield" else (6, 3)
-        axis.errorbar(one["changed_percent"], share, [[0.0], [above]], fmt=mark, markersize=size, zorder=order,
-                      capsize=3, color=colour, label=plot_text(guard))  # fmt: skip
+        here = one["changed_percent"], share
+        # guards that do the same show around each other: rings, the widest behind
+        around = sum(_coincide(here, other) for other in drawn)
+        drawn.append(here)
+        axis.errorbar(*here, [[0.0], [above]], fmt=mark, markersize=5 + 4 * around, zorder=4 - 0.1 * around,
+                      capsize=3 + 2 * around, color=colour, label=plot_text(guard),
+                      markerfacecolor="none" if around else colour)  # fmt: skip
     axis.set_yscale("symlog", linthresh=LINEAR_PERCENT)
     axis.set_ylim(bottom=-0.02)
     axis.set_xlabel("commands changed, %", fontsize=8)
     axis.set_ylabel("encounters breached, %", fontsize=8)
+
+
+def _coincide(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether two markers would cover each other: shares of commands, and of encounters, in percent."""
+    return abs(one[0] - other[0]) < SAME_PERCENT[0] and abs(one[1] - other[1]) < SAME_PERCENT[1]
 
 
 def _draw_families(axis: Any, contest: Contest, looks: Mapping[str, tuple[str, str]]) -> None:

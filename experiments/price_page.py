@@ -9,6 +9,7 @@ from typing import Any
 from steerclear.shield.config import ShieldConfig
 
 from .markdown import MADE, line, table
+from .plot_labels import label_points
 from .tables import interval_text
 from .tally import RADII_M, breach_column
 
@@ -110,6 +111,7 @@ def _plot(groups: _Groups, path: Path) -> None:
 
     canvas = Figure(figsize=(10.0, 4.2), layout="constrained", dpi=150)
     hits, net = canvas.subplots(1, 2)
+    labels: dict[Any, list[tuple[tuple[float, float], str]]] = {hits: [], net: []}
     for (preset, radius_m, pairing), runs in groups.items():
         changed = [summary["metrics"]["changed_share"]["on"]["value"] for _, _, summary in runs]
         for axis, name, state in (
@@ -119,7 +121,7 @@ def _plot(groups: _Groups, path: Path) -> None:
             values = [summary["metrics"][name][state]["value"] for _, _, summary in runs]
             axis.plot(changed, values, "o-", ms=4, label=f"{preset} {radius_m:g} m, {pairing}")
             for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True):
-                axis.annotate(_told_fear(fear_s), (x, y), fontsize=7, xytext=(3, 3), textcoords="offset points")
+                labels[axis].append(((x, y), _told_fear(fear_s)))
     hits.set_ylabel("hits with opponents, per game")
     net.set_ylabel("net of captures, on - off, per game")
     for axis in (hits, net):
@@ -127,4 +129,7 @@ def _plot(groups: _Groups, path: Path) -> None:
         axis.axhline(0.0, color="#999999", lw=0.6)
         axis.spines[["top", "right"]].set_visible(False)
     hits.legend(fontsize=7, frameon=False)
+    canvas.draw_without_rendering()  # settles where the axes lie
+    for axis, placed in labels.items():
+        label_points(axis, [point for point, _ in placed], [text for _, text in placed])
     canvas.savefig(path)

@@ -1,5 +1,6 @@
 """Every example runs as it stands and prints what it is about."""
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -52,6 +53,23 @@ def test_an_example_runs(name, capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", [name, str(LOG)])
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     assert SAYS[name] in capsys.readouterr().out
+
+
+def decided(text, capsys):
+    exec(compile(text, "first_decision", "exec"), {})
+    return capsys.readouterr().out.strip()
+
+
+def test_the_tutorial_explains_what_its_program_prints(capsys):
+    page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    text = (EXAMPLES / "first_decision.py").read_text(encoding="utf-8")
+    after = page.partition("examples/first_decision.py")[2].partition("\n## ")[0]
+    (printed,) = re.findall(r"^```text\n(.*?)\n```$", after, flags=re.M | re.S)
+    assert printed == decided(text, capsys)
+    explained = re.findall(r"^- `(.*?)`:", after, flags=re.M)
+    assert " ".join(explained) == printed
+    assert "farther off (8 m) and the reason is `PASSED`" in after
+    assert decided(text.replace("[0, 5.5]", "[0, 8.0]"), capsys).startswith("PASSED 0.0 deg")
 
 
 def test_examples_are_short():

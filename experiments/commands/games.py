@@ -21,11 +21,15 @@ from ..sea import check_current
 from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table, verdict_table
+from ..tally import RADII_M
 from ..warming import WARMED, warm_up
 from .console import Interrupted, err, out, progress
 from .policies_tried import try_policies
 
 KEYBOARD = "keyboard"
+HITS_WORDS = (
+    f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several into {RADII_M[0]:g} m."
+)
 
 MOST_GAMES = 100_000
 """Games of a pairing at most: all are listed before the first is played."""
@@ -109,6 +113,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print(pairing_table(summary))
         console.print(verdict_table(summary))
         console.print()
+    if results["pairings"]:
+        console.print(f"{HITS_WORDS}\n", soft_wrap=True)
     if results["bars"]:
         console.print(bars_table(results["bars"]))
         console.print()

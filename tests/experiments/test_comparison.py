@@ -183,6 +183,21 @@ def test_panels_of_one_guard_have_one_scale(tmp_path, monkeypatch):
     assert saved[0].axes[0].get_xlim()[1] > 50.0
 
 
+def test_guards_that_do_the_same_show_around_each_other(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    saved = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, path: saved.append(self))
+    cells = [cell(guard, "head_on", changed=changed) for guard, changed in
+             (("bold", 5.1), ("shield", 5.0), ("calm", 4.9), ("wild", 40.0))]  # fmt: skip
+    plot_contests([one_contest(content(*cells))], tmp_path / "plot.png")
+    drawn = {bars.get_label(): bars.lines[0] for bars in saved[0].axes[0].containers}
+    sizes = {guard: line.get_markersize() for guard, line in drawn.items()}
+    assert sizes == {"shield": 5, "bold": 9, "calm": 13, "wild": 5}
+    assert {guard for guard, line in drawn.items() if line.get_markerfacecolor() == "none"} == {"bold", "calm"}
+    assert [float(drawn[guard].get_xdata()[0]) for guard in ("shield", "bold")] == [5.0, 5.1]
+
+
 def test_bad_results_are_refused(tmp_path):
     broken = cell("a", "head_on")
     del broken["avoidable"]
