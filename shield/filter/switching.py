@@ -18,7 +18,7 @@ from ..backup.assign import assign_plans
 from ..backup.candidates import candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
-from ..backup.rank import PAIR_SAFE, STATIC_LOST, rank_path, worst_rank
+from ..backup.rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE, rank_path, worst_rank
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.neighbours import could_meet
@@ -142,7 +142,7 @@ def _join_short(scene: Scene) -> int:
     """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        if ours[i] and work.rank[i] < PAIR_SAFE:
+        if ours[i] and work.rank[i] < STRAIGHT_SAFE:
             plan.moving[i] = True
     return list_movers(plan)
 
