@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,8 @@ def _groups(found: Sequence[Mapping[str, Any]]) -> _Groups:
     groups: _Groups = {}
     for content in found:
         shield = content["settings"]["shield"]
-        config = ShieldConfig.of(**{k: v for k, v in shield.items() if k in _DIALS})
+        dials = {name: math.inf if value == "inf" else value for name, value in shield.items() if name in _DIALS}
+        config = ShieldConfig.of(**dials)
         fear_s = config.feared_s, config.visitor_feared_s
         radius_m = float(shield.get("separation_m", RADII_M[0]))
         for summary in content["pairings"]:
@@ -106,30 +108,36 @@ def _row(fear_s: _Fear, content: Mapping[str, Any], summary: Mapping[str, Any], 
 
 
 def _plot(groups: _Groups, path: Path) -> None:
-    """Hits with opponents and net of captures against commands changed, one line a pairing, its points the times."""
+    """Hits with opponents and net of captures against commands changed: a column a game, a line an opponent."""
     from matplotlib.figure import Figure  # without pyplot: no window system is touched
 
-    canvas = Figure(figsize=(10.0, 4.2), layout="constrained", dpi=150)
-    hits, net = canvas.subplots(1, 2)
-    labels: dict[Any, list[tuple[tuple[float, float], str]]] = {hits: [], net: []}
+    games = list(dict.fromkeys((preset, radius_m) for preset, radius_m, _ in groups))
+    pairings = list(dict.fromkeys(pairing for _, _, pairing in groups))
+    canvas = Figure(figsize=(2.9 * len(games) + 0.6, 5.2), layout="constrained", dpi=150)
+    axes = canvas.subplots(2, len(games), squeeze=False, sharex="col", sharey="row")
+    labels: dict[Any, list[tuple[tuple[float, float], str]]] = {}
     for (preset, radius_m, pairing), runs in groups.items():
+        column, colour = games.index((preset, radius_m)), f"C{pairings.index(pairing)}"
         changed = [summary["metrics"]["changed_share"]["on"]["value"] for _, _, summary in runs]
         for axis, name, state in (
-            (hits, breach_column("opponent", radius_m), "on"),
-            (net, "net_captures", "difference"),
+            (axes[0, column], breach_column("opponent", radius_m), "on"),
+            (axes[1, column], "net_captures", "difference"),
         ):
             values = [summary["metrics"][name][state]["value"] for _, _, summary in runs]
-            axis.plot(changed, values, "o-", ms=4, label=f"{preset} {radius_m:g} m, {pairing}")
-            for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True):
-                labels[axis].append(((x, y), _told_fear(fear_s)))
-    hits.set_ylabel("hits with opponents, per game")
-    net.set_ylabel("net of captures, on - off, per game")
-    for axis in (hits, net):
-        axis.set_xlabel("commands changed, %")
+            axis.plot(changed, values, "o-", ms=3, lw=1, color=colour, label=pairing)
+            placed = labels.setdefault(axis, [])
+            placed += [((x, y), _told_fear(fear_s)) for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True)]
+    for (preset, radius_m), column in zip(games, axes.T, strict=True):
+        column[0].set_title(f"{preset}, {radius_m:g} m", fontsize=9)
+        column[1].set_xlabel("commands changed, %")
+    axes[0, 0].set_ylabel("hits with opponents, per game")
+    axes[1, 0].set_ylabel("net of captures, on - off")
+    for axis in axes.flat:
         axis.axhline(0.0, color="#999999", lw=0.6)
+        axis.margins(x=0.12)
         axis.spines[["top", "right"]].set_visible(False)
-    hits.legend(fontsize=7, frameon=False)
+    axes[0, 0].legend(fontsize=7, frameon=False)
     canvas.draw_without_rendering()  # settles where the axes lie
     for axis, placed in labels.items():
-        label_points(axis, [point for point, _ in placed], [text for _, text in placed])
+        label_points(axis, [point for point, _ in placed], [text for _, text in placed], 6.0)
     canvas.savefig(path)

@@ -16,7 +16,7 @@ from .provenance import machine, versions
 from .replay_html import write_replay
 from .report_html import write_report
 from .spec import MatchSpec
-from .store import write_json, write_table
+from .store import told_settings, write_json, write_table
 from .summary import Row
 from .tally import breach_column
 from .verdicts import all_breaches, without_breaches
@@ -41,7 +41,7 @@ def results_of(
         "command": command,
         "complete": len(played.rows) == expected,
         "quick": quick,
-        "settings": asdict(settings),
+        "settings": told_settings(asdict(settings)),
         "policy_files": _policy_files(played.rows),
         "seeds": [settings.seed + game for game in range(settings.games)],
         "versions": versions(),

@@ -232,6 +232,15 @@ def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writerows(rows)
 
 
+def told_settings(value: Any) -> Any:
+    """Nested settings with infinity as the text inf, as commands take it: JSON has no such number."""
+    if isinstance(value, Mapping):
+        return {key: told_settings(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [told_settings(item) for item in value]
+    return f"{value:g}" if isinstance(value, float) and math.isinf(value) else value
+
+
 def finite(value: Any) -> Any:
     """Replace every NaN and infinity in nested data by None."""
     value = _plain(value) if hasattr(value, "tolist") else value

@@ -8,6 +8,7 @@ from typing import Any
 from ..pool import available_cores
 from ..provenance import machine, versions
 from ..spec import SIDES
+from ..store import told_settings
 from .agreement import agreement
 from .price import prices
 from .settings import ALL, FINAL, OFF, QUALIFYING, TournamentSettings, label
@@ -42,7 +43,7 @@ def results_of(
     return {
         "command": "tournament",
         "complete": len(rows) == expected,
-        "settings": settings.as_dict(),
+        "settings": told_settings(settings.as_dict()),
         "versions": versions(),
         "machine": {**machine(), "cores": available_cores()},
         "wall_s": wall_s,

@@ -1,8 +1,15 @@
 """The page of what safety costs: one table a pairing, times in order, figures where they belong."""
 
+import json
+import math
+
 import pytest
+from steerclear.experiments.ablation import AblationSettings
+from steerclear.experiments.campaign import Played
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.price_page import is_dial
+from steerclear.experiments.results import results_of
+from steerclear.experiments.store import finite
 from steerclear.shield.exceptions import ConfigError
 
 
@@ -43,6 +50,14 @@ def test_a_row_for_each_time_the_least_first(tmp_path):
     ]
     assert "12.5" in far
     assert (tmp_path / "price.png").stat().st_size > 10_000
+
+
+def test_fear_without_end_stays_so_in_results():
+    """JSON has no infinity, and None would be the profile's."""
+    settings = AblationSettings(shield={"adversary_s": math.inf}, opponents=("easy",), games=1)
+    kept = json.loads(json.dumps(finite(results_of("ablate", settings, Played([], [], 0), 1.0)["settings"])))
+    assert kept["shield"] == {"adversary_s": "inf"}
+    assert float(kept["shield"]["adversary_s"]) == math.inf
 
 
 def test_other_ablations_keep_their_own_page():
