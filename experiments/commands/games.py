@@ -28,8 +28,7 @@ from .policies_tried import try_policies
 
 KEYBOARD = "keyboard"
 HITS_WORDS = (
-    f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\n"
-    f"into {RADII_M[0]:g} m."
+    f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
 )
 
 MOST_GAMES = 100_000
