@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.words import describe_error
 
 from .actions import HOLD, ActionReader
 from .protocol import Action
 from .report import PolicyReport, Reporter
 from .scripted.team import boat_numbers, game_core
-from .words import plain_text
 
 Answer = Callable[[str], Any]
 """``answer(agent_id) -> action``."""
@@ -165,16 +165,3 @@ def check_observed(observations: Mapping[str, Any], agent_ids: Sequence[str]) ->
     for agent_id in agent_ids:
         if agent_id not in observations:
             raise PolicyError(f"no observation of {agent_id}; reset the game first")
-
-
-def describe_error(error: BaseException) -> str:
-    """Type, text and place of an error raised by foreign code, in one line that a terminal can be shown."""
-    try:
-        text = plain_text(error)
-    except Exception:  # its own __str__ may raise, too
-        text = "(no text)"
-    where = error.__traceback__
-    while where is not None and where.tb_next is not None:
-        where = where.tb_next
-    place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
-    return plain_text(f"{type(error).__name__}: {text}{place}", 900)

@@ -24,6 +24,8 @@ class KeptBarriers:
 
     def __init__(self, config: ShieldConfig) -> None:
         self.names, k = config.barriers, len(config.barriers)
+        for name in self.names:
+            address_of(get_barrier(name))  # compiled now, not in the first decision
         self.arrays = share(
             Registered(
                 address=np.zeros(k, np.int64),

@@ -12,6 +12,7 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.preflight.drill import Drill
 from steerclear.shield.bridge.preflight.link_checks import link_checks
+from steerclear.shield.bridge.preflight.missed import Missed
 from steerclear.shield.bridge.preflight.response import drill_checks
 from steerclear.shield.bridge.preflight.result import Check
 from steerclear.shield.bridge.roster import Roster
@@ -78,14 +79,16 @@ def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] 
     """
     fleet = station.fleet
     drill = Drill(fleet, tuple(station.links))
+    missed = Missed(drill)
     parts = Parts(
         links=station.links,
         policy=drill,
         ears=station.ears,
         contacts=() if station.feed is None else (station.feed,),
         grounds=grounds_of(fleet),
-        sinks=(drill, *sinks),
+        sinks=(drill, missed, *sinks),
     )
     loop = Loop(fleet, parts, operator, station.clock)
+    missed.foresight = loop.foresight
     loop.run(drill.seconds + 2.0 * fleet.dt_s)
-    return drill_checks(drill, dict(fleet.platform_of), fleet.dt_s, loop.foresight)
+    return drill_checks(drill, missed, fleet)

@@ -16,7 +16,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from steerclear.policies.words import plain_text
+from steerclear.shield.words import plain_text
 
 from ..entries.keeper import OVER, READY
 from ..entries.limits import Limits

@@ -15,8 +15,9 @@ from typing import Any
 
 from steerclear import policies
 from steerclear.experiments.deploy.frames import read_message, write_message
-from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam, describe_error
+from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
+from steerclear.shield.words import describe_error
 
 from .answers import to_plain
 from .keeper import AGAIN

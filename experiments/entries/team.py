@@ -17,8 +17,8 @@ from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_
 from steerclear.policies.report import PolicyReport, Reporter
 from steerclear.policies.scripted.team import boat_numbers, game_core
 from steerclear.policies.submissions.stage import ENTRY_FILE
-from steerclear.policies.words import plain_text
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.words import plain_text
 
 from ..spec import ANSWER_S
 from .answers import from_plain

@@ -13,7 +13,7 @@ from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 
 from ..provenance import machine, versions
-from ..store import write_table
+from ..store import told_settings, write_table
 from .settings import TrainingSettings
 
 CURVE, PARQUET_STEM = "curve.json", "curve"
@@ -27,7 +27,7 @@ def write_curve(folder: Path, rows: Sequence[dict[str, Any]], settings: Training
     """
     content = {
         "command": "train",
-        "settings": asdict(settings),
+        "settings": told_settings(asdict(settings)),
         "rows": list(rows),
         "versions": versions(),
         "machine": machine(),

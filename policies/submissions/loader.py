@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.words import describe_error, plain_text
 
-from ..guard import Answer, ForeignCode, GuardedTeam, describe_error
-from ..words import plain_text
+from ..guard import Answer, ForeignCode, GuardedTeam
 from .history import CONFIG_FILE, History, ObservationSettings
 from .interface import METHOD_NAME, check_interface
 from .sandbox import Sandbox

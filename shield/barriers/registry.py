@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from types import ModuleType
 from typing import TypeVar
 
 from ..arrays import NoNumbersError, numbers
+from ..entry_points import load_others
 from ..exceptions import ConfigError
 from ..jit import Array
 
@@ -20,7 +17,6 @@ GROUP = "steerclear.barriers"
 registers some."""
 MOST_VALUES = 64
 """Numbers that one barrier may be given."""
-LOG = logging.getLogger(__name__)
 
 Margin = Callable[[float, float, float, Array], float]
 Slope = Callable[[float, float, float, Array], tuple[float, float]]
@@ -103,24 +99,8 @@ def get_barrier(name: str) -> Barrier:
         ConfigError: there is none.
     """
     if name not in BARRIERS:
-        _load_others()
+        load_others(GROUP, register_barrier)
     if name not in BARRIERS:
         known = ", ".join(sorted(BARRIERS)) or "none"
         raise ConfigError(f"unknown barrier {name!r}; known: {known}; register it first (register_barrier)")
     return BARRIERS[name]
-
-
-@cache
-def _load_others() -> None:
-    for point in entry_points(group=GROUP):
-        _load(point)
-
-
-def _load(point: EntryPoint) -> None:
-    """Load another package's barriers; what is broken there is said and costs no one else theirs."""
-    try:
-        found = point.load()
-        if not isinstance(found, ModuleType):  # a module registers its barriers itself
-            register_barrier(found)
-    except Exception as error:  # another package may raise anything
-        LOG.warning("barriers of %s cannot be loaded: %s: %s", point.value, type(error).__name__, error)

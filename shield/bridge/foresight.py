@@ -129,10 +129,10 @@ class Foresight:
             return 0.0
         return float(np.partition(errors, int(share * (len(errors) - 1)))[int(share * (len(errors) - 1))])
 
-    @property
-    def outside_m(self) -> float:
-        """A boat farther than this from where it was foreseen 2 s ago is far outside its model, m."""
-        return self._limit.outside_m
+    def latest_m(self, boat: str) -> tuple[float, ...]:
+        """How far a boat is at this turn from where it was foreseen, for each of `AHEAD_S`, m; NaN: no telling."""
+        row = self._errors[(self._number - 1) % len(self._errors), self._boats.index(boat)]
+        return tuple(row.tolist())
 
     def outside_s(self, boat: str) -> float:
         """How long a boat has been far outside its model, s."""

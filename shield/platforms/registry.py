@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import logging
 from collections.abc import Callable
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
 from typing import TypeVar
 
+from ..entry_points import load_others
 from ..exceptions import PlatformError
 from .files import is_path, load_platform
 from .platform import Platform
@@ -20,7 +17,6 @@ GROUP = "steerclear.platforms"
 """Entry points of this group name boats of other packages: a `Platform`, a function that builds one, or a module that
 registers some."""
 Boat = TypeVar("Boat", bound="Platform | str | Path | Callable[[], Platform]")
-LOG = logging.getLogger(__name__)
 SHIPPED = Path(__file__).parent / "shipped"
 
 with reference_models():  # proved by the tests: importing them compiles nothing
@@ -68,7 +64,7 @@ def register_platform(boat: Boat) -> Boat:
 
 def known_platforms() -> dict[str, Platform]:
     """All boats by name: ours, those registered here, and those of other packages' entry points."""
-    _load_others()
+    load_others(GROUP, register_platform)
     return dict(PLATFORMS)
 
 
@@ -91,19 +87,3 @@ def get_platform(name: str | Platform) -> Platform:
         known = ", ".join(sorted(boats))
         raise PlatformError(f"unknown platform {name!r}; {hint}known platforms: {known}; or give a file, NAME.yaml")
     return boats[name]
-
-
-@cache
-def _load_others() -> None:
-    for point in entry_points(group=GROUP):
-        _load(point)
-
-
-def _load(point: EntryPoint) -> None:
-    """Load another package's boats; what is broken there is said and costs no one else theirs."""
-    try:
-        found = point.load()
-        if not isinstance(found, ModuleType):  # a module registers its boats itself
-            register_platform(found)
-    except Exception as error:  # another package may raise anything
-        LOG.warning("platforms of %s cannot be loaded: %s: %s", point.value, type(error).__name__, error)

@@ -162,6 +162,7 @@ class ShieldedCallable:
         self.shield: Shield = one_game_shield(shield)
         self.read = read
         self.decisions: Decisions | None = None
+        self._holder = object()
         self._relative = True
         self._failure = ""
 
@@ -170,8 +171,13 @@ class ShieldedCallable:
 
         A policy that raises or answers something else holds all boats; the reason says so, and the log once for each
         thing that is wrong. Before the first usable answer the frame is that of `Commands.relative_deg`.
+
+        Raises:
+            ConfigError: the shield serves another function, team or game since its last `Shield.reset`.
+            FleetError: ``read`` gave no fleet.
         """
         fleet = self.read(seen)
+        check_serving(self.shield, self._holder)
         if not isinstance(fleet, Fleet):
             raise FleetError(f"read answered {type(fleet).__name__}; let it return a Fleet, see Fleet.of")
         try:

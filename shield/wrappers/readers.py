@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
-from functools import cache
-from importlib.metadata import entry_points
 from typing import Any, TypeVar
 
+from ..entry_points import load_others
 from ..exceptions import ConfigError
 from .mctf import MctfReader
 from .pyquaticus import PyquaticusReader
@@ -15,7 +13,6 @@ from .reading import GameReader
 
 GROUP = "steerclear.readers"
 """Entry points of this group name modules of other packages in which readers are registered."""
-LOG = logging.getLogger(__name__)
 Build = TypeVar("Build", bound=Callable[[Any], GameReader])
 _REGISTERED: dict[Callable[[Any], bool], Callable[[Any], GameReader]] = {}
 
@@ -40,7 +37,7 @@ def reader_of(env: Any) -> GameReader:
     Raises:
         ConfigError: nobody reads it.
     """
-    _load_others()
+    load_others(GROUP)
     base = getattr(env, "unwrapped", env)
     for fits, build in reversed(_REGISTERED.items()):
         if fits(base):
@@ -49,15 +46,6 @@ def reader_of(env: Any) -> GameReader:
         f"cannot read a game from {type(base).__name__}; give an MctfEnv, a Pyquaticus env, or use Shield.decide "
         "with a Fleet of your own"
     )
-
-
-@cache
-def _load_others() -> None:
-    for point in entry_points(group=GROUP):
-        try:
-            point.load()
-        except Exception as error:  # another package may raise anything
-            LOG.warning("readers of %s cannot be loaded: %s: %s", point.value, type(error).__name__, error)
 
 
 game_reader(lambda env: hasattr(env, "players") and hasattr(env, "flag_homes"))(PyquaticusReader)

@@ -18,12 +18,17 @@ def begin_serving(shield: Any) -> object:
 
 
 def check_serving(shield: Any, holder: object) -> None:
-    """Refuse a shield that has begun to serve another team or game since.
+    """Refuse a shield that has begun to serve another team or game since; one that serves nobody serves the holder now.
 
     Raises:
         ConfigError: it has.
     """
-    if isinstance(shield, Shield) and shield.serves not in (None, holder):
+    if not isinstance(shield, Shield):
+        return
+    if shield.serves is None:  # somebody reset it
+        shield.serves = holder
+    if shield.serves is not holder:
         raise ConfigError(
-            "this shield has begun to serve another team or game since this one's reset; give each a Shield of its own"
+            "this shield has begun to serve another team or game since this one's reset; give each a Shield of its "
+            "own, or reset() it between them"
         )

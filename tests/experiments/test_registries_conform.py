@@ -1,5 +1,6 @@
 """What is registered conforms, and what does not is told."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,9 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.conformance import NotConforming, check_platform, check_policy, check_reader
 from steerclear.policies.entrants import catalogue
-from steerclear.shield import Shield
+from steerclear.shield import Shield, entry_points
+from steerclear.shield.barriers import registry as barriers
+from steerclear.shield.barriers.registry import Barrier, get_barrier
 from steerclear.shield.exceptions import ConfigError, PlatformError
 from steerclear.shield.platforms import get_platform, known_platforms, register_platform, registry
 from steerclear.shield.wrappers import ShieldedParallelEnv, game_reader, reader_of, readers
@@ -119,19 +122,29 @@ def broken():
 
 def test_entry_points_bring_platforms_and_broken_ones_are_told(apart, monkeypatch, caplog):
     gig = replace(get_platform("heron"), name="gig")
-    monkeypatch.setattr(registry, "entry_points", lambda group: [Point(broken), Point(lambda: gig)])
-    registry._load_others.cache_clear()
+    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken), Point(lambda: gig)])
+    entry_points.load_others.cache_clear()
     assert get_platform("gig") == gig
     assert "platforms of package.boats cannot be loaded: ImportError" in caplog.text
-    registry._load_others.cache_clear()
+    entry_points.load_others.cache_clear()
+
+
+def test_entry_points_bring_barriers_and_broken_ones_are_told(monkeypatch, caplog):
+    monkeypatch.setattr(barriers, "BARRIERS", {})
+    buoy = Barrier("buoy", lambda x, y, ahead, values: math.hypot(x, y) - 3.0)
+    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken), Point(lambda: buoy)])
+    entry_points.load_others.cache_clear()
+    assert get_barrier("buoy") is buoy
+    assert "barriers of package.boats cannot be loaded: ImportError" in caplog.text
+    entry_points.load_others.cache_clear()
 
 
 def test_entry_points_bring_readers_and_broken_ones_are_told(apart, monkeypatch, caplog):
-    monkeypatch.setattr(readers, "entry_points", lambda group: [Point(broken)])
-    readers._load_others.cache_clear()
+    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken)])
+    entry_points.load_others.cache_clear()
     assert isinstance(reader_of(MctfEnv("aamas2024")), MctfReader)
     assert "readers of package.boats cannot be loaded: ImportError" in caplog.text
-    readers._load_others.cache_clear()
+    entry_points.load_others.cache_clear()
 
 
 class Shifted(MctfReader):

@@ -19,6 +19,7 @@ from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.posts import row
 from steerclear.policies.entrants.sight import Boat, look
+from steerclear.shield.entry_points import load_others
 from steerclear.shield.exceptions import PolicyError
 
 SIDES = {"blue": slice(0, 3), "red": slice(3, 6)}
@@ -254,14 +255,14 @@ def test_another_package_enters_a_team_by_an_entry_point(tmp_path, monkeypatch, 
     (info / "entry_points.txt").write_text(f"[{listing.GROUP}]\nteam = their_team\nbroken = there_is_no_such\n")
     monkeypatch.setattr(catalogue, "_ENTRANTS", dict(catalogue._ENTRANTS))
     monkeypatch.syspath_prepend(str(tmp_path))
-    listing._load_others.cache_clear()
+    load_others.cache_clear()
     try:
         assert "theirs" in policies.names()
         assert "entrants of there_is_no_such cannot be loaded: ModuleNotFoundError" in caplog.text
         sent, _ = play("theirs", steps=2)
         assert (sent[..., 0] == 0.0).all()
     finally:
-        listing._load_others.cache_clear()
+        load_others.cache_clear()
 
 
 def test_a_boat_with_the_flag_and_no_way_home_bolts():

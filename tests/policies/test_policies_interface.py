@@ -53,7 +53,7 @@ def test_whatever_can_be_called_is_taken(game, write_entry, load, arguments):
     assert team.act(observations, infos) == {"agent_0": 4}
 
 
-def test_methods_made_while_it_is_built_count_too(write_entry, load):
+def test_methods_made_while_it_is_built_count_too(game, write_entry, load):
     made = """
     class solution:
         def __init__(self):
@@ -61,7 +61,10 @@ def test_methods_made_while_it_is_built_count_too(write_entry, load):
         def compute_action(self):
             return 4
     """
-    load(write_entry(made))
+    env, observations, infos = game
+    team = load(write_entry(made))
+    team.reset(env, ["agent_0"], 0)
+    assert team.act(observations, infos) == {"agent_0": 4}
 
 
 def test_agents_and_functions_that_cannot_be_called_are_refused(game):

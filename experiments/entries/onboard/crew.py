@@ -24,14 +24,13 @@ from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.shield import Shield
 from steerclear.shield.surroundings import Surroundings
+from steerclear.shield.words import describe_error
 
 logger = logging.getLogger("steerclear")
 
 Ask = Callable[[str], Any]
 STOP = (0.0, 0.0)
 UNDECIDED = "shield could not decide"
-LONGEST = 500
-"""Characters of a failure's text."""
 JUMP_M = 5.0
 """A boat that is farther than this beyond its reach from where it was, m, is in another game."""
 
@@ -115,7 +114,7 @@ class Deck:
         try:
             sight = see(self._facts, state)
         except Exception as error:
-            text = described(error)
+            text = describe_error(error)
             self.failures[place] = UNDECIDED, f"the global state cannot be read: {text}"
             _say_once(f"the global state cannot be read ({text}); all boats are told to stop")
             return STOP
@@ -134,7 +133,7 @@ class Deck:
             fleet = fleet_of(self._facts, sight, self._team, self._disabled_s)
             sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
         except Exception as error:  # whatever it is, boats that nobody decides for must stop
-            text = described(error)
+            text = describe_error(error)
             self.failures = dict.fromkeys(self._places, (UNDECIDED, text))
             _say_once(f"the shield could not decide ({text}); all boats are told to stop")
             return dict.fromkeys(self._places, STOP)
@@ -149,11 +148,11 @@ class Deck:
         try:
             action = ask(name)
         except (Exception, SystemExit) as error:  # an entry that calls exit() does not end the game
-            return self._failed(place, f"raised {type(error).__name__}", described(error))
+            return self._failed(place, f"raised {type(error).__name__}", describe_error(error))
         try:
             command = read_action(self._seat(place, sight), action)
         except Exception as error:
-            return self._failed(place, "no action", described(error))
+            return self._failed(place, "no action", describe_error(error))
         if not all(map(math.isfinite, command)):
             return self._failed(place, "not finite", f"{command} is not finite")
         return command
@@ -203,19 +202,6 @@ class Deck:
         fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody, nobody), self._team, self._disabled_s)
         self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
         self._shield.reset()
-
-
-def described(error: BaseException) -> str:
-    """Type, text and place of an error."""
-    try:
-        text = str(error)
-    except Exception:  # its own __str__ may raise, too
-        text = "(no text)"
-    where = error.__traceback__
-    while where is not None and where.tb_next is not None:
-        where = where.tb_next
-    place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
-    return f"{type(error).__name__}: {text}{place}"[:LONGEST]
 
 
 def name_of(facts: Facts, place: int) -> str:

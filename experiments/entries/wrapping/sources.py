@@ -12,7 +12,7 @@ import steerclear.shield
 
 ROOT = "steerclear"
 SHIELD = f"{ROOT}.shield"
-ROOTS = (f"{SHIELD}.shield", f"{SHIELD}.actions", f"{SHIELD}.tracking.driving")
+ROOTS = (f"{SHIELD}.shield", f"{SHIELD}.actions", f"{SHIELD}.tracking.driving", f"{SHIELD}.words")
 """Modules that the crew of a zip uses; `sources` adds what these import."""
 STAND_INS = {
     f"{SHIELD}.jit": "jit",

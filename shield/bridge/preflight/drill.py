@@ -78,7 +78,7 @@ class Drill:
         if math.isnan(self._began_s):
             self._began_s = snapshot.taken_s
         values = np.column_stack([np.zeros(len(snapshot.seen)), np.radians(snapshot.seen[:, 2])])
-        boat, into_s = self._turn_of(snapshot.taken_s)
+        boat, into_s = self.turn_of(snapshot.taken_s)
         if boat:
             i = self._fleet.names.index(boat)
             values[i] = self._wanted(boat, snapshot.seen[i], into_s)
@@ -90,11 +90,18 @@ class Drill:
 
     def take(self, tick: Tick) -> None:
         """See `TickSink`."""
-        boat, _ = self._turn_of(tick.began_s)
+        boat, _ = self.turn_of(tick.began_s)
         reading, sent = tick.readings.get(boat), tick.sent.get(boat)
         if reading is not None:
             told = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
             self.samples[boat].append(DrillSample(tick.began_s, reading, *told, self._is_changed(boat, tick, told)))
+
+    def turn_of(self, time_s: float) -> tuple[str, float]:
+        """Whose turn it is and for how long already, s; no name before and after."""
+        into_s = time_s - self._began_s
+        if not 0.0 <= into_s < self.seconds:
+            return "", 0.0
+        return self._boats[int(into_s / EACH_S)], into_s % EACH_S
 
     def close(self) -> None:
         """Nothing is held."""
@@ -111,13 +118,6 @@ class Drill:
             decided = told[1], told[0]
         turned = abs((decided[1] - heading + math.pi) % (2.0 * math.pi) - math.pi)
         return not (abs(decided[0] - speed) <= SAME_MPS and turned <= SAME_RAD)
-
-    def _turn_of(self, time_s: float) -> tuple[str, float]:
-        """Whose turn it is and for how long already, s; no name before and after."""
-        into_s = time_s - self._began_s
-        if not 0.0 <= into_s < self.seconds:
-            return "", 0.0
-        return self._boats[int(into_s / EACH_S)], into_s % EACH_S
 
     def _wanted(self, boat: str, row: Array, into_s: float) -> tuple[float, float]:
         """Speed m/s and heading rad; speed 0 for a boat nobody sees."""

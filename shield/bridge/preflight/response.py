@@ -13,8 +13,9 @@ import numpy as np
 from ...jit import Array
 from ...platforms import Platform, fresh_state, step_boat
 from ...platforms import layout as L
-from ..foresight import AHEAD_S, TOLD_BY, Foresight
+from ..fleet_file import FleetFile
 from .drill import Drill, DrillSample
+from .missed import Missed, check_model
 from .result import Check, CheckResult
 
 COURSE_DEG = 15.0
@@ -32,36 +33,21 @@ MOST_CHANGED = 0.4
 """Of a drill with a greater share of commands changed too little is left to judge."""
 
 
-def drill_checks(drill: Drill, platforms: dict[str, Platform], dt_s: float, foresight: Foresight) -> list[Check]:
+def drill_checks(drill: Drill, missed: Missed, fleet: FleetFile) -> list[Check]:
     """Checks of a drill that has been driven.
 
     Args:
         drill: with its samples.
-        platforms: by boat's name.
-        dt_s: step of the loop, s.
-        foresight: what the loop measured meanwhile.
+        missed: what the boats' models missed meanwhile.
+        fleet: the file: platforms, step and limits.
     """
-    checks = []
+    checks, dt_s, most_m = [], fleet.dt_s, fleet.limits.model.outside_m
     for boat, samples in drill.samples.items():
+        platform, errors_m = fleet.platform_of[boat], missed.errors_m[boat]
         checks.append(Check(f"course:{boat}", partial(check_course, boat, samples)))
-        checks.append(Check(f"response:{boat}", partial(check_response, boat, samples, platforms[boat], dt_s)))
-        checks.append(Check(f"model:{boat}", partial(check_model, boat, platforms[boat], foresight)))
+        checks.append(Check(f"response:{boat}", partial(check_response, boat, samples, platform, dt_s)))
+        checks.append(Check(f"model:{boat}", partial(check_model, boat, errors_m, platform, most_m, dt_s)))
     return checks
-
-
-def check_model(boat: str, platform: Platform, foresight: Foresight) -> CheckResult:
-    """The boat was where its model foresaw it, near enough that it would not be slowed for it (``limits.model``)."""
-    name, most_m = f"model:{boat}", foresight.outside_m
-    missed_m = [foresight.quantile_m(boat, k) for k in range(len(AHEAD_S))]
-    figures = {f"missed_{ahead:g}s_m": missed for ahead, missed in zip(AHEAD_S, missed_m, strict=True)}
-    words = f"its model misses {'/'.join(f'{missed:.1f}' for missed in missed_m)} m 1/2/3 s ahead (95 of 100)"
-    if missed_m[TOLD_BY] > most_m:
-        text = (
-            f"{words}, and beyond {most_m:g} m it would be slowed and handed over (limits.model); drive "
-            f"steerclear sea-trial, and put what steerclear fit makes of its log in place of {platform.name}"
-        )
-        return CheckResult(name, False, text, figures)
-    return CheckResult(name, True, words, figures)
 
 
 def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:

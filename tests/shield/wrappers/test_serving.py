@@ -8,7 +8,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.wrappers import ShieldedParallelEnv
@@ -60,9 +60,29 @@ def test_one_shield_round_two_games_in_turn_is_refused_and_one_after_the_other_i
 def test_a_reset_of_the_shield_itself_takes_nothing_from_its_wrapper():
     shield = Shield()
     env = ShieldedParallelEnv(MctfEnv(SMALL), shield)
+    still = {agent: 16 for agent in env.possible_agents}
     env.reset(seed=0)
     shield.reset()
-    env.step({agent: 16 for agent in env.possible_agents})
+    env.step(still)
+    assert env.decisions is not None
+    other = ShieldedParallelEnv(MctfEnv(SMALL), shield)
+    other.reset(seed=0)
+    with pytest.raises(ConfigError, match=OTHERS):
+        env.step(still)
+
+
+def test_one_shield_round_two_functions_is_refused_until_its_reset():
+    shield = Shield()
+    fleets = {
+        name: Fleet.of(position_m=[[0, 0]], heading_rad=[0], speed_mps=[1], team=[0], platforms="heron", names=[name])
+        for name in ("one", "other")
+    }
+    one, other = (shield.wrap(lambda seen: Commands.relative_deg([[1.0, 0.0]]), read=fleets.get) for _ in range(2))
+    np.testing.assert_array_equal(one("one").values, [[1.0, 0.0]])
+    with pytest.raises(ConfigError, match=OTHERS):
+        other("other")
+    shield.reset()
+    np.testing.assert_array_equal(other("other").values, [[1.0, 0.0]])
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])

@@ -200,4 +200,4 @@ def test_a_wrapped_policy_may_be_asked_twice_in_one_step():
     policy = Shield.for_game(game).wrap(policies.make("medium"))
     policy.reset(game, game.agents[:3], seed=1)
     for _ in range(3):
-        policy.act(observations, infos)
+        assert set(policy.act(observations, infos)) == set(game.agents[:3])

@@ -10,7 +10,8 @@ from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.foresight import Foresight
 from steerclear.shield.bridge.link import BoatReading, Sent
 from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
-from steerclear.shield.bridge.preflight.response import check_course, check_model, check_response, drill_checks
+from steerclear.shield.bridge.preflight.missed import Missed, check_model
+from steerclear.shield.bridge.preflight.response import check_course, check_response, drill_checks
 from steerclear.shield.bridge.preflight.result import run_checks
 from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.bridge.wanted import Snapshot
@@ -67,19 +68,22 @@ class Water:
 def driven(boats=("blue_1",), bend=None, **water):
     """A drill that has been driven, and the water it was driven on; ``bend(s into it, values)`` stands for a shield."""
     drill, water = Drill(FLEET, boats), Water(**water)
-    water.foresight = Foresight(FLEET, boats)
+    foresight, water.missed = Foresight(FLEET, boats), Missed(drill)
+    water.missed.foresight = foresight
     for k in range(round(drill.seconds / DT_S) + 5):
         now = 50.0 + DT_S * k
         readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}
-        water.foresight.update({name: water.rows[i].copy() for i, name in enumerate(boats)}, readings)
+        foresight.update({name: water.rows[i].copy() for i, name in enumerate(boats)}, readings)
         drill.offer(Snapshot(k, now, water.seen()))
         values = drill.latest().commands.values
         values = values if bend is None else bend(DT_S * k, values.copy())
         sent = {
             name: Sent(name, now, values[i][1], values[i][0], "fake", True) for i, name in enumerate(FLEET.names[:2])
         }
-        water.foresight.sent(sent)
-        drill.take(Tick(k, now, now, now, readings, (), None, None, None, None, False, sent, 0.0))
+        foresight.sent(sent)
+        tick = Tick(k, now, now, now, readings, (), None, None, None, None, False, sent, 0.0)
+        drill.take(tick)
+        water.missed.take(tick)
         water.step(values)
     return drill, water
 
@@ -90,7 +94,7 @@ def good():
 
 
 def test_boats_that_are_what_the_file_says_pass(good):
-    results = run_checks(drill_checks(good[0], dict(FLEET.platform_of), DT_S, good[1].foresight))
+    results = run_checks(drill_checks(good[0], good[1].missed, FLEET))
     assert [r.name for r in results] == [
         f"{kind}:{boat}" for boat in ("blue_1", "blue_2") for kind in ("course", "response", "model")
     ]
@@ -207,20 +211,40 @@ def test_a_boat_that_does_not_move_passes_nothing():
     with reference_models():
         aground = replace(HERON, name="aground", max_speed_mps=0.01)
     drill, water = driven(platform=aground)
-    for check in drill_checks(drill, dict(FLEET.platform_of), DT_S, water.foresight):
+    for check in drill_checks(drill, water.missed, FLEET):
         assert not check.run().passed
+
+
+def model_of(boat, missed):
+    return check_model(boat, missed.errors_m[boat], HERON, FLEET.limits.model.outside_m, DT_S)
 
 
 def test_a_boat_far_from_where_it_is_foreseen_is_to_be_fitted_first():
     """As the loop would slow it: the words name the trial and the fit, the figures what is missed."""
     _, off = driven(reverse=True)
-    result = check_model("blue_1", HERON, off.foresight)
+    result = model_of("blue_1", off.missed)
     assert not result.passed
     assert "steerclear sea-trial" in result.text
     assert "steerclear fit" in result.text
     assert result.figures["missed_2s_m"] > 1.5
     _, same = driven()
-    assert check_model("blue_1", HERON, same.foresight).figures["missed_2s_m"] < 0.05
+    assert model_of("blue_1", same.missed).figures["missed_2s_m"] < 0.05
+
+
+def test_what_is_missed_counts_in_the_boats_own_turn_alone():
+    """In the other's turn it lies still, where any model foresees it: that must not thin its errors out."""
+    _, alone = driven(("blue_1",), reverse=True)
+    _, both = driven(("blue_1", "blue_2"), reverse=True)
+    figures = [model_of("blue_1", water.missed).figures["missed_2s_m"] for water in (alone, both)]
+    assert figures[1] == pytest.approx(figures[0], rel=0.05)
+    assert not model_of("blue_2", both.missed).passed
+
+
+@pytest.mark.parametrize("seen", [0, 30])
+def test_a_boat_that_was_hardly_seen_is_not_passed(seen):
+    result = check_model("blue_1", [(0.0, 0.0, 0.0)] * seen + [(0.0, math.nan, math.nan)] * 200, HERON, 1.5, DT_S)
+    assert not result.passed
+    assert f"for {seen * DT_S:.1f} s of its drill, 5 s are needed" in result.text
 
 
 def test_going_astern_is_found():
