@@ -55,4 +55,5 @@ def test_a_decision_a_second_keeps_the_boats_it_commands(capsys):
             found[when][kind] = sum(hits(game.record)[kind] for game in games)
     with capsys.disabled():
         sys.stderr.write("\n" + "\n".join(f"{when}: {counts}" for when, counts in found.items()) + "\n")
+    assert found["off"]["commanded"] > GAMES, "boats meet"
     assert found["once"]["commanded"] <= 0.1 * found["off"]["commanded"]

@@ -31,4 +31,5 @@ def test_a_fitted_fleet_among_rammers_keeps_its_distance(tmp_path, capsys):
             counts = f"mates {[f.mates for f in found]}, opponents {[f.opponents for f in found]}, closest, m {closest}"
             sys.stderr.write(f"\nshield {'on' if shielded else 'off'}: {counts}\n")
     assert sum(f.mates for f in hits[True]) == 0
+    assert sum(f.opponents for f in hits[False]) > 100, "rammers ram"
     assert sum(f.opponents for f in hits[True]) <= 0.1 * sum(f.opponents for f in hits[False])
