@@ -30,8 +30,8 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     """
     settings = read_config(config)
     folder = out_folder or Path("trainings") / config.stem
-    if settings.algorithm != "cloning" and (find_spec("torch") is None or find_spec("stable_baselines3") is None):
-        raise ConfigError(EXTRA)
+    if settings.algorithm != "cloning":
+        check_extra()
     kept = folder / CONFIG
     if not resume and (folder / "checkpoints").exists():
         raise ConfigError(f"{folder} holds a training already; add --resume to go on with it, or name another --out")
@@ -45,6 +45,16 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     for name in ("curve.json", "best.npz", "final.npz", "model.zip"):
         if (folder / name).exists():
             out().print(f"{folder / name}", soft_wrap=True)
+
+
+def check_extra() -> None:
+    """Refuse what learns where the extra is not installed.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if find_spec("torch") is None or find_spec("stable_baselines3") is None:
+        raise ConfigError(EXTRA)
 
 
 def _training_of(settings: Any, folder: Path, resume: bool) -> Any:

@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..folder_lock import lock_folder
 from ..training.config_file import read_config
 from .console import Interrupted, command, out, progress
-from .train import Config
+from .train import Config, check_extra
 
 Seeds = Annotated[int, typer.Option(metavar="N", min=1, max=100, help="Trainings per cell.")]
 Games = Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Games per cell and held-out opponent.")]
@@ -28,9 +28,10 @@ def train_study(
 
     ``steerclear docs DIR`` makes its page. Exit status: 0 done, 2 bad input, 130 interrupted (the same goes on).
     """
-    from ..training.study import RESULTS, cells, run_study  # needs the extra [train]
-
     settings = read_config(config)
+    check_extra()
+    from ..training.study import RESULTS, cells, run_study
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = lock_folder(folder)

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from steerclear.env.record import save
 from steerclear.experiments import cli
+from steerclear.experiments.commands import train
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.policies.entrants import learned
 from typer.testing import CliRunner
 
 MISTAKES = [
@@ -255,6 +257,16 @@ def test_a_mistake_ends_in_one_line_that_names_the_remedy(line, words, workplace
         assert done.stderr.count("\n") == 1, "one line"
     left = [path.name for path in sorted(workplace.rglob("*")) if path not in before]
     assert left in ([], ["results"], ["logs"]), "nothing was done"
+
+
+@pytest.mark.parametrize("line", ["train learn.yaml --out t", "train-study learn.yaml --out t"])
+def test_who_learns_without_the_extra_is_told_which_it_is(line, workplace, monkeypatch):
+    Path("learn.yaml").write_text((learned.TEAMS / "jin.yaml").read_text(encoding="utf-8"))
+    monkeypatch.setattr(train, "find_spec", lambda name: None)
+    done = CliRunner().invoke(cli.app, shlex.split(line))
+    assert done.exit_code == ExitCode.BAD_INPUT, done.output
+    assert 'pip install "steerclear[train]"' in done.stderr
+    assert not Path("t").exists()
 
 
 def test_the_table_covers_every_command():

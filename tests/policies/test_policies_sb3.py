@@ -143,6 +143,7 @@ def bomb(tmp_path):
 
 
 def test_that_a_model_runs_code_is_said_once_before_it_does(bomb, caplog, monkeypatch):
+    pytest.importorskip("stable_baselines3")
     path, left = bomb("mine")
     seen = []
     monkeypatch.setattr(caplog.handler, "emit", lambda record: seen.append((record.getMessage(), left.exists())))
@@ -160,6 +161,7 @@ def test_a_model_among_entries_is_refused_unless_allowed(bomb, folder):
     with pytest.raises(PolicyError, match=r"runs code .* among entries of others .*allow_code=True"):
         policies.make(f"sb3:{path}")
     assert not left.exists()
+    pytest.importorskip("stable_baselines3")
     with pytest.raises(PolicyError, match="cannot be loaded as PPO"):
         policies.make(f"sb3:{path}", allow_code=True)
     assert left.exists()
