@@ -61,6 +61,8 @@ class ShieldConfig:
             0.2 to 1 microsecond each; it then sends the best that it has verified and says so
             (`Decision.cut_short`). Counted in work, so that the same inputs give the same bits on any machine; at least
             1000, which lets six boats look at every manoeuvre; inf: no limit.
+        dwell_s: least time for which boats of kind "rate", which turn at once, carry on with a backup from opponents
+            that keep them short of `margin_cap_m`; 0: none. Other boats' autopilots smooth what they are told.
         hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
         position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
@@ -100,6 +102,7 @@ class ShieldConfig:
     tail_s: float = 5.0
     horizon_s: float | None = None
     search_limit: float = 200_000.0
+    dwell_s: float = 0.4
     hysteresis_m: float = 0.3
     speed_weight: float = 0.1
     position_error_m: float = 0.0
@@ -195,6 +198,7 @@ _RANGES = {
     "move_s": (0.01, 1.0),
     "horizon_s": (0.0, 120.0),
     "tail_s": (0.0, 60.0),
+    "dwell_s": (0.0, 10.0),
     "delay_s": (0.0, 10.0),
     "search_limit": (1e3, math.inf),
 }

@@ -23,6 +23,7 @@ class Memory(NamedTuple):
         joint_m: of boats that look opponents up, the least on runs of several, 0 where there were none.
         static_m: the margin from static constraints, 0 where it was not looked at.
         backing_up: whether the boat was carrying it out at the last decision.
+        dwell_s: how long it still carries on with it whatever is wanted, s.
         pressed_s: how long a team-mate alongside has kept the boat from turning where it wants, or how long it has
             given way to it, see `right_of_way`.
         pressed_deg: heading it had when that began.
@@ -40,6 +41,7 @@ class Memory(NamedTuple):
     joint_m: Array
     static_m: Array
     backing_up: BoolArray
+    dwell_s: Array
     pressed_s: Array
     pressed_deg: Array
     free_s: Array
@@ -60,6 +62,7 @@ def new_memory(*shape: int) -> Memory:
             joint_m=np.zeros(shape),
             static_m=np.zeros(shape),
             backing_up=np.zeros(shape, np.bool_),
+            dwell_s=np.zeros(shape),
             pressed_s=np.zeros(shape),
             pressed_deg=np.zeros(shape),
             free_s=np.zeros(shape),
@@ -81,6 +84,7 @@ def take_memory(games: Memory, game: int, own: Memory) -> None:
     own.joint_m[:] = games.joint_m[game]
     own.static_m[:] = games.static_m[game]
     own.backing_up[:] = games.backing_up[game]
+    own.dwell_s[:] = games.dwell_s[game]
     own.pressed_s[:] = games.pressed_s[game]
     own.pressed_deg[:] = games.pressed_deg[game]
     own.free_s[:] = games.free_s[game]
@@ -100,6 +104,7 @@ def put_memory(own: Memory, game: int, games: Memory) -> None:
     games.joint_m[game] = own.joint_m
     games.static_m[game] = own.static_m
     games.backing_up[game] = own.backing_up
+    games.dwell_s[game] = own.dwell_s
     games.pressed_s[game] = own.pressed_s
     games.pressed_deg[game] = own.pressed_deg
     games.free_s[game] = own.free_s

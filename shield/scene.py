@@ -46,6 +46,7 @@ class Boats(NamedTuple):
         plans: backup manoeuvres each boat looks at, the first so many of the family, (n,).
         decay: factor by which each boat's margin may shrink in one step; 0 lets it fall to 0 at once, (n,).
         cap_m: margins above this may shrink freely, (n,), m.
+        dwell_s: least time each boat carries on with a backup from opponents, (n,), s.
         tables: value tables.
         table: table of each own boat (row) with each opponent (column), -1 for none, (n, n).
         table_margin_m: added to the radius where a table is looked into, m.
@@ -79,6 +80,7 @@ class Boats(NamedTuple):
     plans: IntArray
     decay: Array
     cap_m: Array
+    dwell_s: Array
     tables: Tables
     table: IntArray
     table_margin_m: float

@@ -119,6 +119,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
             ),
             cap_m=np.where(with_table, _table_cap(config, lookup), config.margin_cap_m),
+            dwell_s=np.array([config.dwell_s if kind.kind == "rate" else 0.0 for kind in kinds]),
             tables=lookup.tables,
             table=lookup.table,
             table_margin_m=config.table_margin_m,

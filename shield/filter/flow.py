@@ -33,8 +33,27 @@ PASSES, TO_SOLVE, TO_BACK_UP = range(3)
 NO_ANSWER, UNSAFE, SAFE = range(3)
 """What an answer of the program comes to: none that can be sent, one that fails the exact check, one that passes."""
 
+ROUNDING_S = 1e-9
+"""Times this short are none: what is left of a sum of steps."""
+
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
+
+
+@lean_kernel
+def _note_backing_up(i: int, scene: Scene) -> None:
+    """Note whether boat i is on its backup, and for how long it stays so at least.
+
+    On the bound of what it must keep a boat would else take up the wanted command and its backup in turn, from step to
+    step, and one that turns at once would do so from side to side.
+    """
+    memory, reason = scene.memory, scene.plan.reason[i]
+    backing_up = reason in (BACKUP, BEST_EFFORT)
+    left_s = 0.0
+    if backing_up:
+        left_s = (memory.dwell_s[i] if memory.backing_up[i] else scene.boats.dwell_s[i]) - scene.tuning.dt_s
+    memory.dwell_s[i] = left_s if left_s > ROUNDING_S else 0.0
+    memory.backing_up[i] = backing_up
 
 
 @lean_kernel
@@ -44,7 +63,7 @@ def commit(scene: Scene) -> None:
     Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
     of a manoeuvre are not: another may trade one for the other, so for other boats the least counts for all.
     """
-    ours, boats, memory, work, plan = scene.ours, scene.boats, scene.memory, scene.work, scene.plan
+    ours, boats, memory, work = scene.ours, scene.boats, scene.memory, scene.work
     for i in range(ours.shape[0]):
         if not ours[i]:
             memory.kept[i] = False
@@ -66,7 +85,7 @@ def commit(scene: Scene) -> None:
             copy_row(memory.threat_m[i], work.threats_m[i])
         else:
             memory.threat_m[i, :] = work.threat_m[i]
-        memory.backing_up[i] = plan.reason[i] == BACKUP or plan.reason[i] == BEST_EFFORT
+        _note_backing_up(i, scene)
         note_pressing(i, scene)
 
 

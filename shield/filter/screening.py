@@ -40,6 +40,8 @@ def set_targets(scene: Scene) -> None:
 
     What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
     be let go at once. That from team-mates of ours shrinks freely until it is small: what they will do is known.
+
+    A boat that dwells on its backup gives nothing of it away: all there may be is asked for.
     """
     ours, boats, tuning, memory, work = scene.ours, scene.boats, scene.tuning, scene.memory, scene.work
     for i in range(ours.shape[0]):
@@ -56,7 +58,8 @@ def set_targets(scene: Scene) -> None:
             work.static_target_m[i] = tuning.static_decay * max(0.0, min(memory.static_m[i], tuning.margin_cap_m))
             for j in range(ours.shape[0]):
                 most = min(boats.cap_m[i], _most_known(i, j, boats, work))
-                work.threat_target_m[i, j] = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
+                kept = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
+                work.threat_target_m[i, j] = most if memory.dwell_s[i] > 0.0 else kept
 
 
 @lean_kernel

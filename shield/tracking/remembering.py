@@ -21,6 +21,7 @@ _OWN = (
     "joint_m",
     "static_m",
     "backing_up",
+    "dwell_s",
     "pressed_s",
     "pressed_deg",
     "free_s",
