@@ -90,11 +90,13 @@ def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[
             pages[name] = text
             pictures += picture
     dials = [content for content in results if is_dial(content)]
+    if len(dials) == 1:  # one point is no trade: an ablation like any other
+        dials = []
     if dials:
         name, text, picture = price_page(dials, folder)
         pages[name] = text
         pictures += picture
-    for content in (one for one in results if one.get("command") not in POOLED and not is_dial(one)):
+    for content in (one for one in results if one.get("command") not in POOLED and one not in dials):
         name, text, picture = _page_of(content, folder)
         pages[name] = text
         pictures += picture

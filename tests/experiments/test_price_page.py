@@ -4,6 +4,7 @@ import json
 import math
 
 import pytest
+from steerclear.experiments import docs_pages
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.campaign import Played
 from steerclear.experiments.docs_pages import write_pages
@@ -50,6 +51,12 @@ def test_a_row_for_each_time_the_least_first(tmp_path):
     ]
     assert "12.5" in far
     assert (tmp_path / "price.png").stat().st_size > 10_000
+
+
+def test_a_single_time_is_an_ablation_and_no_trade(tmp_path, monkeypatch):
+    monkeypatch.setattr(docs_pages, "_page_of", lambda content, folder: ("ablation.md", str(content["settings"]), []))
+    pages = write_pages([ablation({"profile": "players"}, 7.75, 0.25)], tmp_path)
+    assert [page.name for page in pages] == ["json_keys.md", "settings.md", "ablation.md"]
 
 
 def test_fear_without_end_stays_so_in_results():
