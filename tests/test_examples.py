@@ -60,6 +60,12 @@ def decided(text, capsys):
     return capsys.readouterr().out.strip()
 
 
+def test_the_tutorial_compares_the_same_games_without_a_shield_and_with_one():
+    page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    without, with_it = [line for line in page.splitlines() if line.startswith(".venv/bin/steerclear evaluate")]
+    assert with_it == f"{without} --shield"
+
+
 def test_the_tutorial_explains_what_its_program_prints(capsys):
     page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
     text = (EXAMPLES / "first_decision.py").read_text(encoding="utf-8")

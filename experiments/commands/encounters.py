@@ -86,10 +86,8 @@ def encounters(
                 "--noise": noise != 0.0,
                 "--current": current != 0.0,
                 "--seed": seed != 0,
-                "--jobs": workers is not None,
-                "--resume": resume,
-                "--json": json_file is not None,
-            }
+            },
+            {"--jobs": workers is not None, "--resume": resume, "--json": json_file is not None},
         )
         finish(play_scene_files(scene, guards, folder, not no_judge))
         return
@@ -110,17 +108,19 @@ def encounters(
     finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
 
 
-def _refuse_beside_scenes(given: dict[str, bool]) -> None:
-    """Options of drawn encounters say nothing about scenes.
+def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> None:
+    """Options of drawn encounters say nothing about scenes: what a scene file holds, and what is for many games.
 
     Raises:
         ConfigError: one of them was given.
     """
-    named = [option for option, is_given in given.items() if is_given]
-    if named:
-        raise ConfigError(
-            f"{', '.join(named)} beside --scene: a scene file holds its own; leave it out, or edit the file"
-        )
+    for given, why in (
+        (held, "a scene file holds its own; leave it out, or edit the file"),
+        (unused, "scenes are played one after another and leave no results; leave it out"),
+    ):
+        named = [option for option, is_given in given.items() if is_given]
+        if named:
+            raise ConfigError(f"{', '.join(named)} beside --scene: {why}")
 
 
 def platform_pairs(text: str) -> tuple[Pair, ...]:

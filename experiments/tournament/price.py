@@ -48,7 +48,7 @@ def _price(team: str, pairs: Sequence[tuple[Row, Row]], seed: int) -> dict[str, 
         "hits_off": float(hits[:, 0].mean()) if len(seen) else None,
         "hits_on": float(hits[:, 1].mean()) if len(seen) else None,
         "hits": _plain(mean_interval(hits[:, 1] - hits[:, 0], seed)),
-        "kept": keeps(net),
+        "kept": keeps(net) if net.any() or captures.any() else None,
         "margin": _plain(bootstrap_interval(net.astype(np.float64), _margin, seed)),
         **avoidable([(after, side) for _, after, side in seen]),
     }

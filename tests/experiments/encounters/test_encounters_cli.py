@@ -103,7 +103,8 @@ def _breaching(measure_chunk):
         (["--workers", "0"], "at least 1"),
         (["--resume"], "--resume needs the --out"),
         (["--scene", "missing.json"], "cannot read a scene from missing.json"),
-        (["--scene", "missing.json", "--radius", "4", "--resume"], "--radius, --resume beside --scene"),
+        (["--scene", "missing.json", "--radius", "4", "--n", "3"], "--n, --radius beside --scene: a scene file holds"),
+        (["--scene", "missing.json", "--jobs", "1", "--resume"], "--jobs, --resume beside --scene: scenes are played"),
     ],
 )
 def test_bad_input_is_one_line_and_status_two(arguments, words):

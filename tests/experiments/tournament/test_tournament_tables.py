@@ -136,6 +136,12 @@ def test_a_team_keeps_its_net_captures(off, on, kept):
     assert score_of(np.zeros(9), 0.25) == 0.0
 
 
+def test_where_nobody_captures_nothing_is_kept():
+    rows = [game("a", "b", 0, state) for state in ("off", "all")]
+    line = prices(rows, ["a"], "off", "all", 0)[0]
+    assert (line["kept"], _kept(line)) == (None, "-")
+
+
 def test_a_loss_that_may_be_chance_is_called_unsure():
     rows = [game("a", "b", k, "off") for k in range(6)] + [
         game("a", "b", k, "all", red_captures=k % 2) for k in range(6)
