@@ -154,8 +154,8 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     lines += [f"![off and on]({path.name})\n" for path in plots]
     for summary in content["pairings"]:
         lines += [f"## {line(summary['pairing'])}", "", *_metrics_table(summary), ""]
-        if summary.get("verdicts"):
-            lines += ["Breaches judged in hindsight:", "", *table(HEADS, _verdicts(summary)), ""]
+        if verdicts := verdict_rows(summary.get("verdicts") or {}, interval_text):
+            lines += ["Breaches judged in hindsight:", "", *table(HEADS, verdicts), ""]
         if summary["reasons"]:
             lines += [_reasons_line(summary["reasons"]), ""]
     if content["bars"]:
@@ -209,10 +209,6 @@ def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
         for figures in summary["metrics"].values()
     ]
     return table(["", *(head for _, head in present)], rows)
-
-
-def _verdicts(summary: Mapping[str, Any]) -> list[list[str]]:
-    return verdict_rows(summary["verdicts"], interval_text)
 
 
 def _reasons_line(reasons: Mapping[str, int]) -> str:

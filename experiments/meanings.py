@@ -26,6 +26,7 @@ FIGURES = {
     "decision_p99_us": "99 of 100 decisions took no longer, microseconds",
     "deadlocks": "pairs of own boats that wanted to move and stood still for over 10 s",
     "reversals_per_boat_minute": "changes of the commanded side of turn (beyond 5°), per boat and minute",
+    "collisions": "as the game counts them for the score: once a decision and for each own boat in one",
     "primary": "captures − captures against − penalty × collisions",
     "secondary": "grabs + tags − grabs against − tags against",
 }

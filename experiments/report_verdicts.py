@@ -17,8 +17,8 @@ def verdict_tables(pairings: Sequence[Mapping[str, Any]]) -> str:
     """Write a table of verdicts per pairing; results of earlier versions have none."""
     tables = []
     for pairing in pairings:
-        verdicts = pairing.get("verdicts")
-        body = _table(HEADS, verdict_rows(verdicts, interval_text)) if verdicts else "<p>Not judged.</p>"
+        rows = verdict_rows(pairing.get("verdicts") or {}, interval_text)
+        body = _table(HEADS, rows) if rows else "<p>Not judged.</p>"
         tables.append(f'<section class="card wide"><h3>{as_text(pairing["pairing"])}</h3>{body}</section>')
     return "".join(tables)
 

@@ -101,19 +101,19 @@ def metrics_of(radii_m: Sequence[float], seed: int = 0) -> list[Metric]:
         Metric("changed_share", "steps changed, %", partial(_changed_percent, seed), only_on=True),
         *_shield_means(seed),
         _counted("deadlocks", "deadlocks"),
-        *(
-            Metric(name, label, partial(_mean, name, seed), partial(_number, name))
-            for name, label in (
-                ("reversals_per_boat_minute", "reversals/min"),
-                ("primary", "primary score"),
-                ("secondary", "secondary score"),
-            )
-        ),
+        _averaged("reversals_per_boat_minute", "reversals/min", seed),
+        _counted("collisions", "collisions scored"),
+        _averaged("primary", "primary score", seed),
+        _averaged("secondary", "secondary score", seed),
     ]
 
 
 def _counted(name: str, label: str) -> Metric:
     return Metric(name, label, partial(_count, name), partial(_number, name), counted=True)
+
+
+def _averaged(name: str, label: str, seed: int) -> Metric:
+    return Metric(name, label, partial(_mean, name, seed), partial(_number, name))
 
 
 def _shield_means(seed: int) -> list[Metric]:

@@ -40,15 +40,14 @@ def pairing_table(summary: Mapping[str, Any]) -> Group:
     return titled(title, ["", *(head for _, head in shown)], rows)
 
 
-def verdict_table(summary: Mapping[str, Any]) -> Group:
-    """Build the table of what the oracle says about a pairing's breaches.
+def verdict_table(summary: Mapping[str, Any]) -> Group | None:
+    """Build the table of what the oracle says about a pairing's breaches; None where it was not asked.
 
     Args:
         summary: as `summary.summarise` returns it.
     """
-    return titled(
-        "Breaches judged in hindsight", SHORT_HEADS, verdict_rows(summary.get("verdicts") or {}, interval_text)
-    )
+    rows = verdict_rows(summary.get("verdicts") or {}, interval_text)
+    return titled("Breaches judged in hindsight", SHORT_HEADS, rows) if rows else None
 
 
 def titled(
@@ -159,6 +158,7 @@ def _game_lines(radii_m: Sequence[float]) -> list[tuple[str, str]]:
         ("mean_speed_change_mps", "mean change, m/s"),
         ("decision_p50_us", "decision p50, us"),
         ("decision_p99_us", "decision p99, us"),
+        ("collisions", "collisions scored"),
         ("primary", "primary score"),
         ("secondary", "secondary score"),
         ("policy_failures", "policy failures"),

@@ -90,11 +90,15 @@ def without_breaches(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[str]]:
     """Lay out a summary of verdicts, a line per shield state and kind, under `HEADS`.
 
+    There are none where no game was judged.
+
     Args:
         verdicts: as `summarise_verdicts` returns them; empty for results of an earlier version.
         interval_text: writes a figure.
     """
-    lines = []
+    lines: list[list[str]] = []
+    if not any((verdicts.get(state) or {}).get("games_judged") for _, state in _STATES):
+        return lines
     for state in ("off", "on"):
         part = verdicts.get(state) or {}
         if part.get("games"):

@@ -111,7 +111,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for summary in results["pairings"]:
         console.print(pairing_table(summary))
-        console.print(verdict_table(summary))
+        if (judged := verdict_table(summary)) is not None:
+            console.print(judged)
         console.print()
     if results["pairings"]:
         console.print(f"{HITS_WORDS}\n", soft_wrap=True)
