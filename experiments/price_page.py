@@ -36,6 +36,15 @@ def is_dial(content: Mapping[str, Any]) -> bool:
     return content.get("command") == "ablate" and bool(set(_DIALS) & set(shield))
 
 
+ADVICE = (
+    "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats are "
+    "slow to get away (surveyors that hold still are what single rammers hit: see "
+    "[encounters by family](measured/comparison.md), `at_rest`), and on boats, as `FLEET.yaml` does; `hold-course` "
+    "where opponents are traffic and not a team."
+)
+"""Beside the figures: which of the profiles is for whom."""
+
+
 def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
     """Name and text of the page, and its pictures.
 
@@ -50,7 +59,7 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
         "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is "
         "for those on our side of the field (`visitor_s`), which can tag nobody there."
     )
-    lines = ["# Safety and its price", "", MADE, "", words, ""]
+    lines = ["# Safety and its price", "", MADE, "", words, "", ADVICE, ""]
     picture = folder / f"{STEM}.png"
     _plot(groups, picture)
     lines += [f"![hits against changed commands]({picture.name})", ""]
