@@ -113,9 +113,11 @@ def short_limit(value: float) -> str:
 
 
 def number_text(value: float | None) -> str:
-    """Write a number with about three digits."""
+    """Write a number with about three digits, a whole one (int) as it is."""
     if value is None or value != value:
         return "-"
+    if isinstance(value, int):
+        return f"{value:,}"
     size = abs(round(value, 2))
     return f"{value:,.0f}" if size >= 100 else f"{value:.1f}" if size >= 10 else f"{value:.2f}"
 
