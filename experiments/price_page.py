@@ -37,8 +37,8 @@ def is_dial(content: Mapping[str, Any]) -> bool:
 
 
 ADVICE = (
-    "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats are "
-    "slow to get away (surveyors that hold still are what single rammers hit: see "
+    "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats "
+    "are slow to get away (surveyors that hold still are what single rammers hit: see "
     "[encounters by family](measured/comparison.md), `at_rest`), and on boats, as `FLEET.yaml` does; `hold-course` "
     "where opponents are traffic and not a team."
 )
