@@ -49,6 +49,29 @@ def test_bad_input_is_one_line(tiny, tmp_path):
     assert "is not a Stable-Baselines3 model" in result.output
 
 
+@pytest.mark.parametrize(
+    ("shield_settings", "words"),
+    [
+        ({"dwellll_s": 1}, "unknown shield setting 'dwellll_s'"),
+        ({"profile": "pirates"}, "pirates"),
+        ({"separation_m": 500}, "the shorter side of the field, 40 m"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["none", "deployment", "training"])
+def test_a_bad_shield_setting_is_found_before_the_first_rollout(tiny, tmp_path, shield_settings, words, mode):
+    result = call("train", tiny(shield=mode, shield_settings=shield_settings), "--out", tmp_path / "x")
+    assert result.exit_code == 2
+    assert words in result.output
+    assert not list(tmp_path.glob("x/checkpoints/*"))
+
+
+def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_path):
+    result = call("train", tiny(shield="deployment", shield_settings={"dt_s": 0.7}), "--out", tmp_path / "x")
+    assert result.exit_code == 2
+    assert "0.7 s" in result.output
+    assert not list(tmp_path.glob("x/checkpoints/*"))
+
+
 def test_every_team_has_a_config_that_can_be_read():
     found = sorted((ROOT / "policies/entrants/learned/teams").glob("*.yaml"))
     assert {path.stem for path in found} == {"crowley", "jin", "leprell", "ours", "richley"}
