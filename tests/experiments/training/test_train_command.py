@@ -24,11 +24,35 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     assert again.exit_code == 2
     assert "add --resume" in again.output
     files = "--out", tmp_path / "team.npz", "--submission", tmp_path / "solution.zip"
-    assert call("export", folder / "model.zip", *files).exit_code == 0
+    exported = call("export", folder / "model.zip", *files)
+    assert exported.exit_code == 0
+    assert exported.output.count("for games of preset aamas2024") == 2
     for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
         played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
         assert played.exit_code == 0, played.output
+    for words in (
+        ("entry", "check", tmp_path / "solution.zip", "--preset", "mctf2026", "--max-time", 3),
+        ("play", "--own", f"weights:{tmp_path / 'team.npz'}", "--opponent", "hold", "--set", "team_size=2"),
+    ):
+        elsewhere = call(*words)
+        assert elsewhere.exit_code == 2
+        assert "take" in elsewhere.output
+        assert "--preset aamas2024" in elsewhere.output
+
+
+def test_a_training_without_a_terminal_tells_how_far_it_is(tiny, tmp_path, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.commands.plain_progress.EVERY_S", 0.0)
+    first = call("train", tiny(decisions=36), "--out", tmp_path / "run")
+    assert first.exit_code == 0
+    said = [line for line in first.stderr.splitlines() if line.startswith("decisions: ")]
+    assert said[0] == "decisions: 0 of 36"
+    for words in ("decisions: 36 of 36, stage ", "captures ", "against ", "hits ", "decisions/s"):
+        assert words in said[-1]
+    assert "nothing was left" not in first.stderr
+    again = call("train", tiny(decisions=36), "--out", tmp_path / "run", "--resume")
+    assert again.exit_code == 0
+    assert "nothing was left to do: all 36 decisions were made before" in again.stderr
 
 
 def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
