@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from inspect import Parameter, signature
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import yaml
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands import train
 from steerclear.experiments.folder_lock import _HELD
+from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
 from typer.testing import CliRunner
 
@@ -111,6 +113,14 @@ def test_playing_exported_weights_needs_no_torch():
         "assert not any(name.split('.')[0] in ('torch', 'stable_baselines3') for name in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", words], timeout=120, check=False).returncode == 0
+
+
+def test_the_page_lists_every_option_of_the_environment_with_its_default():
+    page = (ROOT / "docs" / "train.md").read_text()
+    for name, one in signature(make_learners).parameters.items():
+        if one.kind is not Parameter.VAR_KEYWORD:
+            default = f'"{one.default}"' if isinstance(one.default, str) else one.default
+            assert f"| `{name}` | `{default}` |" in page
 
 
 @pytest.mark.parametrize("command", ["train", "export", "train-study"])
