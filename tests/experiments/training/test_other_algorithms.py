@@ -90,6 +90,7 @@ def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(
     assert all((one == two).all() for one, two in zip(pair.weights, play.weights, strict=True))
     assert len(pair.carriers) == 3
     again = training_of(settings, tmp_path / "run", True)  # the first part is kept
+    assert again.decisions == 72  # nothing is left
     again.run()
     assert again.decisions == 72
 
