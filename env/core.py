@@ -10,6 +10,7 @@ import numpy as np
 from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.plan import LARGEST_COMMAND
 from steerclear.shield.shared import share
 
 from .advance import (
@@ -174,7 +175,7 @@ class BatchedMctf:
             New array (B, n, 2), same units.
 
         Raises:
-            GameError: wrong shape, or an action is not finite.
+            GameError: wrong shape, or an action is not finite or beyond `LARGEST_COMMAND`.
         """
         wanted = self._checked("actions", actions)
         decided = np.empty_like(self._commands)
@@ -188,7 +189,7 @@ class BatchedMctf:
         go on under the same speed and relative heading.
 
         Raises:
-            GameError: wrong shape, or a command is not finite.
+            GameError: wrong shape, or a command is not finite or beyond `LARGEST_COMMAND`.
         """
         given = self._obeyed(commands)
         begin_decision(self.rules, self.games)
@@ -303,7 +304,20 @@ class BatchedMctf:
             ) from None
         if array.shape != self._commands.shape:
             raise GameError(f"{name} have shape {array.shape}; give {self._commands.shape}: speed m/s, heading deg")
+        self._refuse_huge(name, array)
         return array
+
+    def _refuse_huge(self, name: str, array: Array) -> None:
+        """Refuse finite numbers so large that the motion would overflow; others are refused where they are read."""
+        if not np.abs(array).max(initial=0.0) > LARGEST_COMMAND:
+            return
+        huge = np.isfinite(array) & (np.abs(array) > LARGEST_COMMAND)
+        if huge.any():
+            game, boat, _ = np.argwhere(huge)[0]
+            raise GameError(
+                f"{name.removesuffix('s')} of agent_{boat} in game {game} is beyond {LARGEST_COMMAND:g}; "
+                "give speed m/s and heading deg"
+            )
 
     def _checked_sight(self, seen: Any) -> Array:
         array = np.array(seen, dtype=np.float64, order="C")

@@ -140,15 +140,6 @@ def _settings_by_side(spec: MatchSpec) -> dict[str, Mapping[str, Any] | None]:
     return {spec.side: spec.shield, other: spec.opponent_shield}
 
 
-def check_shield(settings: Mapping[str, Any]) -> None:
-    """Check settings without a game.
-
-    Raises:
-        ConfigError: a setting is unknown or out of range.
-    """
-    ShieldConfig.of(**settings)
-
-
 def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
     config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, "separation_m": RADII_M[0], **settings})
     reader = None if shielding.sea is None else shielding.sea.reader()

@@ -22,6 +22,7 @@ from ..faults import fault_words, machine_words
 from ..pool import interrupted_by_sigterm
 from ..terminal import SafeConsole
 from .files import check_files
+from .plain_progress import PlainProgress
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 COMPILING_WORDS = "compiling for this machine, once: a minute or two (steerclear warm-up does it beforehand)"
@@ -139,10 +140,16 @@ def finish(passed: bool) -> None:
 
 @contextmanager
 def progress(words: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on stderr where that is a terminal; call what it yields with the number of finished jobs."""
+    """Show progress on stderr; call what it yields with the number of finished jobs.
+
+    On a terminal that is a bar, elsewhere a plain line now and then.
+    """
+    console = err()
+    if not console.is_terminal:
+        yield PlainProgress(words, total, console)
+        return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
     columns += (TextColumn("left"), TimeRemainingColumn())
-    console = err()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(words, total=total)
         yield lambda done: bar.update(task, completed=done, refresh=True)

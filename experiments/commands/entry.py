@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
 from ..ablation import AblationSettings, spec_of
@@ -23,7 +24,7 @@ from ..spec import ANSWER_S
 from ..store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
-from .games import check_complete, default_folder, run_games
+from .games import check_complete, default_folder, run_games, say_of_distance
 
 app = typer.Typer(
     help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
@@ -171,6 +172,7 @@ def wrap(
     tried, settings = made.pop("tried"), made["shield"]
     if tried["failures"]:
         err().print(f"warning: {headline(tried)}; its shield tells them to stop", markup=False, soft_wrap=True)
+    say_of_distance(settings["separation_m"], GameConfig.preset(preset))
     console = out()
     words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
     console.print(words, markup=False, soft_wrap=True)

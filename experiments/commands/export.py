@@ -12,11 +12,17 @@ from steerclear.policies.entrants.learned.sb3_file import read_sb3
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..training.checkpoints import is_checkpoint, network_in
 from ..training.submission import write_submission
 from .console import command, out
 from .files import check_ending
 
-Model = Annotated[Path, typer.Argument(metavar="MODEL", help="A model.zip of PPO or A2C, or exported weights (.npz).")]
+Model = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL", help="A model.zip of PPO or A2C, exported weights or a training's checkpoint (.npz)."
+    ),
+]
 Weights = Annotated[Path | None, typer.Option("--out", metavar="FILE.npz", help="Where the weights go.")]
 Submission = Annotated[
     Path | None, typer.Option("--submission", metavar="FILE.zip", help="Where a competition entry goes.")
@@ -39,15 +45,16 @@ def export(model: Model, file: Weights = None, submission: Submission = None, in
     if interval is not None and not 1 <= interval <= 1000:
         raise ConfigError(f"--interval is {interval}; give 1 to 1000")
     network = _read(model, interval)
+    game = f"for games of preset {network.preset}" if network.preset else "for games of the preset it learned in"
     if file is not None:
-        out().print(f"{write_weights(network, file)}: play it as weights:{file}", soft_wrap=True)
+        out().print(f"{write_weights(network, file)}: {game}; play it as weights:{file}", soft_wrap=True)
     if submission is not None:
-        out().print(f"{write_submission(network, submission)}", soft_wrap=True)
+        out().print(f"{write_submission(network, submission)}: {game}", soft_wrap=True)
 
 
 def _read(model: Path, interval: int | None) -> Network:
     if model.suffix.lower() == ".npz":
-        network = read_weights(model)
+        network = network_in(model) if is_checkpoint(model) else read_weights(model)
         return network if interval is None else _held(network, interval)
     return read_sb3(model, interval)
 

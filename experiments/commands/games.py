@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..ablation import AblationSettings
@@ -15,10 +16,10 @@ from ..campaign import Campaign, Played
 from ..conditions import words_of
 from ..engines import Workers
 from ..judging import check_judge
+from ..kept_distance import check_shield, words_of_less
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..sea import check_current
-from ..shielding import check_shield
 from ..store import LINES_FILE, ResultStore
 from ..tables import bars_table, pairing_table, verdict_table
 from ..tally import RADII_M
@@ -45,12 +46,21 @@ def check_settings(settings: AblationSettings) -> None:
         raise ConfigError(f"--games must be at least 1 and at most {MOST_GAMES:,}; got {settings.games:,}")
     check_penalty(settings.penalty)
     check_judge(settings.judge)
-    check_shield(settings.shield)
+    game = settings.specs()[0].config()
+    kept_m = check_shield(settings.shield, game).separation_m
+    if any(settings.states):
+        say_of_distance(kept_m, game)
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
     try_policies((settings.own, *settings.opponents), settings.trust)
-    check_current(settings.conditions, settings.specs()[0].config())
+    check_current(settings.conditions, game)
+
+
+def say_of_distance(kept_m: float, game: GameConfig) -> None:
+    """Say, once a command, that its shield keeps less than the distance at which the game counts collisions."""
+    if words := words_of_less(kept_m, game):
+        warn(words)
 
 
 def default_folder(command: str) -> Path:

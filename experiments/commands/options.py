@@ -8,12 +8,12 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 from steerclear.env.config import GameConfig
 from steerclear.shield.config import PROFILES
 from steerclear.shield.exceptions import ConfigError
 
+from ..kept_distance import counted_m
 from ..tally import RADII_M
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
@@ -134,8 +134,8 @@ def with_distance(shield: dict[str, Any], preset: str, rules: dict[str, Any]) ->
     Raises:
         ConfigError: a rule is unknown or unusable.
     """
-    radius_m = float(np.max(GameConfig.preset(preset, **rules).agent_radius_m))
-    counted = {} if 2.0 * radius_m <= RADII_M[0] else {"separation_m": 2.0 * radius_m}
+    metres = counted_m(GameConfig.preset(preset, **rules))
+    counted = {} if metres <= RADII_M[0] else {"separation_m": metres}
     return {**counted, **shield}
 
 

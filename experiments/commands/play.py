@@ -17,16 +17,17 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..conditions import Conditions
 from ..failure_words import held_games
+from ..kept_distance import check_shield
 from ..match import MatchResult, Watcher, play_match
 from ..provenance import machine, versions
 from ..score import DEFAULT_PENALTY, check_penalty
 from ..sea import check_current
-from ..shielding import check_shield
 from ..spec import ANSWER_S, MatchSpec
 from ..store import write_json
 from ..tables import game_table
 from . import options as o
 from .console import command, err, out, progress
+from .games import say_of_distance
 from .policies_tried import try_policies
 from .saving import check_endings, save_record
 
@@ -129,7 +130,7 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
     check_endings(save)
     check_current(spec.conditions, spec.config())
     if spec.shield is not None:
-        check_shield(spec.shield)
+        say_of_distance(check_shield(spec.shield, spec.config()).separation_m, spec.config())
     try_policies((spec.own, spec.opponent), spec.trust)
     if KEYBOARD in (spec.own, spec.opponent):
         err().print(STEERING, soft_wrap=True)

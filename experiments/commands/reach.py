@@ -27,6 +27,7 @@ from steerclear.shield.tables.solve import Notice
 from ..reach_show import check_picture, draw_sets, show_card
 from . import options as o
 from .console import Interrupted, command, err, finish, out
+from .plain_progress import PlainProgress
 from .reach_compare import OtherBoat, OwnBoat, compare
 from .reach_play import play
 
@@ -103,6 +104,9 @@ def solve(
 
 @contextmanager
 def _stages() -> Iterator[Stage]:
+    if not err().is_terminal:
+        yield _plain_stage
+        return
     columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TextColumn("{task.fields[change]}"), console=err(), transient=True) as bar:
 
@@ -110,12 +114,27 @@ def _stages() -> Iterator[Stage]:
             task = bar.add_task(name, total=None, change="")
 
             def notice(done: int, total: int, residual_m: float) -> None:
-                change = f"largest change {residual_m:.3f} m" if residual_m else ""
-                bar.update(task, completed=done, total=total, change=change)
+                bar.update(task, completed=done, total=total, change=_change(residual_m))
 
             return notice
 
         yield stage
+
+
+def _plain_stage(name: str) -> Notice:
+    """A stage where there is no terminal."""
+    shown: PlainProgress | None = None
+
+    def notice(done: int, total: int, residual_m: float) -> None:
+        nonlocal shown
+        shown = shown or PlainProgress(name, total, err())
+        shown(done, _change(residual_m))
+
+    return notice
+
+
+def _change(residual_m: float) -> str:
+    return f"largest change {residual_m:.3f} m" if residual_m else ""
 
 
 @app.command()

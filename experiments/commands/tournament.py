@@ -12,9 +12,9 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 from ..conditions import CALM
 from ..engines import Workers, engine_of
 from ..judging import check_judge
+from ..kept_distance import check_shield
 from ..score import DEFAULT_PENALTY, check_penalty
 from ..sea import check_current
-from ..shielding import check_shield
 from ..spec import ANSWER_S
 from ..store import LINES_FILE, RESULTS_FILE, ResultStore, write_json, write_table
 from ..tables import bars_table, titled
@@ -28,7 +28,7 @@ from ..tournament.tables import agreement_lines, all_tables
 from ..warming import WARMED, warm_up
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
-from .games import KEYBOARD, default_folder
+from .games import KEYBOARD, default_folder, say_of_distance
 from .policies_tried import try_policies
 
 Teams = Annotated[str, typer.Option(metavar="A,B", help="Teams: names or submissions' paths, separated by commas.")]
@@ -118,10 +118,13 @@ def _check(settings: TournamentSettings) -> None:
     Raises:
         SteerclearError: a team, preset, game or shield setting is unusable.
     """
-    check_shield(settings.shield)
+    game = settings.final(settings.teams)[0].spec.config()
+    kept_m = check_shield(settings.shield, game).separation_m
+    if set(settings.states) - {"off"}:
+        say_of_distance(kept_m, game)
     if KEYBOARD in settings.teams:
         raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
-    check_current(CALM, settings.final(settings.teams)[0].spec.config())
+    check_current(CALM, game)
     try_policies(settings.teams, settings.trust)
 
 

@@ -14,6 +14,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..folder_lock import lock_folder
 from ..training.config_file import read_config
 from .console import Interrupted, command, err, out
+from .plain_progress import PlainProgress
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG.yaml", help="What to train; see docs/train.md.")]
 Folder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder of the training.")]
@@ -64,13 +65,22 @@ def _training_of(settings: Any, folder: Path, resume: bool) -> Any:
 
 
 def _run(training: Any, folder: Path) -> None:
-    console = err()
+    total = training.settings.decisions
+    if training.decisions >= total:
+        err().print(
+            f"nothing was left to do: all {total:,} decisions were made before; more decisions in the config go on "
+            "from here",
+            soft_wrap=True,
+        )
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn(), TextColumn("left"))
     try:
-        with Progress(
-            *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
-        ) as bar:
-            task = bar.add_task("training", total=training.settings.decisions, completed=training.decisions)
+        if not err().is_terminal:
+            plain = PlainProgress("decisions", total, err(), at_once=True)
+            plain(training.decisions)
+            training.run(plain)
+            return
+        with Progress(*columns, TimeRemainingColumn(), console=err(), transient=True) as bar:
+            task = bar.add_task("training", total=total, completed=training.decisions)
             training.run(lambda done, words: bar.update(task, completed=done, description=words, refresh=True))
     except KeyboardInterrupt:
         raise Interrupted(

@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 from steerclear.env.whole_file import whole_file
+from steerclear.policies.entrants.learned.network import Network
+from steerclear.policies.entrants.learned.sb3_file import network_of_tensors
 from steerclear.shield.exceptions import ConfigError
 
 FOLDER, KEEP = "checkpoints", 2
+_UNUSABLE = (KeyError, ValueError, TypeError, IndexError)
 _DAMAGED = (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError, zlib.error)
 
 
@@ -30,6 +33,38 @@ def write_checkpoint(folder: Path, number: int, facts: dict[str, Any], arrays: d
     for old in checkpoints_in(folder)[:-KEEP]:
         old.unlink(missing_ok=True)
     return path
+
+
+def is_checkpoint(path: Path) -> bool:
+    """Whether a file is a checkpoint of a training, and not weights or something else."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "facts.npy" in archive.namelist()
+    except _DAMAGED:
+        return False
+
+
+def network_in(path: Path) -> Network:
+    """The actor that a checkpoint holds, as weights to play.
+
+    Raises:
+        ConfigError: it is damaged, or holds only one network of two.
+    """
+    facts, arrays = read_checkpoint(path)
+    at = "policy/"
+    tensors = {name.removeprefix(at): array for name, array in arrays.items() if name.startswith(at)}
+    try:
+        settings = facts["settings"]
+        if settings["options"]:
+            raise ConfigError(
+                f"{path} holds one network of two; go on with the training (--resume), which writes both to final.npz"
+            )
+        card = {"trained_with": "steerclear train", "preset": settings["preset"], "source": path.name}
+        return network_of_tensors(tensors, settings["net"]["activation"], None, card)
+    except ConfigError:
+        raise  # a kind of ValueError; says already what to do
+    except _UNUSABLE as error:
+        raise ConfigError(f"{path} holds no network this version can play ({type(error).__name__}: {error})") from error
 
 
 def checkpoints_in(folder: Path) -> list[Path]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.game_facts import facts_of_games
@@ -26,10 +25,7 @@ def core_of(settings: TrainingSettings, games: int, seed: int) -> BatchedMctf:
     Raises:
         ConfigError: the rules cannot be.
     """
-    rules: dict[str, Any] = {"default_start": False, **settings.rules}
-    if settings.platform:
-        rules["platforms"] = settings.platform
-    return BatchedMctf(GameConfig.preset(settings.preset, **rules), n_games=games, seed=seed)
+    return BatchedMctf(settings.game(), n_games=games, seed=seed)
 
 
 def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue") -> Any:
@@ -39,13 +35,17 @@ def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue")
 
 
 def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
-    """The learners, blue, in games against an opponent."""
+    """The learners, blue, in games against an opponent.
+
+    A shield that only evaluations ask is built here, too: what is wrong with it is found before the first rollout.
+    """
     core = core_of(settings, settings.games, settings.seed)
+    shield = shield_of(settings, core) if settings.shield != "none" else None
     batch = TeamBatch(
         core,
         opponent,
         "blue",
-        shield=shield_of(settings, core) if settings.shielded_training else None,
+        shield=shield if settings.shielded_training else None,
         actions=settings.actions,
         seed=settings.seed,
         interval=settings.interval,

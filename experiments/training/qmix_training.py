@@ -76,9 +76,9 @@ class QmixTraining:
             if (self.decisions // self.batch.learners) % 200 == 0:
                 self._note(losses[-200:], nets[-100:], began)
                 notice(self.decisions, f"net {np.mean(nets[-100:]):+.1f} a game")
-        self._note(losses[-200:], nets[-100:], began, evaluate=True)
-        for name in ("final.npz", "best.npz"):
+        for name in ("final.npz", "best.npz"):  # before the evaluation: an error in its games must not lose them
             write_weights(self.network(), self.folder / name)
+        self._note(losses[-200:], nets[-100:], began, evaluate=True)
 
     def _decide(self, seen: Any) -> tuple[Any, float, list[float]]:
         games = self.batch.core.n_games

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
+from ..kept_distance import check_shield
 from ..spec import near
 from .checks import choice, count, number, texts
 
@@ -218,6 +220,26 @@ class TrainingSettings:
             raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")
         for name, weight in self.rewards.items():
             number(f"rewards.{name}", weight, -1000.0, 1000.0)
+        self._check_shield()
+
+    def game(self) -> GameConfig:
+        """The rules of its games.
+
+        Raises:
+            ConfigError: they cannot be.
+        """
+        rules: dict[str, Any] = {"default_start": False, **self.rules}
+        if self.platform:
+            rules["platforms"] = self.platform
+        return GameConfig.preset(self.preset, **rules)
+
+    def _check_shield(self) -> None:
+        """Whatever the shield mode: a shield of these settings must fit the game before it is trained for."""
+        game = self.game()
+        try:
+            check_shield(self.shield_settings, game)
+        except ConfigError as error:
+            raise ConfigError(f"shield_settings: {error}") from None
 
     def reward_weights(self) -> dict[str, float]:
         """Weights of the reward terms, the shield mode's own among them."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from steerclear.policies.entrants.learned.sb3_file import add_card
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 
@@ -66,6 +67,7 @@ class Training:
         before = torch.get_num_threads()
         torch.set_num_threads(self.settings.threads)
         try:
+            self._make_up_for_evaluation()
             while self.decisions < self.settings.decisions:
                 self._iterate()
                 notice(self.decisions, self._words())
@@ -77,6 +79,7 @@ class Training:
         if not (self.folder / BEST).exists():
             write_weights(self.learner.network(), self.folder / BEST)
         self.learner.model.save(self.folder / MODEL)
+        add_card(self.folder / MODEL, self._card())
 
     def _iterate(self) -> None:
         began = time.perf_counter()
@@ -91,10 +94,13 @@ class Training:
         row = {"decisions": self.decisions, "stage": self.stage, **_means(games), **told}
         self._promote(games)
         self._league()
-        row |= self._evaluate()
-        self._wall_s += time.perf_counter() - began
-        row["wall"] = {"total_s": self._wall_s, **parts, "learning_s": learned - played}
+        row["wall"] = {"total_s": self._wall_s + time.perf_counter() - began, **parts, "learning_s": learned - played}
         self.curve.append(row)
+        if self._due():
+            self._last = self._packed()  # what was learned is kept, whatever the games of an evaluation meet
+            row |= self._evaluate()
+        self._wall_s += time.perf_counter() - began
+        row["wall"]["total_s"] = self._wall_s
         self._last = self._packed()
         if self.rollouts % self.settings.checkpoint_every == 0:
             write_checkpoint(self.folder, self.rollouts, *self._last)
@@ -137,14 +143,22 @@ class Training:
         write_weights(network, self.folder / SNAPSHOTS / f"{SELF}_{self.rollouts}.npz")
         self.batch.opponent.add_snapshot(network, self.rollouts)
 
+    def _due(self) -> bool:
+        """Whether this rollout ends with an evaluation."""
+        return self.rollouts % self.settings.evaluation.every == 0 or self.decisions >= self.settings.decisions
+
+    def _make_up_for_evaluation(self) -> None:
+        """Play the evaluation that an error kept from the training that is gone on with."""
+        if self.curve and self._due() and "evaluation" not in self.curve[-1]:
+            self.curve[-1] |= self._evaluate()
+            self._last = self._packed()
+
     def _evaluate(self) -> dict[str, Any]:
-        """Games against held-out opponents, and the best kept."""
+        """Games against held-out opponents, and the best kept; the weights as they are lie there before the first."""
         wanted = self.settings.evaluation
-        last = self.decisions >= self.settings.decisions
-        if self.rollouts % wanted.every and not last:
-            return {}
         shielded = self.settings.shield != "none"
         network = self.learner.network()
+        write_weights(network, self.folder / FINAL)
         found = {
             name: summary_of(play_games(self.settings, network, name, wanted.games, wanted.seed, shielded))
             for name in wanted.opponents
@@ -252,15 +266,18 @@ class Training:
         }
 
     def _words(self) -> str:
-        """What the progress bar says."""
+        """What the progress says: means of the games that ended in the last rollout, and its rate."""
         row = self.curve[-1]
         rate = (
             self.settings.ppo.steps
             * self.batch.learners
             / max(sum(s for name, s in row["wall"].items() if name != "total_s"), 1e-9)
         )
-        net = row["captures"] - row["captures_against"] if row["games"] else float("nan")
-        return f"stage {self.stage + 1}/{len(self.settings.stages)}, net {net:+.1f} a game, {rate:,.0f} decisions/s"
+        stage = f"stage {self.stage + 1}/{len(self.settings.stages)}"
+        if not row["games"]:
+            return f"{stage}, {rate:,.0f} decisions/s"
+        counts = f"captures {row['captures']:.1f}, against {row['captures_against']:.1f}, hits {row['hits']:.1f}"
+        return f"{stage}, {counts} a game, {rate:,.0f} decisions/s"
 
 
 def _not_ours(path: Path, error: Exception) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .checkpoints import checkpoints_in, read_checkpoint
 from .qmix_training import QmixTraining
 from .settings import TrainingSettings
 from .taking_over import FIRST
@@ -25,7 +26,7 @@ class TwoPartTraining:
         resume: go on with PPO from its last checkpoint.
 
     Raises:
-        ConfigError: an option is unusable.
+        ConfigError: an option or checkpoint is unusable.
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
@@ -38,6 +39,8 @@ class TwoPartTraining:
         self._play = None
         if not (resume and self.weights.exists()):
             self._play = QmixTraining(replace(settings, decisions=first, options=options), folder / PLAY)
+        elif found := checkpoints_in(folder):
+            self.decisions = first + int(read_checkpoint(found[-1])[0]["decisions"])
         self._first = first
 
     def run(self, notice: Any = lambda done, words: None) -> None:

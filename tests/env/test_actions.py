@@ -3,7 +3,9 @@ import pytest
 from steerclear.env.actions import DISCRETE, STOP, action_kinds, discrete_commands
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
+from steerclear.shield import Shield
 from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.wrappers import ShieldedParallelEnv
 
 
 @pytest.fixture
@@ -117,3 +119,16 @@ def test_many_discrete_actions_at_once():
     for bad in (np.array([[17, 0]]), np.array([[-1, 0]]), np.array([[0.5, 0.0]])):
         with pytest.raises(GameError, match=r"0\.\.16"):
             discrete_commands(bad, speeds)
+
+
+@pytest.mark.parametrize("action", [(1e9, 0.0), (1.0, -1e300), (2e6, 0)])
+@pytest.mark.parametrize("shielded", [False, True])
+def test_an_absurdly_large_pair_is_refused_before_it_overflows_the_motion(env, action, shielded):
+    game = ShieldedParallelEnv(env, Shield.for_game(env)) if shielded else env
+    game.reset(seed=0)
+    before = env.core.state.copy()
+    with pytest.raises(GameError, match=r"action of agent_0 in game 0 is beyond 1e\+06"):
+        game.step({"agent_0": action})
+    np.testing.assert_array_equal(env.core.state, before)
+    game.step({"agent_0": (1e6, -1e6)})
+    assert np.isfinite(env.core.state[0, :, :5]).all()

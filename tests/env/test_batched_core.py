@@ -129,6 +129,7 @@ def test_step_is_commands_then_advance():
         (np.zeros((1, 4, 2)), r"actions have shape \(1, 4, 2\); give \(2, 4, 2\)"),
         (np.zeros((2, 4)), "actions have shape"),
         (np.full((2, 4, 2), np.nan), "action of agent_0 in game 0 is not finite"),
+        (np.full((2, 4, 2), 1e9), "action of agent_0 in game 0 is beyond 1e\\+06"),
     ],
 )
 def test_unusable_actions_are_refused(actions, message):

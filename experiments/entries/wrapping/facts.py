@@ -8,10 +8,11 @@ from typing import Any
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.field import field_points
-from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.wrappers.mctf import surroundings_of
+
+from ...kept_distance import check_shield
 
 
 def facts_for(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def facts_for(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
     rules = core.rules
     move_s = float(rules.decision_s) / config.decision_steps
     times = {"dt_s": float(rules.decision_s), "move_s": move_s if config.decision_steps > 1 else None}
-    settings = ShieldConfig.of(**{**times, **shield})
+    settings = check_shield({**times, **shield}, config)
     if settings.barriers:
         names = ", ".join(settings.barriers)
         raise ConfigError(f"a shielded zip cannot carry registered barriers ({names}); wrap without them")

@@ -78,6 +78,11 @@ class Network:
     carriers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
+    def preset(self) -> str:
+        """Rules of the game it learned in; empty where its card does not say."""
+        return str(self.card.get("preset", ""))[:40]
+
+    @property
     def roles(self) -> int:
         """Networks, one per role."""
         return int(self.weights[0].shape[0])

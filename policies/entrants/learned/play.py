@@ -70,7 +70,7 @@ class LearnedBatch:
         if n_obs != net.n_obs:
             raise PolicyError(
                 f"policy {self.name!r} takes observations of {net.n_obs} numbers, this game makes {n_obs}; "
-                "play it in the game it learned in (team_size, obstacles, preset)"
+                f"play it in the game it learned in ({_game_words(net.preset)})"
             )
         if net.roles not in (1, team_size):
             raise PolicyError(f"policy {self.name!r} has {net.roles} roles, the team has {team_size} boats")
@@ -123,6 +123,11 @@ class LearnedBatch:
             rows.append(rng.gumbel(size=(boats, actions)).astype(np.float32))
             self._drawn[game] += 1
         return np.concatenate(rows)
+
+
+def _game_words(preset: str) -> str:
+    """How to ask for the game a network learned in."""
+    return f"--preset {preset}, with its team_size and obstacles" if preset else "preset, team_size, obstacles"
 
 
 class LearnedTeam:

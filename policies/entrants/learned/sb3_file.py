@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import zipfile
 from collections.abc import Mapping
@@ -18,6 +19,8 @@ from .network import Features, Network
 PLAYABLE = ("PPO", "A2C")
 ABOUT = "steerclear."
 """Our own tensors among a model's begin like this."""
+CARD, MOST_CARD_BYTES = "steerclear_card.json", 2**16
+"""Member of the zip that says what game the model learned; SB3 does not look at it."""
 REMEDY = "give a PPO or A2C zip with an MlpPolicy, or one of steerclear train"
 
 
@@ -38,10 +41,33 @@ def read_sb3(path: str | Path, interval: int | None = None) -> Network:
     if (algorithm := algorithm_of(saved)) not in PLAYABLE:
         raise PolicyError(f"{file} is a model of {algorithm}, whose actor is another kind of network; {REMEDY}")
     try:
-        return network_of_tensors(_tensors(file), _activation(saved), interval, {"source": file.name})
+        return network_of_tensors(_tensors(file), _activation(saved), interval, {**_card(file), "source": file.name})
     except (*UNREADABLE, TypeError, IndexError) as error:
         why = " ".join(str(error).split())[:160]
         raise PolicyError(f"{file} has no actor this can play ({type(error).__name__}: {why}); {REMEDY}") from error
+
+
+def add_card(file: Path, card: Mapping[str, Any]) -> None:
+    """Put a card, such as the preset a model learned in, into its zip."""
+    with zipfile.ZipFile(file, "a") as archive:
+        archive.writestr(CARD, json.dumps(dict(card)))
+
+
+def _card(file: Path) -> dict[str, Any]:
+    """The card of a model of ours; empty where there is none.
+
+    Raises:
+        ValueError: it is too large, or no card.
+    """
+    with zipfile.ZipFile(file) as archive:
+        if CARD not in archive.namelist():
+            return {}
+        if archive.getinfo(CARD).file_size > MOST_CARD_BYTES:
+            raise ValueError("its card is too large")
+        card = json.loads(archive.read(CARD))
+    if not isinstance(card, dict):
+        raise ValueError("its card is none")
+    return card
 
 
 def _tensors(file: Path) -> dict[str, Any]:

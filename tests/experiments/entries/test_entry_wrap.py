@@ -244,3 +244,15 @@ def test_facts_are_of_the_game():
     assert facts["agent_ids"] == [f"agent_{i}" for i in range(6)]
     assert (facts["size"], facts["power_s"], facts["decision_s"]) == ([160.0, 80.0], 120.0, 1.0)
     assert facts["stops"] == [[], []]
+
+
+def test_a_distance_is_refused_where_the_field_has_no_room_and_told_where_the_game_counts_at_more(
+    folder_of_entry, tmp_path
+):
+    far = run("wrap", folder_of_entry, "--out", tmp_path / "far.zip", "--separation", 500)
+    assert far.exit_code == ExitCode.BAD_INPUT
+    assert "the shorter side of the field, 80 m" in far.output
+    assert not (tmp_path / "far.zip").exists()
+    near = run("wrap", folder_of_entry, "--out", tmp_path / "near.zip", "--separation", 1)
+    assert near.exit_code == ExitCode.OK, near.output
+    assert near.stderr.count("the shield keeps 1 m (separation_m), but this game counts collisions at 4 m") == 1

@@ -69,6 +69,17 @@ def test_qmix_learns_from_a_replay_and_its_network_plays(tiny, tmp_path):
     assert json.loads((tmp_path / "run" / "curve.json").read_text())["rows"][-1]["evaluation"]["medium"]["games"] == 2
 
 
+def test_qmix_keeps_its_weights_where_the_evaluation_fails(tiny, tmp_path, monkeypatch):
+    def failing(*arguments):
+        raise RuntimeError("an opponent's file is gone")
+
+    monkeypatch.setattr("steerclear.experiments.training.qmix_training.play_games", failing)
+    training = training_of(read_config(tiny(algorithm="qmix", decisions=24)), tmp_path / "run", False)
+    with pytest.raises(RuntimeError, match="is gone"):
+        training.run()
+    assert read_weights(tmp_path / "run" / "final.npz").preset == "aamas2024"
+
+
 def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(tiny, tmp_path):
     rules = {"max_time_s": 30.0}
     changes = {"options": {"batch": 8, "updates": 1, "play_share": 0.5}, "decisions": 72, "rules": rules}
@@ -79,6 +90,7 @@ def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(
     assert all((one == two).all() for one, two in zip(pair.weights, play.weights, strict=True))
     assert len(pair.carriers) == 3
     again = training_of(settings, tmp_path / "run", True)  # the first part is kept
+    assert again.decisions == 72  # nothing is left
     again.run()
     assert again.decisions == 72
 

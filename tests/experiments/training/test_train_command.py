@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from inspect import Parameter, signature
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import yaml
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands import train
 from steerclear.experiments.folder_lock import _HELD
+from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
 from typer.testing import CliRunner
 
@@ -24,11 +26,35 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     assert again.exit_code == 2
     assert "add --resume" in again.output
     files = "--out", tmp_path / "team.npz", "--submission", tmp_path / "solution.zip"
-    assert call("export", folder / "model.zip", *files).exit_code == 0
+    exported = call("export", folder / "model.zip", *files)
+    assert exported.exit_code == 0
+    assert exported.output.count("for games of preset aamas2024") == 2
     for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
         played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
         assert played.exit_code == 0, played.output
+    for words in (
+        ("entry", "check", tmp_path / "solution.zip", "--preset", "mctf2026", "--max-time", 3),
+        ("play", "--own", f"weights:{tmp_path / 'team.npz'}", "--opponent", "hold", "--set", "team_size=2"),
+    ):
+        elsewhere = call(*words)
+        assert elsewhere.exit_code == 2
+        assert "take" in elsewhere.output
+        assert "--preset aamas2024" in elsewhere.output
+
+
+def test_a_training_without_a_terminal_tells_how_far_it_is(tiny, tmp_path, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.commands.plain_progress.EVERY_S", 0.0)
+    first = call("train", tiny(decisions=36), "--out", tmp_path / "run")
+    assert first.exit_code == 0
+    said = [line for line in first.stderr.splitlines() if line.startswith("decisions: ")]
+    assert said[0] == "decisions: 0 of 36"
+    for words in ("decisions: 36 of 36, stage ", "captures ", "against ", "hits ", "decisions/s"):
+        assert words in said[-1]
+    assert "nothing was left" not in first.stderr
+    again = call("train", tiny(decisions=36), "--out", tmp_path / "run", "--resume")
+    assert again.exit_code == 0
+    assert "nothing was left to do: all 36 decisions were made before" in again.stderr
 
 
 def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
@@ -49,6 +75,29 @@ def test_bad_input_is_one_line(tiny, tmp_path):
     assert "is not a Stable-Baselines3 model" in result.output
 
 
+@pytest.mark.parametrize(
+    ("shield_settings", "words"),
+    [
+        ({"dwellll_s": 1}, "unknown shield setting 'dwellll_s'"),
+        ({"profile": "pirates"}, "pirates"),
+        ({"separation_m": 500}, "the shorter side of the field, 40 m"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["none", "deployment", "training"])
+def test_a_bad_shield_setting_is_found_before_the_first_rollout(tiny, tmp_path, shield_settings, words, mode):
+    result = call("train", tiny(shield=mode, shield_settings=shield_settings), "--out", tmp_path / "x")
+    assert result.exit_code == 2
+    assert words in result.output
+    assert not list(tmp_path.glob("x/checkpoints/*"))
+
+
+def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_path):
+    result = call("train", tiny(shield="deployment", shield_settings={"dt_s": 0.7}), "--out", tmp_path / "x")
+    assert result.exit_code == 2
+    assert "0.7 s" in result.output
+    assert not list(tmp_path.glob("x/checkpoints/*"))
+
+
 def test_every_team_has_a_config_that_can_be_read():
     found = sorted((ROOT / "policies/entrants/learned/teams").glob("*.yaml"))
     assert {path.stem for path in found} == {"crowley", "jin", "leprell", "ours", "richley"}
@@ -64,6 +113,14 @@ def test_playing_exported_weights_needs_no_torch():
         "assert not any(name.split('.')[0] in ('torch', 'stable_baselines3') for name in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", words], timeout=120, check=False).returncode == 0
+
+
+def test_the_page_lists_every_option_of_the_environment_with_its_default():
+    page = (ROOT / "docs" / "train.md").read_text()
+    for name, one in signature(make_learners).parameters.items():
+        if one.kind is not Parameter.VAR_KEYWORD:
+            default = f'"{one.default}"' if isinstance(one.default, str) else one.default
+            assert f"| `{name}` | `{default}` |" in page
 
 
 @pytest.mark.parametrize("command", ["train", "export", "train-study"])

@@ -89,6 +89,42 @@ def test_what_is_interrupted_is_kept_up_to_the_last_rollout(tiny, tmp_path):
     assert len(json.loads((tmp_path / "run" / "curve.json").read_text())["rows"]) == 2
 
 
+def test_an_evaluation_that_fails_loses_nothing_and_is_made_up_for(tiny, tmp_path, whole, monkeypatch):
+    def failing(*arguments):
+        raise RuntimeError("an opponent's file is gone")
+
+    config, folder = tiny(evaluation={"every": 100, "games": 2}), tmp_path / "run"
+    with monkeypatch.context() as patched:
+        patched.setattr("steerclear.experiments.training.training.play_games", failing)
+        with pytest.raises(RuntimeError, match="is gone"):
+            trained(config, folder)
+    facts, _ = read_checkpoint(checkpoints_in(folder)[-1])
+    assert facts["decisions"] == 144
+    assert "evaluation" not in facts["curve"][-1]
+    kept = read_weights(folder / "final.npz")
+    gone_on = trained(config, folder, resume=True)
+    assert gone_on.curve[-1]["evaluation"] == whole[0].curve[-1]["evaluation"]
+    for mine, other in zip(kept.weights, read_weights(whole[1] / "final.npz").weights, strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+def test_a_checkpoint_can_be_exported(whole, tmp_path):
+    result = CliRunner().invoke(app, ["export", str(checkpoints_in(whole[1])[-1]), "--out", str(tmp_path / "team.npz")])
+    assert result.exit_code == 0, result.output
+    assert "for games of preset aamas2024" in result.output
+    found, last = read_weights(tmp_path / "team.npz"), read_weights(whole[1] / "final.npz")
+    assert (found.interval, found.kind, found.preset) == (last.interval, last.kind, "aamas2024")
+    for mine, other in zip((*found.weights, *found.biases), (*last.weights, *last.biases), strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+def test_a_checkpoint_of_one_network_of_two_says_what_to_do(tmp_path):
+    path = write_checkpoint(tmp_path, 1, {"settings": {"options": {"first": "a.npz"}}}, {})
+    result = CliRunner().invoke(app, ["export", str(path), "--out", str(tmp_path / "team.npz")])
+    assert result.exit_code == 2
+    assert "--resume" in result.output
+
+
 def test_a_loss_that_is_not_finite_ends_in_one_line_and_keeps_what_was(tiny, tmp_path, monkeypatch):
     training = Training(read_config(tiny()), tmp_path / "run")
     learn = training.learner.learn
