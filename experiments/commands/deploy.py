@@ -24,6 +24,7 @@ from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.run import deploy as run_boats
+from ..deploy.tally import distance_words
 from ..spec import check_seed
 from ..store import write_json
 from . import deploying as d
@@ -139,7 +140,7 @@ def _table(figures: dict[str, float]) -> Table:
     rows = (
         ("turns", f"{figures['ticks']:.0f}"),
         ("commands changed by the shield", f"{100.0 * figures['changed_share']:.1f} %"),
-        ("closest approach of our boats, as believed", f"{figures['closest_m']:.2f} m"),
+        ("closest approach of our boats, as believed", distance_words(figures["closest_m"])),
         ("turns with a declared response", f"{figures['ticks_with_actions']:.0f}"),
         ("turn began late, 999 of 1000 within", f"{1e3 * figures['jitter_p999_s']:.1f} ms"),
         ("telemetry read to command sent, 99 of 100 within", f"{1e3 * figures['read_to_sent_p99_s']:.1f} ms"),
