@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 from steerclear import policies
+from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.operator import Operator
@@ -83,7 +84,7 @@ def deploy(
         return (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),)
 
     with ExitStack() as stack:
-        stack.enter_context(logging_aside(d.text_log(file.log_dir), shown=not dashboard))
+        stack.enter_context(logging_aside(log_path(file.log_dir, ".log", orders.begun_unix_s), shown=not dashboard))
         if demo:
             water = stack.enter_context(Demo(orders.fleet_file, opponents, speed))
             with err().status("simulated boats are starting; the first time all is compiled, which takes minutes"):
@@ -129,6 +130,8 @@ def _orders(
         speed=speed,
         connect_s=max(wait_s, 60.0) if demo and wait_s > 0.0 else wait_s,
         trust=trust,
+        untold_delay_s=0.0 if demo else None,  # simulated boats on this machine obey at once
+        begun_unix_s=time.time(),
     )
     return orders if fleet is not None else replace(orders, fleet_file=demo_file())  # a folder, once all else is sound
 
