@@ -115,11 +115,14 @@ class Foresight:
                 outside = missed > self._limit.outside_m
                 change = self._dt_s if outside else -self._dt_s
                 self._outside_s[i] = max(0.0, self._outside_s[i] + change)
-            missed_m = self.quantile_m(name)
-            missed_m = missed_m if missed_m > ROUNDING_M else 0.0
-            goal = max(float(self._declared_m[i]), min(missed_m, self._limit.widest_m))
             step = WIDEN_MPS * self._dt_s
-            self.margin_m[name] += min(max(goal - self.margin_m[name], -step), step)
+            self.margin_m[name] += min(max(self._goal_m(name) - self.margin_m[name], -step), step)
+
+    def _goal_m(self, name: str) -> float:
+        """Margin that a boat's errors ask for, m, within its bounds."""
+        missed_m = self.quantile_m(name)
+        missed_m = missed_m if missed_m > ROUNDING_M else 0.0
+        return max(float(self._declared_m[self._boats.index(name)]), min(missed_m, self._limit.widest_m))
 
     def quantile_m(self, boat: str, ahead: int = TOLD_BY, share: float = SHARE) -> float:
         """Quantile of a boat's errors so far ahead (place in `AHEAD_S`), m; 0 while too little was seen."""
@@ -148,11 +151,13 @@ class Foresight:
 
     def _words(self, name: str) -> str:
         missed = "/".join(f"{self.quantile_m(name, k):.1f}" for k in range(len(AHEAD_S)))
-        bound = " (the most that limits.model.widest_m allows)" if self._is_bounded(name) else ""
+        margin, goal = self.margin_m[name], self._goal_m(name)
+        growing = f", growing to {goal:.2f} m" if goal > margin + 0.005 else ""
+        bound = ", the most that limits.model.widest_m allows" if self._is_bounded(name) else ""
         return (
-            f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {self.margin_m[name]:.2f} m{bound}"
-            "; steerclear fit this run's log"
+            f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {margin:.2f} m{growing}{bound}"
+            "; if it stays so, steerclear fit this run's log"
         )
 
     def _is_bounded(self, name: str) -> bool:
-        return self.quantile_m(name) > self._limit.widest_m
+        return self.quantile_m(name) > self._limit.widest_m >= self._goal_m(name)

@@ -62,6 +62,19 @@ def test_the_margin_is_bounded_as_declared():
     assert margins.max() == pytest.approx(0.25)
 
 
+@pytest.mark.parametrize("seconds", [10.0, 40.0])
+def test_a_margin_under_way_to_its_bound_is_not_told_as_the_bound(seconds):
+    foresight, margins = drive(turn_share=0.3, limits={"widest_m": 0.5}, seconds=seconds)
+    (action,) = foresight.actions()
+    bound = "the most that limits.model.widest_m allows"
+    assert foresight.quantile_m(NAME) > 0.5
+    if seconds < 20.0:
+        assert margins[-1] < 0.4
+        assert f"margin {margins[-1]:.2f} m, growing to 0.50 m, {bound}" in action.text
+    else:
+        assert f"margin 0.50 m, {bound}" in action.text
+
+
 def test_errors_grow_with_the_time_ahead():
     foresight, _ = drive(turn_share=0.6)
     found = [foresight.quantile_m(NAME, ahead) for ahead in range(3)]
