@@ -36,6 +36,8 @@ WORTH_TELLING_M = 0.15
 """Margins beyond what was declared by more than this are told."""
 ROUNDING_M = 0.05
 """Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
+MISSED = 1.5
+"""Turns farther apart than so many steps are not one after the other."""
 FRESH_S = 0.3
 """Places older than this are no measurement, s."""
 
@@ -63,6 +65,7 @@ class Foresight:
         self._told: deque[Array] = deque(maxlen=longest)
         self._errors = np.full((round(MEMORY_S / config.dt_s), len(boats), len(AHEAD_S)), np.nan)
         self._number = 0
+        self._read_s = math.inf
         self._outside_s = np.zeros(len(boats))
         self.margin_m = {name: float(margin) for name, margin in zip(boats, self._declared_m, strict=True)}
         """Bound on the error of each boat's place that the shield is to count on, m."""
@@ -74,6 +77,7 @@ class Foresight:
             rows: state of each boat as estimated; None: not known.
             readings: their telemetry.
         """
+        self._look_at_clock(max(reading.read_s for reading in readings.values()) if readings else self._read_s)
         now = np.full((len(self._boats), L.N_STATE), np.nan)
         for i, name in enumerate(self._boats):
             row, reading = rows.get(name), readings[name]
@@ -86,6 +90,13 @@ class Foresight:
             errors[:, k] = self._missed_m(now, steps)
         self._number += 1
         self._judge(errors)
+
+    def _look_at_clock(self, read_s: float) -> None:
+        """After turns that were left out nothing is held against what was foreseen before them: it counts in turns."""
+        if read_s - self._read_s > MISSED * self._dt_s:
+            self._rows.clear()
+            self._told.clear()
+        self._read_s = read_s
 
     def sent(self, sent: Mapping[str, Sent]) -> None:
         """Note what left at this turn."""
