@@ -21,9 +21,10 @@ from steerclear.experiments.deploy.quiet import (
     before_others,
     ended_by_signals,
     undisturbed,
+    warm_up,
 )
 from steerclear.experiments.deploy.tally import Tally, closest_m, distance_words
-from steerclear.shield import Commands, Shield, ShieldConfig
+from steerclear.shield import Commands, Shield, ShieldConfig, shield
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
 from steerclear.shield.fleet import Fleet
@@ -70,8 +71,8 @@ def test_a_boat_alone_has_no_closest_approach(fleet_of):
     tick = Stream(fleet_of(2)).tick()
     fleet = tick.fleet
     one = Fleet(fleet.state[:1], fleet.team[:1], fleet.platforms[:1], fleet.controlled[:1], fleet.names[:1])
-    shield = Shield(ShieldConfig())
-    alone = dataclasses.replace(tick, fleet=one, decisions=shield.decide(one, Commands.relative_deg([[1.0, 0.0]])))
+    guard = Shield(ShieldConfig())
+    alone = dataclasses.replace(tick, fleet=one, decisions=guard.decide(one, Commands.relative_deg([[1.0, 0.0]])))
     lines = []
     sink = PlainLines(lines.append, every_s=0.02)
     sink.take(alone)
@@ -104,6 +105,15 @@ def test_nothing_is_said_before_the_first_tick():
     time.sleep(0.1)
     sink.close()
     assert lines == []
+
+
+def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
+    seen = set()
+    for name in ("begin", "linearise", "solve", "accept", "finish"):
+        stage = getattr(shield, name)
+        monkeypatch.setattr(shield, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+    warm_up(fleet_of(2).with_shield(position_error_m=0.3, delay_s=0.1))
+    assert seen == {"begin", "linearise", "solve", "accept", "finish"}
 
 
 def test_logs_go_to_the_file(tmp_path):
