@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 from steerclear import policies
+from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.operator import Operator
@@ -24,6 +25,7 @@ from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.run import deploy as run_boats
+from ..deploy.tally import distance_words
 from ..spec import check_seed
 from ..store import write_json
 from . import deploying as d
@@ -82,7 +84,7 @@ def deploy(
         return (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),)
 
     with ExitStack() as stack:
-        stack.enter_context(logging_aside(d.text_log(file.log_dir), shown=not dashboard))
+        stack.enter_context(logging_aside(log_path(file.log_dir, ".log", orders.begun_unix_s), shown=not dashboard))
         if demo:
             water = stack.enter_context(Demo(orders.fleet_file, opponents, speed))
             with err().status("simulated boats are starting; the first time all is compiled, which takes minutes"):
@@ -128,6 +130,8 @@ def _orders(
         speed=speed,
         connect_s=max(wait_s, 60.0) if demo and wait_s > 0.0 else wait_s,
         trust=trust,
+        untold_delay_s=0.0 if demo else None,  # simulated boats on this machine obey at once
+        begun_unix_s=time.time(),
     )
     return orders if fleet is not None else replace(orders, fleet_file=demo_file())  # a folder, once all else is sound
 
@@ -139,7 +143,7 @@ def _table(figures: dict[str, float]) -> Table:
     rows = (
         ("turns", f"{figures['ticks']:.0f}"),
         ("commands changed by the shield", f"{100.0 * figures['changed_share']:.1f} %"),
-        ("closest approach of our boats, as believed", f"{figures['closest_m']:.2f} m"),
+        ("closest approach of our boats, as believed", distance_words(figures["closest_m"])),
         ("turns with a declared response", f"{figures['ticks_with_actions']:.0f}"),
         ("turn began late, 999 of 1000 within", f"{1e3 * figures['jitter_p999_s']:.1f} ms"),
         ("telemetry read to command sent, 99 of 100 within", f"{1e3 * figures['read_to_sent_p99_s']:.1f} ms"),

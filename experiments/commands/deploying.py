@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -78,8 +77,3 @@ def content_of(command: str, settings: dict[str, Any], outcome: Outcome, started
 def on_terminal() -> bool:
     """Whether a person sits before it: keys can be read and the screen be drawn."""
     return sys.stdin.isatty() and sys.stdout.isatty()
-
-
-def text_log(folder: Path) -> Path:
-    """Path of a new log of text."""
-    return folder / f"steerclear_{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,7 @@ from .files import check_ending
 app = typer.Typer(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
 Named = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")]
 Begin = Annotated[str, typer.Option("--from", metavar="NAME", help="The platform to begin with.")]
+PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,31}")
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write there.", show_default="NAME.yaml")]
 
 
@@ -79,6 +81,10 @@ def new(
     """Write a platform file to edit, with a word on each entry, beginning with a boat there is."""
     from dataclasses import replace
 
+    if not PLAIN_NAME.fullmatch(name) or is_path(name):
+        raise ConfigError(
+            f"NAME is {name!r}; give 1 to 32 letters, digits, '_', '-' or '.', no file; say where with --out"
+        )
     path = file or Path(f"{name}.yaml")
     check_ending(path, "--out", (".yaml", ".yml"))
     if path.exists():

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.fleet_file import load_fleet
 
 from ..deploy.orders import Orders, Surface
@@ -38,13 +39,14 @@ def preflight(
     Boats move in the drill, one after the other, all of them behind the shield. Exit status: 0 all pass, 1 not all, 2
     bad input, 130 interrupted.
     """
-    orders = Orders(fleet, "", boat, None, tuple(accept or ()), 0, not no_tlog, speed, wait)
+    accepted = tuple(accept or ())
+    orders = Orders(fleet, "", boat, None, accepted, 0, not no_tlog, speed, wait, begun_unix_s=time.time())
     console, started = out(), time.perf_counter()
     surface = Surface(
         lambda result: d.show_check(console, result, orders.accept),
         lambda file, operator, clock: (PlainLines(lambda text: err().print(text, markup=False, soft_wrap=True)),),
     )
-    with logging_aside(d.text_log(load_fleet(fleet).log_dir), shown=True):
+    with logging_aside(log_path(load_fleet(fleet).log_dir, ".log", orders.begun_unix_s), shown=True):
         outcome = check_boats(orders, surface, drill=not no_drill)
     d.show_outcome(console, outcome)
     if json_file is not None:

@@ -30,4 +30,4 @@ def open_box(station: Station, text: str, policy: str, checks: Sequence[CheckRes
         clock_s=station.clock.now_s(),
         notes={f"accepted {result.name}": result.text for result in checks if not result.passed},
     )
-    return McapWriter(log_path(station.fleet.log_dir, ".mcap"), header, key=station.key)
+    return McapWriter(log_path(station.fleet.log_dir, ".mcap", station.begun_unix_s), header, key=station.key)

@@ -48,6 +48,8 @@ class Orders:
         speed: times faster than real time, for simulated boats that live so.
         connect_s: how long boats are waited for, s.
         trust: also load a model that lies among entries of others.
+        untold_delay_s: from command to effect where neither file, drill nor fit says it, s; None: one step.
+        begun_unix_s: when it was begun, s since 1970, which all its files are named after; None: when they are opened.
 
     Raises:
         ConfigError: the speed is not above 0 or the wait is out of range.
@@ -63,6 +65,8 @@ class Orders:
     speed: float = 1.0
     connect_s: float = CONNECT_S
     trust: bool = False
+    untold_delay_s: float | None = None
+    begun_unix_s: float | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.connect_s <= LONGEST_WAIT_S:
@@ -122,7 +126,7 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)
     if "delay_s" not in fleet.shield:
-        fleet = fleet.with_shield(delay_s=_delay_s(fleet, orders.boat))
+        fleet = fleet.with_shield(delay_s=_delay_s(fleet, orders.boat, orders.untold_delay_s))
     return fleet, text
 
 
@@ -134,13 +138,13 @@ def _nothing_to_command(fleet: FleetFile) -> str:
     return f"no boat of team {fleet.team} has a link; give one to command it"
 
 
-def _delay_s(fleet: FleetFile, boat: str | None) -> float:
-    """What the last drill measured, else the longest that the platforms' files say; one step where nobody says."""
+def _delay_s(fleet: FleetFile, boat: str | None, untold_s: float | None = None) -> float:
+    """What the last drill measured, else the longest that the platforms' files say, see `Orders.untold_delay_s`."""
     drilled = measured_delay_s(fleet, boat)
     if drilled is not None:
         return drilled
     told = [fleet.measured_of(entry.name).get("delay_s", 0.0) for entry in fleet.commanded(boat)]
-    return max(fleet.dt_s, *told)
+    return max(fleet.dt_s if untold_s is None else untold_s, *told)
 
 
 def check_accepted(checks: Sequence[Check], accept: Sequence[str], elsewhere: Sequence[str] = ()) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import logging.handlers
+import math
 import queue
 import threading
 from collections.abc import Callable, Iterator
@@ -15,14 +16,16 @@ from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.exceptions import BridgeError
 
 from ..terminal import SafeFormatter
-from .tally import closest_m
+from .tally import Tally
 
 MOST_LINES = 10_000
 """Lines of the log that may wait to be written; more are dropped."""
 
 
 class PlainLines:
-    """A sink that says how it goes every few seconds, from a thread of its own.
+    """A sink that says how it went since the last line, every few seconds, from a thread of its own.
+
+    What is declared of a boat is said once, and again when its response changes or it comes back.
 
     Args:
         say: takes a line.
@@ -33,7 +36,8 @@ class PlainLines:
         self._say, self._every_s = say, every_s
         self._tick: Tick | None = None
         self._began_s: float | None = None
-        self._told: tuple[str, ...] = ()
+        self._tally = Tally()
+        self._told: set[tuple[str, str, str]] = set()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plain lines", daemon=True)
         self._thread.start()
@@ -43,6 +47,7 @@ class PlainLines:
         if self._began_s is None:
             self._began_s = tick.began_s
         self._tick = tick
+        self._tally.take(tick)
 
     def close(self) -> None:
         """Say the last and end."""
@@ -51,30 +56,31 @@ class PlainLines:
 
     def _run(self) -> None:
         while not self._closing.wait(self._every_s):
-            if self._tick is not None:
-                self._say(self._line(self._tick))
-                new = tuple(action.text for action in self._tick.actions)
-                for text in new:
-                    if text.split(",")[0] not in {told.split(",")[0] for told in self._told}:
-                        self._say(f"  {text}")
-                self._told = new
+            if self._tick is None:
+                continue
+            since, self._tally = self._tally, Tally()  # no lock: the loop is never to wait for this thread
+            self._say(self._line(self._tick, since))
+            new = {(action.subject, action.condition, action.response): action.text for action in self._tick.actions}
+            for key, text in new.items():
+                if key not in self._told:
+                    self._say(f"  {text}")
+            self._told = set(new)
 
-    def _line(self, tick: Tick) -> str:
+    def _line(self, tick: Tick, since: Tally) -> str:
         seconds = tick.began_s - (self._began_s or 0.0)
         if tick.fleet is None or tick.decisions is None:
             return f"{seconds:6.0f} s  no decision"
-        changed = f"{tick.decisions.count_intervened} of {int(tick.fleet.controlled.sum())}"
-        return (
-            f"{seconds:6.0f} s  closest {closest_m(tick.fleet):5.1f} m, {changed} commands changed, "
-            f"policy {1e3 * tick.policy_age_s:.0f} ms old"
-        )
+        near = "no other boat" if math.isinf(since.closest_m) else f"closest {since.closest_m:5.1f} m"
+        changed = f"{since.changed} of {since.commands} commands changed"
+        return f"{seconds:6.0f} s  {near}, {changed}, policy {1e3 * tick.policy_age_s:.0f} ms old"
 
 
 @contextlib.contextmanager
 def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
     """Write the log to a file, and to standard error when ``shown``, from a thread of its own.
 
-    Whatever a disk or a terminal does, logging costs the loop no time.
+    Whatever a disk or a terminal does, logging costs the loop no time. The file is left only where something was
+    logged: warnings and failures; what happened in a run is in its black box.
 
     Raises:
         BridgeError: the file cannot be made.
@@ -100,6 +106,9 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
         listener.stop()
         for handler in handlers:
             handler.close()
+        with contextlib.suppress(OSError):
+            if path is not None and path.stat().st_size == 0:
+                path.unlink()  # nothing had to be said
 
 
 def _file(path: Path) -> logging.Handler:

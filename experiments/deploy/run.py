@@ -59,7 +59,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         publishers = _publishers(fleet, orders)
         for publisher in publishers:
             stack.callback(publisher.close)
-        station = Station(fleet, orders.boat, clock, tlog=orders.tlog)
+        station = Station(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
         try:
             with station, ended_by_signals(operator):
                 checks = checks_of(station, orders.minutes or LONGEST_MINUTES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
@@ -38,6 +39,7 @@ class Station:
         boat: name of this process's boat, or None for all of the team.
         clock: the loop's.
         tlog: whether raw packets are kept in the log folder.
+        begun_unix_s: time, s since 1970, that this run's files are named after; None: now.
 
     Raises:
         FleetFileError: there is nothing to command.
@@ -46,8 +48,11 @@ class Station:
         BridgeError: the feed cannot be heard, or the packet log cannot be made.
     """
 
-    def __init__(self, fleet: FleetFile, boat: str | None, clock: Clock, *, tlog: bool = True) -> None:
+    def __init__(
+        self, fleet: FleetFile, boat: str | None, clock: Clock, *, tlog: bool = True, begun_unix_s: float | None = None
+    ) -> None:
         self.fleet, self.clock = fleet, clock
+        self.begun_unix_s = time.time() if begun_unix_s is None else begun_unix_s
         commanded = fleet.commanded(boat)
         signing = signing_of(fleet)
         self._endpoints: dict[str, Endpoint] = {}
@@ -58,7 +63,7 @@ class Station:
         """What each boat was left doing, once closed."""
         try:
             if tlog:
-                self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog"))
+                self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog", self.begun_unix_s))
             self.links = {entry.name: self._link(entry) for entry in commanded}
             self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
             listen = fleet.feed_listen(boat)

@@ -12,11 +12,18 @@ from steerclear.shield.platforms import layout as L
 
 
 class Tally:
-    """Counts decisions and keeps the closest approach of own boats to any other."""
+    """Counts decisions and keeps the closest approach of own boats to any other.
+
+    Attributes:
+        commands: of own boats that were decided.
+        changed: of these, by the shield.
+        closest_m: closest approach, as believed, m; inf: nobody else was there.
+    """
 
     def __init__(self) -> None:
-        self._ticks = self._decided = self._commands = self._changed = self._best_effort = self._responses = 0
-        self._closest_m = math.inf
+        self._ticks = self._decided = self._best_effort = self._responses = 0
+        self.commands = self.changed = 0
+        self.closest_m = math.inf
         self._least_m = math.inf
 
     def take(self, tick: Tick) -> None:
@@ -28,11 +35,11 @@ class Tally:
             return
         own = tick.fleet.controlled
         self._decided += 1
-        self._commands += int(own.sum())
-        self._changed += decisions.count_intervened
+        self.commands += int(own.sum())
+        self.changed += decisions.count_intervened
         self._best_effort += int((decisions.reason[own] == Reason.BEST_EFFORT).sum())
         self._least_m = min(self._least_m, float(decisions.certificate_m[own].min(initial=math.inf)))
-        self._closest_m = min(self._closest_m, closest_m(tick.fleet))
+        self.closest_m = min(self.closest_m, closest_m(tick.fleet))
 
     def close(self) -> None:
         """Nothing to finish."""
@@ -42,10 +49,10 @@ class Tally:
         return {
             "ticks": float(self._ticks),
             "decided": float(self._decided),
-            "changed_share": self._changed / max(1, self._commands),
+            "changed_share": self.changed / max(1, self.commands),
             "best_effort_commands": float(self._best_effort),
             "ticks_with_actions": float(self._responses),
-            "closest_m": self._closest_m,
+            "closest_m": self.closest_m,
             "least_certificate_m": self._least_m,
         }
 
@@ -56,3 +63,8 @@ def closest_m(fleet: Fleet) -> float:
     apart = np.hypot(*np.moveaxis(at[:, None] - at[None], -1, 0))
     np.fill_diagonal(apart, np.inf)
     return float(apart[fleet.controlled].min(initial=math.inf))
+
+
+def distance_words(distance_m: float) -> str:
+    """A closest approach for a person; inf: nobody else was there."""
+    return f"{distance_m:.2f} m" if math.isfinite(distance_m) else "no other boat"

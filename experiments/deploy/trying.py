@@ -52,7 +52,8 @@ def sea_trial(
     refuse_early(fleet)
     warm_up(fleet)
     outcome, trial = Outcome(), None
-    station = Station(fleet, orders.boat, MonotonicClock(orders.speed), tlog=orders.tlog)
+    clock = MonotonicClock(orders.speed)
+    station = Station(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
     try:
         with station, ended_by_signals(operator):
             checks = checks_of(station, LONGEST_MINUTES)

@@ -24,6 +24,9 @@ from .fleet_settings import BoatSettings, FleetSettings
 from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
 
+VERSION = 1
+"""Of the format."""
+
 OUTSIDE_TEAM = 2
 """Team number of boats outside the game that are nobody's."""
 
@@ -186,6 +189,9 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
         raise FleetFileError(f"{where} is not YAML of a fleet file: {error}") from None
     if not isinstance(content, dict):
         raise FleetFileError(f"{where} holds no settings; give version, field, geofence, team and boats")
+    version = content.get("version")
+    if isinstance(version, int) and version > VERSION:
+        raise FleetFileError(f"{where}: version {version} is newer than this steerclear reads ({VERSION}); update it")
     try:
         fleet = FleetFile.model_validate_json(json.dumps(content))  # by JSON's rules lists are lists, and texts paths
     except ValidationError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from typing import Any, get_args
 
@@ -10,6 +11,11 @@ from pydantic.fields import FieldInfo
 
 LONGEST_NAME = 120
 """Of a place in the file, characters."""
+
+WORDS_OF_A_PROGRAMMER = ("string_pattern_mismatch",)
+"""Faults whose text is left out where the remedy says it."""
+
+_SUBJECT = re.compile("^(Input|String|List|Tuple|Dictionary|Value)(?= should)")
 
 
 def explain(error: ValidationError, root: type[BaseModel]) -> str:
@@ -32,8 +38,8 @@ def _sentence(fault: Any, root: type[BaseModel]) -> str:
         return f"unknown key {name!r}; {hint}"
     if fault["type"] == "missing":
         return f"{name} is missing; {remedy or 'give it'}"
-    said = fault["msg"][:1].lower() + fault["msg"][1:]
-    return f"{name} is {_short(fault['input'])}: {said}; {remedy or 'correct it'}"
+    said = "" if remedy and fault["type"] in WORDS_OF_A_PROGRAMMER else f": {_SUBJECT.sub('it', fault['msg'])}"
+    return f"{name} is {_short(fault['input'])}{said}; {remedy or 'correct it'}"
 
 
 def _find(root: type[BaseModel], place: tuple[int | str, ...]) -> tuple[type[BaseModel] | None, FieldInfo | None]:

@@ -206,7 +206,7 @@ class End(Section):
 class FleetSettings(Section):
     """The whole file, section by section; `fleet_file.FleetFile` adds what follows from it."""
 
-    version: Annotated[int, Field(ge=1, le=1, description="the version of the format: 1")]
+    version: Annotated[int, Field(ge=1, le=1, description="give the version of the format: 1")]
     rate_hz: Annotated[float, Field(ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")] = 10.0
     field: FieldSettings = Field(description="give origin and size_m of the field")
     geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the water no boat may leave")

@@ -36,6 +36,8 @@ WORTH_TELLING_M = 0.15
 """Margins beyond what was declared by more than this are told."""
 ROUNDING_M = 0.05
 """Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
+MISSED = 1.5
+"""Turns farther apart than so many steps are not one after the other."""
 FRESH_S = 0.3
 """Places older than this are no measurement, s."""
 
@@ -63,6 +65,7 @@ class Foresight:
         self._told: deque[Array] = deque(maxlen=longest)
         self._errors = np.full((round(MEMORY_S / config.dt_s), len(boats), len(AHEAD_S)), np.nan)
         self._number = 0
+        self._read_s = math.inf
         self._outside_s = np.zeros(len(boats))
         self.margin_m = {name: float(margin) for name, margin in zip(boats, self._declared_m, strict=True)}
         """Bound on the error of each boat's place that the shield is to count on, m."""
@@ -74,6 +77,7 @@ class Foresight:
             rows: state of each boat as estimated; None: not known.
             readings: their telemetry.
         """
+        self._look_at_clock(max(reading.read_s for reading in readings.values()) if readings else self._read_s)
         now = np.full((len(self._boats), L.N_STATE), np.nan)
         for i, name in enumerate(self._boats):
             row, reading = rows.get(name), readings[name]
@@ -86,6 +90,13 @@ class Foresight:
             errors[:, k] = self._missed_m(now, steps)
         self._number += 1
         self._judge(errors)
+
+    def _look_at_clock(self, read_s: float) -> None:
+        """After turns that were left out nothing is held against what was foreseen before them: it counts in turns."""
+        if read_s - self._read_s > MISSED * self._dt_s:
+            self._rows.clear()
+            self._told.clear()
+        self._read_s = read_s
 
     def sent(self, sent: Mapping[str, Sent]) -> None:
         """Note what left at this turn."""
@@ -115,11 +126,14 @@ class Foresight:
                 outside = missed > self._limit.outside_m
                 change = self._dt_s if outside else -self._dt_s
                 self._outside_s[i] = max(0.0, self._outside_s[i] + change)
-            missed_m = self.quantile_m(name)
-            missed_m = missed_m if missed_m > ROUNDING_M else 0.0
-            goal = max(float(self._declared_m[i]), min(missed_m, self._limit.widest_m))
             step = WIDEN_MPS * self._dt_s
-            self.margin_m[name] += min(max(goal - self.margin_m[name], -step), step)
+            self.margin_m[name] += min(max(self._goal_m(name) - self.margin_m[name], -step), step)
+
+    def _goal_m(self, name: str) -> float:
+        """Margin that a boat's errors ask for, m, within its bounds."""
+        missed_m = self.quantile_m(name)
+        missed_m = missed_m if missed_m > ROUNDING_M else 0.0
+        return max(float(self._declared_m[self._boats.index(name)]), min(missed_m, self._limit.widest_m))
 
     def quantile_m(self, boat: str, ahead: int = TOLD_BY, share: float = SHARE) -> float:
         """Quantile of a boat's errors so far ahead (place in `AHEAD_S`), m; 0 while too little was seen."""
@@ -148,11 +162,13 @@ class Foresight:
 
     def _words(self, name: str) -> str:
         missed = "/".join(f"{self.quantile_m(name, k):.1f}" for k in range(len(AHEAD_S)))
-        bound = " (the most that limits.model.widest_m allows)" if self._is_bounded(name) else ""
+        margin, goal = self.margin_m[name], self._goal_m(name)
+        growing = f", growing to {goal:.2f} m" if goal > margin + 0.005 else ""
+        bound = ", the most that limits.model.widest_m allows" if self._is_bounded(name) else ""
         return (
-            f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {self.margin_m[name]:.2f} m{bound}"
-            "; steerclear fit this run's log"
+            f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {margin:.2f} m{growing}{bound}"
+            "; if it stays so, steerclear fit this run's log"
         )
 
     def _is_bounded(self, name: str) -> bool:
-        return self.quantile_m(name) > self._limit.widest_m
+        return self.quantile_m(name) > self._limit.widest_m >= self._goal_m(name)

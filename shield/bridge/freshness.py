@@ -161,7 +161,10 @@ def _judge_policy(fleet: FleetFile, seen: Seen, boat: str, verdict: Verdict) -> 
     if seen.overridden("policy", boat):
         response = "stop"
     fault = f" ({seen.policy_fault})" if seen.policy_fault else ""
-    text = f"{boat}: no usable command of the policy, last {words(age)}{fault}"
+    if math.isfinite(age):
+        text = f"{boat}: no usable command of the policy, last {words(age)}{fault}"
+    else:
+        text = f"{boat}: no answer of the policy yet{fault}"
     verdict.due(Action(boat, "policy", response, text), (boat,))
 
 

@@ -32,6 +32,9 @@ TELLING_DEG = 0.3
 LATER_S = 0.15
 """Commands that work later than declared by more than this are told of, s."""
 
+MISSED = 1.5
+"""Turns farther apart than so many steps are not one after the other."""
+
 ENOUGH_DEG2 = 30.0
 """Sum of squared disagreement needed before an answer is given, deg^2."""
 
@@ -48,6 +51,7 @@ class DelayMeter:
         self._params = platform.pack()
         self._dt_s = dt_s
         self._rows: Array | None = None
+        self._read_s = math.inf
         self._commands: deque[tuple[float, float] | None] = deque([None] * (LONGEST_STEPS + 1), LONGEST_STEPS + 1)
         self._cost = np.zeros(LONGEST_STEPS + 1)
         self._told = 0.0
@@ -67,6 +71,10 @@ class DelayMeter:
 
     def update(self, reading: BoatReading) -> None:
         """Take a reading at a turn of the loop, before this turn's command is sent."""
+        if reading.read_s - self._read_s > MISSED * self._dt_s:  # turns were left out: it counts in turns
+            self._rows = None
+            self._commands.extend([None] * len(self._commands))
+        self._read_s = reading.read_s
         seen = _seen_of(reading)
         if not np.isfinite(seen).all() or reading.age_s > 3.0 * self._dt_s:
             self._rows = None
@@ -78,7 +86,7 @@ class DelayMeter:
         foretold = self._foretell(self._rows)
         missed = (seen[2] - foretold + 180.0) % 360.0 - 180.0
         apart = float(np.ptp(missed))
-        if TELLING_DEG < apart < 90.0:
+        if TELLING_DEG < apart < 90.0 and None not in self._commands:
             self._cost = self._keep * self._cost + missed**2
             self._told = self._keep * self._told + apart**2
         self._rows[:, [L.X, L.Y, L.HEADING, L.SPEED]] = seen

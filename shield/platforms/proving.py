@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
@@ -28,6 +28,37 @@ STOPPED = 0.05
 TURN_DEG = 90.0
 NEAR_DEG = 30.0
 """How near to the heading commanded, deg, the boat must come."""
+
+_REMEDIES = {
+    "speed": {L.KIND_USV: "thrust_map, max_thrust and speed_pid or speed_factor"},
+    "turn": {
+        L.KIND_USV: "turn_gain, max_rudder and heading_pid",
+        L.KIND_RATE: "turn_rate_at_rest_dps or turn_rate_per_mps, max_turn_rate_dps, max_angular_acc_dps2, turn_lag_s",
+    },
+    "stop": {
+        L.KIND_USV: "thrust_map, max_dec and speed_pid",
+        L.KIND_RATE: "max_dec and speed_lag_s",
+        L.KIND_DOUBLE_INTEGRATOR: "max_acc",
+    },
+}
+"""Settings that a manoeuvre hangs on, by kind, where none alone is at fault; other kinds: `_LIMITS`."""
+
+_LIMITS = {
+    "speed": {"max_acc": L.MAX_ACC},
+    "turn": {"max_turn_rate_dps": L.MAX_TURN_RATE, "max_angular_acc_dps2": L.MAX_ANGULAR_ACC},
+    "stop": {"max_dec": L.MAX_DEC},
+}
+"""Limits of a manoeuvre; one of them alone may be at fault."""
+
+_LAGS = {
+    "speed": ("speed_lag_s", L.SPEED_LAG),
+    "turn": ("turn_lag_s", L.TURN_LAG),
+    "stop": ("speed_lag_s", L.SPEED_LAG),
+}
+"""Of kind rate; so may its lag."""
+
+_AMPLE = 90.0
+"""No boat needs more of a limit to come to its speed, to turn or to stop: m/s2, deg/s, deg/s2."""
 
 _unproved: ContextVar[bool] = ContextVar("unproved", default=False)
 
@@ -56,24 +87,49 @@ def fault_of(platform: Platform) -> str | None:
 @lru_cache(maxsize=256)
 def _fault_of(packed: bytes) -> str | None:
     params = np.frombuffer(packed, np.float64).copy()
-    usv = params[L.KIND] == L.KIND_USV
-    top_mps, state = float(params[L.MAX_SPEED]), fresh_state(0.0, 0.0, 0.0)
-    fastest = _run(params, state, top_mps, 0.0)
-    if not fastest >= REACHED * top_mps:
-        remedy = "thrust_map, max_thrust and speed_pid or speed_factor" if usv else "max_acc"
-        return f"told {top_mps:g} m/s it comes to {fastest:.3g} m/s within {WITHIN_S:g} s; give its {remedy}"
-    off_deg = _turn(params, state, top_mps)
-    if not off_deg <= NEAR_DEG:
-        remedy = "turn_gain, max_rudder and heading_pid" if usv else "max_turn_rate_dps and max_angular_acc_dps2"
-        if params[L.KIND] == L.KIND_RATE:
-            remedy = "turn_rate_at_rest_dps or turn_rate_per_mps, and max_turn_rate_dps"
-        left = f"{off_deg:.3g} of {TURN_DEG:g} deg are left after {WITHIN_S:g} s"
-        return f"told to turn, {left}; give its {remedy}"
-    _run(params, state, 0.0, 0.0)
-    if not state[L.SPEED] <= STOPPED * top_mps:
-        remedy = "thrust_map, max_dec and speed_pid" if usv else "max_acc"
-        return f"told to stop it does {state[L.SPEED]:.3g} m/s after {WITHIN_S:g} s; give its {remedy}"
+    state = fresh_state(0.0, 0.0, 0.0)
+    for manoeuvre, fault_in in (("speed", _fault_in_speed), ("turn", _fault_in_turn), ("stop", _fault_in_stop)):
+        before = state.copy()
+        fault = fault_in(params, state)
+        if fault:
+            return f"{fault}; give its {_at_fault(manoeuvre, params, before, fault_in)}"
     return None
+
+
+def _fault_in_speed(params: Array, state: Array) -> str:
+    top_mps = float(params[L.MAX_SPEED])
+    fastest = _run(params, state, top_mps, 0.0)
+    if fastest >= REACHED * top_mps:
+        return ""
+    return f"told {top_mps:g} m/s it comes to {fastest:.3g} m/s within {WITHIN_S:g} s"
+
+
+def _fault_in_turn(params: Array, state: Array) -> str:
+    off_deg = _turn(params, state, float(params[L.MAX_SPEED]))
+    if off_deg <= NEAR_DEG:
+        return ""
+    return f"told to turn, {off_deg:.3g} of {TURN_DEG:g} deg are left after {WITHIN_S:g} s"
+
+
+def _fault_in_stop(params: Array, state: Array) -> str:
+    _run(params, state, 0.0, 0.0)
+    if state[L.SPEED] <= STOPPED * params[L.MAX_SPEED]:
+        return ""
+    return f"told to stop it does {state[L.SPEED]:.3g} m/s after {WITHIN_S:g} s"
+
+
+def _at_fault(manoeuvre: str, params: Array, state: Array, fault_in: Callable[[Array, Array], str]) -> str:
+    """The settings of which each alone, with another value, mends a manoeuvre begun in ``state``; else all of its."""
+    kind, found = int(params[L.KIND]), []
+    trials = [(name, column, max(_AMPLE, float(params[column]))) for name, column in _LIMITS[manoeuvre].items()]
+    if kind == L.KIND_RATE:
+        trials.append((*_LAGS[manoeuvre], 0.0))
+    for name, column, value in trials:
+        mended = params.copy()
+        mended[column] = value
+        if not fault_in(mended, state.copy()):
+            found.append(name)
+    return " or ".join(found) or _REMEDIES[manoeuvre].get(kind, " and ".join(_LIMITS[manoeuvre]))
 
 
 def _run(params: Array, state: Array, speed_mps: float, error_deg: float) -> float:

@@ -72,3 +72,20 @@ def test_a_folder_is_no_record(folder, tmp_path, monkeypatch):
     done = CliRunner().invoke(app, ["render", folder], terminal_width=200)
     assert done.exit_code == ExitCode.BAD_INPUT
     assert "is a folder; name a record in it" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["../../x y", "a/b", "..", ".hidden", "two words", "", "boat.yaml", "b" * 33, "é"])
+def test_a_new_platform_has_a_plain_name_and_lies_where_it_was_begun(name, tmp_path, monkeypatch):
+    here = tmp_path / "one" / "two"
+    here.mkdir(parents=True)
+    monkeypatch.chdir(here)
+    done = CliRunner().invoke(app, ["platform", "new", "--", name], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "give 1 to 32 letters, digits" in done.stderr
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_a_new_platform_of_a_plain_name_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["platform", "new", "my-boat_2.b"]).exit_code == 0
+    assert (tmp_path / "my-boat_2.b.yaml").exists()

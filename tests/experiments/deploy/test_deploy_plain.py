@@ -1,6 +1,8 @@
 """Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
 
+import dataclasses
 import logging
+import math
 import os
 import signal
 import subprocess
@@ -19,10 +21,13 @@ from steerclear.experiments.deploy.quiet import (
     before_others,
     ended_by_signals,
     undisturbed,
+    warm_up,
 )
-from steerclear.experiments.deploy.tally import Tally
+from steerclear.experiments.deploy.tally import Tally, closest_m, distance_words
+from steerclear.shield import Commands, Shield, ShieldConfig, shield
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import Action
+from steerclear.shield.fleet import Fleet
 
 
 @pytest.fixture
@@ -48,12 +53,67 @@ def test_lines_say_how_it_goes(ticks):
     assert any("red_1 old" in line for line in lines)
 
 
+def test_a_line_counts_all_that_happened_since_the_last_one(ticks):
+    lines = []
+    sink = PlainLines(lines.append, every_s=0.3)
+    for tick in ticks:
+        sink.take(tick)
+    said = told(lines)
+    sink.close()
+    commands = sum(int(tick.fleet.controlled.sum()) for tick in ticks)
+    changed = sum(tick.decisions.count_intervened for tick in ticks)
+    closest = min(closest_m(tick.fleet) for tick in ticks)
+    assert f"closest {closest:5.1f} m, {changed} of {commands} commands changed" in said[0]
+    assert len(ticks) > 1 < commands
+
+
+def test_a_boat_alone_has_no_closest_approach(fleet_of):
+    tick = Stream(fleet_of(2)).tick()
+    fleet = tick.fleet
+    one = Fleet(fleet.state[:1], fleet.team[:1], fleet.platforms[:1], fleet.controlled[:1], fleet.names[:1])
+    guard = Shield(ShieldConfig())
+    alone = dataclasses.replace(tick, fleet=one, decisions=guard.decide(one, Commands.relative_deg([[1.0, 0.0]])))
+    lines = []
+    sink = PlainLines(lines.append, every_s=0.02)
+    sink.take(alone)
+    said = told(lines)
+    sink.close()
+    assert "no other boat, " in said[0]
+    assert "inf" not in said[0]
+    assert distance_words(math.inf) == "no other boat"
+    assert distance_words(3.456) == "3.46 m"
+
+
+def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_response_changes(ticks):
+    lines = []
+    sink = PlainLines(lines.append, every_s=0.05)
+    for response, ages in (("slow", (1.0, 1.5, 2.0)), ("stop", (5.0, 5.5))):
+        for age in ages:
+            action = Action("red_1", "contact", response, f"red_1 {age} s old")
+            sink.take(dataclasses.replace(ticks[0], actions=(action,)))
+            time.sleep(0.12)
+    sink.close()
+    said = [line.strip() for line in lines if "red_1" in line]
+    assert len(said) == 2
+    assert said[0] in {f"red_1 {age} s old" for age in (1.0, 1.5, 2.0)}
+    assert said[1] in {f"red_1 {age} s old" for age in (5.0, 5.5)}
+
+
 def test_nothing_is_said_before_the_first_tick():
     lines = []
     sink = PlainLines(lines.append, every_s=0.01)
     time.sleep(0.1)
     sink.close()
     assert lines == []
+
+
+def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
+    seen = set()
+    for name in ("begin", "linearise", "solve", "accept", "finish"):
+        stage = getattr(shield, name)
+        monkeypatch.setattr(shield, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+    warm_up(fleet_of(2).with_shield(position_error_m=0.3, delay_s=0.1))
+    assert seen == {"begin", "linearise", "solve", "accept", "finish"}
 
 
 def test_logs_go_to_the_file(tmp_path):
@@ -63,6 +123,13 @@ def test_logs_go_to_the_file(tmp_path):
         logging.getLogger("steerclear.test").warning("override of %s", "red_1")
     assert "override of red_1" in path.read_text()
     assert logging.getLogger().handlers == before
+
+
+def test_a_run_of_which_nothing_was_logged_leaves_no_empty_file(tmp_path):
+    path = tmp_path / "run.log"
+    with logging_aside(path, shown=False):
+        assert path.exists(), "it could be made"
+    assert not path.exists()
 
 
 def test_a_run_is_counted(ticks):

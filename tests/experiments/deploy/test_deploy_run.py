@@ -20,7 +20,7 @@ from steerclear.experiments.deploy.rules import game_config, player_names, state
 from steerclear.experiments.deploy.run import deploy
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.experiments.keys import KEYS, undocumented
-from steerclear.shield.bridge.blackbox import LogReader
+from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
@@ -113,8 +113,10 @@ def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, e
     assert {"disk", "known", "geofence", "certificate", *drilled} <= {r.name for r in seen}
     fleet = load_fleet(fleet_file)
     with referee(fleet):
-        outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY))
+        outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY, begun_unix_s=86400.0))
     assert outcome.refused == []
+    assert outcome.log == log_path(fleet.log_dir, ".mcap", 86400.0)
+    assert outcome.log.with_suffix(".tlog").exists(), "all files of a run have one name"
     assert outcome.ended.startswith("ran for")
     assert outcome.figures["decided"] > 10
     assert "HOLD" in outcome.left[0]
@@ -289,8 +291,10 @@ def test_a_drill_counts_for_the_same_file_for_a_while_and_when_it_passed(fleet_f
 
 def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(fleet_file):
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == pytest.approx(0.1)
+    assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.0, "a demonstration"
     fleet_file.write_text(fleet_file.read_text() + "\nshield: {delay_s: 0.4}\n")
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.4
+    assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.4
 
 
 def test_a_boat_that_is_nobodys_is_named(fleet_file):

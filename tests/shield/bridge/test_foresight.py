@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 DT_S, NAME = 0.1, "blue_1"
 
 
-def drive(turn_share=1.0, seconds=40.0, limits=None, aged=None, speed_share=1.0):
+def drive(turn_share=1.0, seconds=40.0, limits=None, aged=None, speed_share=1.0, left_out=()):
     """A rover weaves; its turning differs from its platform's by a share. Gives the foresight and its margins."""
     fleet = fleet_of(blue=1, red=0, platform="ardurover_boat")
     if limits is not None:
@@ -32,8 +32,9 @@ def drive(turn_share=1.0, seconds=40.0, limits=None, aged=None, speed_share=1.0)
         told = 2.5, 80.0 * math.sin(0.9 * k * DT_S)
         age = aged(k * DT_S) if aged is not None else 0.0
         reading = BoatReading(NAME, k * DT_S, position_age_s=age, ready=True)
-        foresight.update({NAME: row.copy()}, {NAME: reading})
-        foresight.sent({NAME: Sent(NAME, k * DT_S, math.radians(told[1]), told[0], "told", True)})
+        if k not in left_out:
+            foresight.update({NAME: row.copy()}, {NAME: reading})
+            foresight.sent({NAME: Sent(NAME, k * DT_S, math.radians(told[1]), told[0], "told", True)})
         step_boat(true, row, told[0], math.remainder(told[1] - row[L.HEADING], 360.0), DT_S)
         margins.append(foresight.margin_m[NAME])
     return foresight, np.array(margins)
@@ -44,6 +45,15 @@ def test_a_boat_that_is_its_model_gets_no_margin():
     assert margins.max() == 0.0
     assert foresight.quantile_m(NAME, 2) < 1e-6
     assert foresight.actions() == []
+
+
+@pytest.mark.parametrize("turns", [1, 19])
+def test_turns_that_were_left_out_are_no_fault_of_the_model(turns):
+    foresight, margins = drive(left_out=range(150, 150 + turns))
+    assert margins.max() == 0.0
+    assert foresight.quantile_m(NAME, 0, share=1.0) < 1e-6
+    assert foresight.quantile_m(NAME, 2) < 1e-6
+    assert foresight.outside_s(NAME) == 0.0
 
 
 def test_what_the_model_misses_widens_the_margin_slowly_and_is_told():
@@ -60,6 +70,19 @@ def test_what_the_model_misses_widens_the_margin_slowly_and_is_told():
 def test_the_margin_is_bounded_as_declared():
     _, margins = drive(turn_share=0.3, limits={"widest_m": 0.25})
     assert margins.max() == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("seconds", [10.0, 40.0])
+def test_a_margin_under_way_to_its_bound_is_not_told_as_the_bound(seconds):
+    foresight, margins = drive(turn_share=0.3, limits={"widest_m": 0.5}, seconds=seconds)
+    (action,) = foresight.actions()
+    bound = "the most that limits.model.widest_m allows"
+    assert foresight.quantile_m(NAME) > 0.5
+    if seconds < 20.0:
+        assert margins[-1] < 0.4
+        assert f"margin {margins[-1]:.2f} m, growing to 0.50 m, {bound}" in action.text
+    else:
+        assert f"margin 0.50 m, {bound}" in action.text
 
 
 def test_errors_grow_with_the_time_ahead():

@@ -57,6 +57,7 @@ def test_nothing_is_due_while_all_is_well():
         ({"policy_age_s": {"blue_1": 0.6}}, "hold_course", "no usable command"),
         ({"policy_age_s": {"blue_1": 3.1}}, "hold_station", "3.1 s old"),
         ({"usable": ()}, "hold_course", "no usable command"),
+        ({"usable": (), "policy_age_s": {}}, "hold_station", "blue_1: no answer of the policy yet"),
         ({"usable": (), "policy_age_s": {}, "policy_fault": "it died"}, "hold_station", "it died"),
         ({"game_age_s": 2.1}, "hold_station", "state of the game"),
         ({"game_expected": True}, "hold_station", "never heard"),

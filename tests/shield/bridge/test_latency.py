@@ -12,7 +12,7 @@ from steerclear.shield.platforms import get_platform
 DT_S = 0.1
 
 
-def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0):
+def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0, left_out=()):
     clock = ManualClock()
     link = FakeLink("blue_1", clock, platform, 0.0, 0.0, 0.0, 1.0)
     meter = DelayMeter(get_platform(platform), DT_S)
@@ -20,9 +20,10 @@ def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0):
     for k in range(round(seconds / DT_S)):
         reading = link.read()
         turned = math.radians(noise_deg) * random.normal()
-        meter.update(type(reading)(**{**vars(reading), "heading_rad": reading.heading_rad + turned}))
         heading = 0.0 if steady else math.radians(60.0) * ((k // 40) % 3)
-        meter.sent(heading, 2.0)
+        if k not in left_out:
+            meter.update(type(reading)(**{**vars(reading), "heading_rad": reading.heading_rad + turned}))
+            meter.sent(heading, 2.0)
         queue.append((math.degrees(heading), 2.0))
         link.command = queue.pop(0)
         link.advance(DT_S)
@@ -38,6 +39,11 @@ def test_the_delay_is_found(platform, steps):
 
 def test_the_delay_is_found_through_noise():
     assert measure("heron", 2, noise_deg=0.5) == pytest.approx(0.2, abs=0.06)
+
+
+def test_turns_that_were_left_out_make_no_delay():
+    gaps = {k + i for k in range(30, 600, 80) for i in range(15)}  # every other turn of the boat falls into one
+    assert measure("heron", 1, left_out=gaps) == pytest.approx(0.1, abs=0.05)
 
 
 def test_a_boat_that_holds_its_course_tells_nothing():

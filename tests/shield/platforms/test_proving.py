@@ -28,7 +28,8 @@ def test_the_boats_of_the_package_are_boats(name):
         ({"turn_gain": 0.0}, r"told to turn, 90 of 90 deg are left"),
         ({"max_rudder": 0.0}, r"told to turn"),
         ({"thrust_map": ((0.0, 1.5), (100.0, 2.0))}, r"told to stop it does 1.5 m/s after 60 s; give its thrust_map"),
-        ({"max_dec": 0.001}, r"told to stop it does"),
+        ({"max_dec": 0.001}, r"told to stop it does 1.9.* m/s after 60 s; give its max_dec$"),
+        ({"max_acc": 0.001}, r"told 2 m/s it comes to .*; give its max_acc$"),
     ],
 )
 def test_thrust_boats_that_are_none_are_told_what_they_lack(changes, text):
@@ -39,9 +40,9 @@ def test_thrust_boats_that_are_none_are_told_what_they_lack(changes, text):
 @pytest.mark.parametrize(
     ("kind", "lacking", "text"),
     [
-        ("single_integrator", "max_turn_rate_dps", r"told to turn.*give its max_turn_rate_dps"),
-        ("double_integrator", "max_turn_rate_dps", r"told to turn.*max_angular_acc_dps2"),
-        ("double_integrator", "max_angular_acc_dps2", r"told to turn"),
+        ("single_integrator", "max_turn_rate_dps", r"told to turn.*give its max_turn_rate_dps$"),
+        ("double_integrator", "max_turn_rate_dps", r"told to turn.*give its max_turn_rate_dps$"),
+        ("double_integrator", "max_angular_acc_dps2", r"told to turn.*give its max_angular_acc_dps2$"),
         ("double_integrator", "max_acc", r"comes to 0 m/s within 60 s; give its max_acc"),
     ],
 )
@@ -49,6 +50,24 @@ def test_integrators_that_are_none_are_told_what_they_lack(kind, lacking, text):
     Platform(name="mine", kind=kind, **UNICYCLE)
     with pytest.raises(PlatformError, match=text):
         Platform(name="mine", kind=kind, **UNICYCLE | {lacking: 0.0})
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"max_dec": 0.01}, r"told to stop it does .* m/s after 60 s; give its max_dec$"),
+        ({"max_acc": 0.01}, r"it comes to .* within 60 s; give its max_acc$"),
+        ({"speed_lag_s": 1000.0}, r"it comes to .* within 60 s; give its speed_lag_s$"),
+        ({"turn_lag_s": 1e5}, r"told to turn, .* after 60 s; give its turn_lag_s$"),
+        ({"max_angular_acc_dps2": 0.01}, r"told to turn, .*give its max_angular_acc_dps2$"),
+        ({"max_turn_rate_dps": 0.01}, r"told to turn, .*give its max_turn_rate_dps$"),
+        ({"turn_rate_at_rest_dps": 0.0, "turn_rate_per_mps": 0.0}, r"give its turn_rate_at_rest_dps or turn_rate_per"),
+        ({"max_turn_rate_dps": 0.01, "turn_lag_s": 1e5}, r"give its turn_rate_at_rest.*max_turn_rate.*turn_lag_s$"),
+    ],
+)
+def test_of_what_a_manoeuvre_hangs_on_the_setting_at_fault_is_named(changes, text):
+    with pytest.raises(PlatformError, match=text):
+        replace(get_platform("ardurover_boat"), **changes)
 
 
 def test_a_name_a_kind_and_a_speed_make_no_boat():
