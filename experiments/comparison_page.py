@@ -72,7 +72,7 @@ def _intro(versions: Sequence[str]) -> str:
         "All guards of a section met the same encounters. "
         "*Breached* counts encounters in which an own boat came within the radius of another boat, *avoidable* "
         "those that some own command of the last 30 s would have prevented; [ ] is the one-sided 95 % upper limit "
-        "of the probability. *Started outside* are encounters at whose first decision every own boat had an "
+        "of the probability. *Started outside* are encounters at whose first decision every own boat had a "
         "backup by the default shield's certificate. *Time to goal* is that without a guard times the number; own "
         "boats that *never arrived* had not reached their goal by the end of an encounter, though without a guard "
         "they do. *Left alone*: of states sampled along the encounters without a guard that are safe by the value "
