@@ -137,7 +137,7 @@ def _orders(
 
 
 def _table(figures: dict[str, float]) -> Table:
-    table = Table(title="the run")
+    table = Table(title="the run", title_justify="left", show_header=False)
     table.add_column("")
     table.add_column("", justify="right")
     rows = (
