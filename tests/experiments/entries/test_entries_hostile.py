@@ -60,9 +60,13 @@ def test_an_entry_that_is_ended_forfeits_its_moves_and_the_game_goes_on(team_of,
     assert "hold for the rest of the game" in team.held["agent_0"]
 
 
-def test_an_entry_that_stops_its_keeper_and_plays_on_is_ended(team_of, play):
+def test_an_entry_that_stops_its_keeper_and_plays_on_is_ended(team_of, game):
     team = team_of("os.kill(os.getppid(), 19)\nreturn 4", limits=SMALL)
-    assert play(team, 5)[-1] == HELD
+    env, observations, infos = game
+    team.reset(env, list(HELD), 0)
+    by = time.monotonic() + 10.0
+    while team.act(observations, infos) != HELD:  # on a busy machine the stop takes its time
+        assert time.monotonic() < by, "it plays on"
     (failure,) = team.report().failures
     assert "stopped the process that watches it" in failure.message
 
