@@ -18,6 +18,7 @@ from ..platforms import layout as L
 from ..tracking.tracks import run_on_commands, steps_of_delay
 from .fleet_file import FleetFile
 from .link import BoatReading, Sent
+from .overruns import left_out
 from .tick import Action
 
 AHEAD_S = (1.0, 2.0, 3.0)
@@ -36,8 +37,6 @@ WORTH_TELLING_M = 0.15
 """Margins beyond what was declared by more than this are told."""
 ROUNDING_M = 0.05
 """Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
-MISSED = 1.5
-"""Turns farther apart than so many steps are not one after the other."""
 FRESH_S = 0.3
 """Places older than this are no measurement, s."""
 
@@ -92,10 +91,14 @@ class Foresight:
         self._judge(errors)
 
     def _look_at_clock(self, read_s: float) -> None:
-        """After turns that were left out nothing is held against what was foreseen before them: it counts in turns."""
-        if read_s - self._read_s > MISSED * self._dt_s:
-            self._rows.clear()
-            self._told.clear()
+        """Turns that were left out count, too: nothing was seen in them, and the command before them stayed in force.
+
+        So a loop that often falls behind still finds out a model that is wrong.
+        """
+        for _ in range(min(left_out(read_s - self._read_s, self._dt_s), self._rows.maxlen or 0)):
+            self._rows.append(np.full((len(self._boats), L.N_STATE), np.nan))
+            if self._told:
+                self._told.append(self._told[-1])
         self._read_s = read_s
 
     def sent(self, sent: Mapping[str, Sent]) -> None:

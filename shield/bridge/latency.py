@@ -18,6 +18,7 @@ from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
 from ..tracking.tracks import thrust_at
 from .link import BoatReading, Sent
+from .overruns import left_out
 from .tick import Action
 
 LONGEST_STEPS = 8
@@ -31,9 +32,6 @@ TELLING_DEG = 0.3
 
 LATER_S = 0.15
 """Commands that work later than declared by more than this are told of, s."""
-
-MISSED = 1.5
-"""Turns farther apart than so many steps are not one after the other."""
 
 ENOUGH_DEG2 = 30.0
 """Sum of squared disagreement needed before an answer is given, deg^2."""
@@ -71,9 +69,7 @@ class DelayMeter:
 
     def update(self, reading: BoatReading) -> None:
         """Take a reading at a turn of the loop, before this turn's command is sent."""
-        if reading.read_s - self._read_s > MISSED * self._dt_s:  # turns were left out: it counts in turns
-            self._rows = None
-            self._commands.extend([None] * len(self._commands))
+        self._go_through(left_out(reading.read_s - self._read_s, self._dt_s))
         self._read_s = reading.read_s
         seen = _seen_of(reading)
         if not np.isfinite(seen).all() or reading.age_s > 3.0 * self._dt_s:
@@ -90,6 +86,15 @@ class DelayMeter:
             self._cost = self._keep * self._cost + missed**2
             self._told = self._keep * self._told + apart**2
         self._rows[:, [L.X, L.Y, L.HEADING, L.SPEED]] = seen
+
+    def _go_through(self, turns: int) -> None:
+        """Go through turns that were left out: nothing was seen in them, and the last command stayed in force."""
+        if turns > LONGEST_STEPS:
+            self._rows = None
+        for _ in range(min(turns, LONGEST_STEPS + 1)):
+            if self._rows is not None:
+                self._foretell(self._rows)
+            self._commands.append(self._commands[-1])
 
     def sent(self, heading_rad: float, speed_mps: float) -> None:
         """Note the command sent at this turn."""

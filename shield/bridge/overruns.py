@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import logging
+import math
 
 LOG = logging.getLogger(__name__)
 
 TALK_EVERY_S = 10.0
+
+LATE = 0.6
+"""Part of a step that a turn may begin late by and still count as in its place."""
+
+
+def left_out(gap_s: float, dt_s: float) -> int:
+    """Turns that were left out between two that began so long after each other, s; a gap that is not finite: none.
+
+    One that began late by up to `LATE` of a step is not taken for two.
+    """
+    return max(0, math.ceil(gap_s / dt_s - 1.0 - LATE)) if math.isfinite(gap_s) else 0
 
 
 class Overruns:

@@ -29,7 +29,8 @@ def drive(turn_share=1.0, seconds=40.0, limits=None, aged=None, speed_share=1.0,
     ).pack()
     foresight, row, margins = Foresight(fleet, (NAME,)), fresh_state(0.0, 0.0, 0.0, 2.0), []
     for k in range(round(seconds / DT_S)):
-        told = 2.5, 80.0 * math.sin(0.9 * k * DT_S)
+        if k not in left_out:  # else the autopilot goes on with what it was told last
+            told = 2.5, 80.0 * math.sin(0.9 * k * DT_S)
         age = aged(k * DT_S) if aged is not None else 0.0
         reading = BoatReading(NAME, k * DT_S, position_age_s=age, ready=True)
         if k not in left_out:
@@ -54,6 +55,12 @@ def test_turns_that_were_left_out_are_no_fault_of_the_model(turns):
     assert foresight.quantile_m(NAME, 0, share=1.0) < 1e-6
     assert foresight.quantile_m(NAME, 2) < 1e-6
     assert foresight.outside_s(NAME) == 0.0
+
+
+def test_a_loop_that_falls_behind_every_second_still_finds_out_a_wrong_model():
+    foresight, margins = drive(turn_share=0.5, left_out=range(5, 400, 10))
+    assert margins[-1] == pytest.approx(min(foresight.quantile_m(NAME), 1.0), abs=0.05)
+    assert margins[-1] > 0.2
 
 
 def test_what_the_model_misses_widens_the_margin_slowly_and_is_told():

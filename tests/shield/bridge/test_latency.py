@@ -7,12 +7,13 @@ import pytest
 from bridge_fakes import FakeLink
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.latency import DelayMeter
+from steerclear.shield.bridge.overruns import left_out
 from steerclear.shield.platforms import get_platform
 
 DT_S = 0.1
 
 
-def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0, left_out=()):
+def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0, gaps=()):
     clock = ManualClock()
     link = FakeLink("blue_1", clock, platform, 0.0, 0.0, 0.0, 1.0)
     meter = DelayMeter(get_platform(platform), DT_S)
@@ -20,8 +21,8 @@ def measure(platform, delay_steps, noise_deg=0.0, steady=False, seconds=60.0, le
     for k in range(round(seconds / DT_S)):
         reading = link.read()
         turned = math.radians(noise_deg) * random.normal()
-        heading = 0.0 if steady else math.radians(60.0) * ((k // 40) % 3)
-        if k not in left_out:
+        if k not in gaps:  # else the boat goes on with what it was told last
+            heading = 0.0 if steady else math.radians(60.0) * ((k // 40) % 3)
             meter.update(type(reading)(**{**vars(reading), "heading_rad": reading.heading_rad + turned}))
             meter.sent(heading, 2.0)
         queue.append((math.degrees(heading), 2.0))
@@ -43,7 +44,19 @@ def test_the_delay_is_found_through_noise():
 
 def test_turns_that_were_left_out_make_no_delay():
     gaps = {k + i for k in range(30, 600, 80) for i in range(15)}  # every other turn of the boat falls into one
-    assert measure("heron", 1, left_out=gaps) == pytest.approx(0.1, abs=0.05)
+    assert measure("heron", 1, gaps=gaps) == pytest.approx(0.1, abs=0.05)
+
+
+def test_a_loop_that_falls_behind_every_second_still_measures():
+    assert measure("heron", 3, gaps=range(5, 600, 10)) == pytest.approx(0.3, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "turns"),
+    [(0.1, 0), (0.15, 0), (0.2, 1), (0.25, 1), (0.3, 2), (2.0, 19), (-1.0, 0), (-math.inf, 0), (math.nan, 0)],
+)
+def test_turns_left_out_are_told_from_late_ones(gap_s, turns):
+    assert left_out(gap_s, DT_S) == turns
 
 
 def test_a_boat_that_holds_its_course_tells_nothing():
