@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.fleet import LARGEST
-from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import Platform, get_platform
 from steerclear.shield.platforms import layout as L
+
+
+class Games(NamedTuple):
+    """What is decided about, and what is written, of B games of n boats, or of one of them; see `BatchGuard`."""
+
+    state: Array
+    wanted: Array
+    ours: BoolArray
+    memory: Array
+    sent: Array
+    reason: IntArray
+    certificate_m: Array
 
 
 class BatchGuard(ABC):
@@ -27,10 +40,16 @@ class BatchGuard(ABC):
         reason: (B, n) why each command is what it is.
         certificate_m: (B, n) margin left, m, inf where nobody is near.
         sent: (B, n, 2) the commands of the last decision.
+        memory: (B, n, columns) what is kept of each boat between decisions.
+        radius_m: distance to keep: separation, buffer and both position errors, m.
+        params: (n, N_PARAM) platform rows.
 
     Raises:
         ConfigError: a fleet that does not fit, or a delay.
     """
+
+    columns, forgotten, needs_commands = 0, 0.0, True
+    """Columns of the memory, what is in them at first, and whether every boat of ours needs a usable command."""
 
     def __init__(
         self, name: str, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
@@ -43,16 +62,20 @@ class BatchGuard(ABC):
             raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
         self.name, self.config = name, config
         self._platforms = [get_platform(kind) for kind in platforms]
+        self.params = np.array([kind.pack() for kind in self._platforms])
+        self.radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
         shape = (int(games), len(platforms))
         self.reason = np.zeros(shape, np.int64)
         self.certificate_m = np.full(shape, np.inf)
         self.sent = np.zeros((*shape, 2))
+        self.memory = np.full((*shape, self.columns), self.forgotten)
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the last decisions of the games in ``mask`` (B,), or of all."""
         which = slice(None) if mask is None else mask
         self.reason[which] = 0
         self.certificate_m[which] = np.inf
+        self.memory[which] = self.forgotten
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
         """Filtered commands.
@@ -70,11 +93,10 @@ class BatchGuard(ABC):
         """
         state, wanted, ours = np.asarray(state), np.asarray(wanted), np.asarray(ours)
         self._check(state, wanted, ours)
-        self._decide(
-            np.ascontiguousarray(state, dtype=np.float64),
-            np.ascontiguousarray(wanted, dtype=np.float64),
-            np.ascontiguousarray(ours, dtype=np.bool_),
-        )
+        self.sent[:], self.reason[:], self.certificate_m[:] = wanted, 0, np.inf
+        asked = np.ascontiguousarray(state, dtype=np.float64), np.ascontiguousarray(wanted, dtype=np.float64)
+        boats = np.ascontiguousarray(ours, dtype=np.bool_)
+        self._decide(Games(*asked, boats, self.memory, self.sent, self.reason, self.certificate_m))
         return self.sent
 
     def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
@@ -87,7 +109,9 @@ class BatchGuard(ABC):
                 raise FleetError(f"{what} has shape {array.shape}; expected {shape}")
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
+        if self.needs_commands and not (np.abs(wanted[ours.astype(bool)]) <= LARGEST).all():
+            raise FleetError(f"a wanted command is not finite or beyond {LARGEST:g}; give a speed and a heading")
 
     @abstractmethod
-    def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
-        """Write ``sent``, ``reason`` and ``certificate_m``; the arrays are checked and contiguous."""
+    def _decide(self, games: Games) -> None:
+        """Write commands, reasons and certificates; commands are the wanted ones so far, and the arrays contiguous."""

@@ -167,11 +167,11 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
         check_settings(settings)
         return ReachGuard(*fleet)
     if base in rollout_names():
-        from ..rollouts import make_guard as make_rollout
+        from ..rollouts import RolloutGuard
 
-        return make_rollout(base, *fleet, settings)
+        return RolloutGuard(base, *fleet, settings)
     if base not in textbook_names():
         check_guard(base)
-    from ..textbook import make_guard
+    from ..textbook import TextbookGuard
 
-    return make_guard(base, *fleet)
+    return TextbookGuard(base, *fleet)

@@ -18,7 +18,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 
 from ..jit import kernel
 from ..reach_guard import ReachGuard
-from ..reach_guard.values import Setup, near_pairs, value_of
+from ..reach_guard.values import Setup, ahead, margins, near_pairs
 from .guards import GuardMaker, build_guard
 from .play import Film
 from .scenes import DT_S, Conditions, Scenes
@@ -38,18 +38,11 @@ def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> N
         ours: (n,) own boats.
         safe: (B, n) written; False for others.
     """
-    n = state.shape[1]
-    near = np.empty((n, n), np.bool_)
-    for b in range(state.shape[0]):
-        near_pairs(setup, state[b], ours, near)
-        for i in range(n):
-            safe[b, i] = ours[i]
-        for i in range(n):
-            for j in range(n):
-                if near[i, j] and not value_of(setup, i, j, state[b, i], state[b, j]) >= setup.radius_m:
-                    safe[b, i] = False
-                    if ours[j]:
-                        safe[b, j] = False
+    for b in range(len(state)):
+        now = ahead(setup, state[b], ours, np.empty((len(ours), 2)), 0)
+        h = margins(setup, ours, near_pairs(setup, state[b], ours), now, -1)
+        for i in range(len(ours)):
+            safe[b, i] = ours[i] and (h[i] >= 0.0).all()
 
 
 def safe_boats(scenes: Scenes, state: Array, conditions: Conditions) -> BoolArray:

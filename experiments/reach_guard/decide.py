@@ -1,4 +1,12 @@
-"""One decision for all boats of ours in a game, and for a batch of games: screen, program, check, ladder. Compiled."""
+"""One decision for all boats of ours in a game: screen, program, exact check, else the rudder of greatest value.
+
+The inputs of boat i are z_t = turn / full turn of this step and z_s = sqrt(speed_weight) * speed command / top speed.
+With x+ the state after a candidate, the least change meets, for each pair and each way an opponent may move,
+
+    V(x+) + dV/dpsi (psi - psi+) + dV/dv (v - v+) >= R + target,   target = max(0, e^(-response dt) min(h(x), cap)),
+
+with the same terms of a team-mate decided for together. It counts when h(x+) >= target after it by the full model.
+"""
 
 from __future__ import annotations
 
@@ -6,130 +14,166 @@ import math
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.platforms.actuator import command_for_turn
+from steerclear.shield.platforms.actuator import command_for_turn, thrust_after
 from steerclear.shield.platforms.step import step_boat
+from steerclear.shield.platforms.usv import clamp, turn_of_rudder
+from steerclear.shield.tables.lookup import table_gradient
 
+from ..batch_guard import Games
 from ..jit import kernel
-from .ladder import take_backups
-from .rows import Pairs, Program, build_rows, set_inputs
-from .values import WAYS, Setup, fill_margins, least_margin, mark_failing, near_pairs, run_on, set_targets
+from .values import WAYS, Setup, ahead, joint, margins, near_pairs, others, seen
 
-ROUNDS = 2
-"""Times the program is linearised and solved before the ladder takes over."""
-SAME = 1e-6
-"""Input change below which the wanted command is sent."""
-
-
-@kernel
-def predict(setup: Setup, state: Array, ours: BoolArray, commands: Array, later: Array) -> None:
-    """States after the commands, by the full model; boats not decided for stay as they are."""
-    later[:] = state
-    for i in range(state.shape[0]):
-        if ours[i]:
-            step_boat(setup.params[i], later[i], commands[i, 0], commands[i, 1], setup.dt_s)
+ROUNDS, SWEEPS = 2, 2
+"""Times the program is linearised and solved; times the boats choose backups, each knowing the others' choices."""
+AIM_M, SAME = 0.01, 1e-6
+"""Rows aim this much beyond the target, for the curvature of V; smaller changes of inputs are none."""
+BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0, 1.0) for k in range(-4, 0)])
+"""Rudder to starboard as a share of full, and speed as a share of top speed; the first of the best is taken."""
 
 
 @kernel
-def _command(setup: Setup, state: Array, turn: float, speed: float, full_deg: float, i: int) -> tuple[float, float]:
-    """Command that yields the inputs, through the autopilot's inverse."""
-    params = setup.params[i]
-    fast = min(max(speed / math.sqrt(setup.speed_weight), 0.0), 1.0) * params[L.MAX_SPEED]
-    return fast, command_for_turn(params, state, fast, turn * full_deg, setup.dt_s)
+def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z: Array) -> tuple[float, float]:
+    """Write boat i's z (2,) and return d(psi)/d(z_t), the full turn of this step, rad, and d(v)/d(z_s), m/s."""
+    params, top, row, root = setup.params[i], setup.params[i, L.MAX_SPEED], state.copy(), math.sqrt(setup.speed_weight)
+    rudder = min(params[L.MAX_RUDDER], 100.0)
+    full = abs(turn_of_rudder(params, thrust_after(params, state, command[0], setup.dt_s), rudder, setup.dt_s))
+    full, turn = max(full, 1e-6), (later[L.HEADING] - state[L.HEADING] + 180.0) % 360.0 - 180.0
+    z[0], z[1] = clamp(turn / full, -1.0, 1.0), root * clamp(command[0] / top, 0.0, 1.0)
+    step = -0.1 * top if command[0] > 0.5 * top else 0.1 * top
+    step_boat(params, row, command[0] + step, command[1], setup.dt_s)
+    return math.radians(full), (row[L.SPEED] - later[L.SPEED]) / step * top / root
 
 
 @kernel
-def _program(
-    setup: Setup, state: Array, ours: BoolArray, pairs: Pairs, asked: Array, commands: Array, later: Array
-) -> bool:
-    """Nearest inputs to those asked for that keep all targets, linearised and checked; True when the check holds."""
-    n = state.shape[0]
-    slot, own = np.full(n, -1), 0
-    for i in range(n):
-        if ours[i]:
-            slot[i], own = own, own + 1
-    z, row = np.zeros((n, 5)), np.zeros(L.N_STATE)
-    z_now, z0, answer = np.zeros(2 * own), np.zeros(2 * own), np.zeros(2 * own)
-    C, d = np.zeros((WAYS * n * n + 4 * n, 2 * own)), np.zeros(WAYS * n * n + 4 * n)
-    program = Program(slot, z, z_now, C, d)
+def _rows(setup: Setup, ours: BoolArray, value_m: Array, x: Array, effect: Array, z: Array, C: Array, d: Array) -> int:
+    """Write rows of unit length: of pairs V >= ``value_m`` (n, n), -inf of none, and limits; returns how many."""
+    r, root = 0, math.sqrt(setup.speed_weight)
+    for i, j in np.ndindex(value_m.shape):
+        both = joint(setup, ours, i, j)
+        if value_m[i, j] == -np.inf or (both and j < i):
+            continue
+        for other in others(setup, ours, i, j, x):
+            slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
+            C[r] = 0.0
+            C[r, 2 * i], C[r, 2 * i + 1] = slope.own_heading * effect[i, 0], slope.own_speed * effect[i, 1]
+            if both:
+                C[r, 2 * j], C[r, 2 * j + 1] = slope.other_heading * effect[j, 0], slope.other_speed * effect[j, 1]
+            length = math.sqrt((C[r] * C[r]).sum())
+            if length >= 1e-9:
+                d[r] = (value_m[i, j] - slope.value_m + (C[r] * z).sum()) / length
+                C[r] /= length
+                r += 1
+    for c in range(len(z)):
+        C[r : r + 2] = 0.0
+        C[r, c], C[r + 1, c] = 1.0, -1.0
+        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -root)
+        r += 2
+    return r
+
+
+@kernel
+def _short(h: Array, target: Array) -> BoolArray:
+    """Boats (n,) some margin of which, (n, n), is short of its target."""
+    short = np.zeros(len(h), np.bool_)
+    for i in range(len(h)):
+        short[i] = not (h[i] >= target[i]).all()
+    return short
+
+
+@kernel
+def _program(setup: Setup, state: Array, ours: BoolArray, target: Array, asked: Array, sent: Array, h: Array) -> bool:
+    """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
+    n, root, near = len(ours), math.sqrt(setup.speed_weight), target > -np.inf
+    z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
+    C, d = np.zeros((WAYS * n * n + 4 * n, 2 * n)), np.zeros(WAYS * n * n + 4 * n)
     for attempt in range(ROUNDS):
-        for i in range(n):
-            if ours[i]:
-                set_inputs(setup, state[i], commands[i], later[i], row, i, z[i])
-                z_now[2 * slot[i] : 2 * slot[i] + 2] = z[i, :2]
+        x = ahead(setup, state, ours, sent, 1)
+        for i in np.flatnonzero(ours):
+            found = _effects(setup, int(i), state[i], sent[i], x[i, WAYS], now[2 * i : 2 * i + 2])
+            effect[i, 0], effect[i, 1] = found
         if attempt == 0:
-            z0[:] = z_now
-        rows = build_rows(setup, ours, pairs, later, program)
-        if project(C[:rows], d[:rows], z0, answer) != OPTIMAL:
+            z0[:] = now
+        rows = _rows(setup, ours, setup.radius_m + target + AIM_M, x, effect, now, C, d)
+        if project(C[:rows], d[:rows], z0, z) != OPTIMAL:
             return False
-        for i in range(n):
-            if ours[i]:
-                k = 2 * slot[i]
-                commands[i] = asked[i]
-                if abs(answer[k] - z0[k]) > SAME or abs(answer[k + 1] - z0[k + 1]) > SAME:
-                    commands[i, 0], commands[i, 1] = _command(setup, state[i], answer[k], answer[k + 1], z[i, 2], i)
-        predict(setup, state, ours, commands, later)
-        fill_margins(setup, ours, pairs.near, later, pairs.ways, pairs.margin)
-        if mark_failing(setup, ours, pairs.near, pairs.margin, pairs.target, np.zeros(n, np.bool_)):
+        for i in np.flatnonzero(ours):
+            sent[i] = asked[i]
+            if np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
+                speed = clamp(z[2 * i + 1] / root, 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
+                turn = z[2 * i] * math.degrees(effect[i, 0])
+                sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
+        h[:] = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
+        if not _short(h, target).any():
             return True
     return False
 
 
 @kernel
-def _ask(wanted: Array, ours: BoolArray, sent: Array, reason: IntArray) -> None:
-    """Start from the wanted commands; a boat of ours without a usable one holds its course and stops."""
-    sent[:] = wanted
-    for i in range(ours.shape[0]):
-        reason[i] = PASSED if ours[i] else NOT_COVERED
-        if ours[i] and not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
-            sent[i, 0], sent[i, 1], reason[i] = 0.0, 0.0, HELD
+def _follow(setup: Setup, i: int, backup: Array, row: Array) -> tuple[float, float]:
+    """Move boat i's state on by ``look`` steps of a backup; returns its first command."""
+    params, speed, first = setup.params[i], backup[1] * setup.params[i, L.MAX_SPEED], 0.0
+    for step in range(setup.look):
+        heading = command_for_turn(params, row, speed, backup[0] * setup.full_deg[i], setup.dt_s)
+        first = heading if step == 0 else first
+        step_boat(params, row, speed, heading, setup.dt_s)
+    return speed, first
 
 
 @kernel
-def decide_game(
-    setup: Setup,
-    state: Array,
-    wanted: Array,
-    ours: BoolArray,
-    side: Array,
-    sent: Array,
-    reason: IntArray,
-    certificate_m: Array,
+def _take_backups(
+    setup: Setup, state: Array, ours: BoolArray, near: BoolArray, movers: BoolArray, sent: Array, side: Array
 ) -> None:
-    """Decide for the boats of ours in one game, (n, ...) each.
+    """Give the movers (n,) the backups of greatest value after ``look`` steps; others go by their commands.
 
-    ``side`` of each boat's backup under way is kept between decisions; ``sent``, ``reason`` and ``certificate_m``, the
-    least margin after the step, inf where nobody is near, are written.
+    A boat changes its ``side`` (n,), -1 or 1, which is written too, only for what is clearly better.
     """
-    n = state.shape[0]
-    _ask(wanted, ours, sent, reason)
-    asked, later, ways = sent.copy(), state.copy(), np.empty((n, WAYS, L.N_STATE))
-    near, target, margin = np.zeros((n, n), np.bool_), np.zeros((n, n)), np.full((n, n), np.inf)
-    pairs = Pairs(near, ways, target, margin)
-    near_pairs(setup, state, ours, near)
-    set_targets(setup, state, near, target)
-    run_on(setup, state, 1, ways)
-    predict(setup, state, ours, sent, later)
-    fill_margins(setup, ours, near, later, ways, margin)
-    movers = np.zeros(n, np.bool_)
-    if not mark_failing(setup, ours, near, margin, target, movers):
-        if _program(setup, state, ours, pairs, asked, sent, later):
-            movers[:] = False
-            for i in range(n):
-                if ours[i] and (sent[i] != asked[i]).any():
-                    reason[i] = QP
-        else:
-            sent[:] = asked
-            for _ in range(n):  # who falls short by what others do now backs away, too, until nobody is added
-                take_backups(setup, state, ours, near, movers, sent, side)
-                predict(setup, state, ours, sent, later)
-                fill_margins(setup, ours, near, later, ways, margin)
-                if mark_failing(setup, ours, near, margin, target, movers):
-                    break
-    for i in range(n):
-        certificate_m[i] = least_margin(setup, ours, near, margin, i) if ours[i] else np.inf
+    x = ahead(setup, state, ours, sent, setup.look)
+    for sweep in range(SWEEPS):
+        for i in np.flatnonzero(movers):
+            best, chosen = -math.inf, 0
+            for k in range(len(BACKUPS)):
+                x[i, WAYS] = state[i]
+                _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
+                value = margins(setup, ours, near, x, int(i))[i].min()
+                value -= setup.hysteresis_m if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
+                if value > best:
+                    best, chosen = value, k
+            x[i, WAYS] = state[i]
+            speed, heading = _follow(setup, int(i), BACKUPS[chosen], x[i, WAYS])
+            if sweep == SWEEPS - 1:
+                sent[i, 0], sent[i, 1], side[i] = speed, heading, np.sign(BACKUPS[chosen, 0])
+
+
+@kernel
+def decide_game(setup: Setup, game: Games) -> None:
+    """Decide for the boats of ours in one game, (n, ...) each; what is kept of a boat is the side of its backup."""
+    state, wanted, ours, memory, sent, reason, certificate_m = game
+    side = memory[:, 0]
+    reason[:] = np.where(ours, PASSED, NOT_COVERED)
+    for i in np.flatnonzero(ours):
+        if not (np.abs(wanted[i]) <= LARGEST_COMMAND).all():
+            sent[i], reason[i] = 0.0, HELD
+    near, asked = near_pairs(setup, state, ours), sent.copy()
+    now = margins(setup, ours, near, ahead(setup, state, ours, sent, 0), -1)
+    target = np.where(near, np.maximum(0.0, setup.decay * np.minimum(now, setup.cap_m)), -np.inf)
+    h = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
+    movers = _short(h, target)
+    if movers.any() and _program(setup, state, ours, target, asked, sent, h):
+        movers[:] = False
+        for i in np.flatnonzero(ours):
+            reason[i] = QP if (sent[i] != asked[i]).any() else reason[i]
+    elif movers.any():
+        sent[:], added = asked, movers
+        while added.any():  # who falls short by what others do now backs away, too
+            _take_backups(setup, state, ours, near, movers, sent, side)
+            h[:] = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
+            added = _short(h, target) & ~movers
+            movers = movers | added
+    for i in np.flatnonzero(ours):
+        certificate_m[i] = h[i].min()
         if movers[i]:
             reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
         elif reason[i] != QP:
@@ -137,16 +181,8 @@ def decide_game(
 
 
 @kernel
-def decide_games(
-    setup: Setup,
-    state: Array,
-    wanted: Array,
-    ours: BoolArray,
-    side: Array,
-    sent: Array,
-    reason: IntArray,
-    certificate_m: Array,
-) -> None:
+def decide_games(setup: Setup, games: Games) -> None:
     """`decide_game` for every game; arrays carry a leading games axis."""
-    for b in range(state.shape[0]):
-        decide_game(setup, state[b], wanted[b], ours[b], side[b], sent[b], reason[b], certificate_m[b])
+    state, wanted, ours, memory, sent, reason, certificate_m = games
+    for b in range(len(state)):
+        decide_game(setup, Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], certificate_m[b]))

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray
-
+from ..batch_guard import Games
 from ..jit import kernel
-from .gatekeeper import PASSED
 from .gatekeeper import decide_game as decide_gatekeeper
 from .paths import Setup
 from .plcbf import decide_game as decide_library
 
 
 @kernel
-def decide_games(
-    setup: Setup,
-    by_library: bool,
-    state: Array,
-    wanted: Array,
-    ours: BoolArray,
-    plan: Array,
-    sent: Array,
-    reason: IntArray,
-    clear_m: Array,
-) -> None:
-    """Decide by PL-CBF or by gatekeeper; arrays carry a leading games axis."""
-    sent[:], reason[:], clear_m[:] = wanted, PASSED, np.inf
-    for b in range(state.shape[0]):
+def decide_games(setup: Setup, by_library: bool, games: Games) -> None:
+    """Decide by PL-CBF or by gatekeeper; arrays carry a leading games axis, and the memory is the boats' plans."""
+    state, _, ours, plan, sent, reason, clear_m = games
+    for b in range(len(state)):
         if by_library:
             decide_library(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])
         else:

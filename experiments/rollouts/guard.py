@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
-from steerclear.shield.exceptions import ConfigError, FleetError
-from steerclear.shield.fleet import LARGEST
-from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
 
-from ..batch_guard import BatchGuard
+from ..batch_guard import BatchGuard, Games
 from ..textbook.inputs import input_limits
 from .games import decide_games
 from .paths import N_PLAN, NO_PLAN, Setup
@@ -61,6 +59,8 @@ class RolloutGuard(BatchGuard):
             of.
     """
 
+    columns, forgotten = N_PLAN, NO_PLAN
+
     def __init__(
         self,
         name: str,
@@ -72,48 +72,23 @@ class RolloutGuard(BatchGuard):
     ) -> None:
         read = check_settings(name, settings or {}, config.dt_s)
         super().__init__(name, config, games, platforms, team)
-        self._setup = _setup(name, config, self._platforms, team, read)
-        self._plan = np.full((*self.reason.shape, N_PLAN), NO_PLAN)
+        self._setup = self._make_setup(read, team)
 
-    def reset(self, mask: BoolArray | None = None) -> None:
-        """Forget the committed trajectories of the games in ``mask`` (B,), or of all."""
-        super().reset(mask)
-        self._plan[slice(None) if mask is None else mask] = NO_PLAN
+    def _decide(self, games: Games) -> None:
+        decide_games(self._setup, self.name == PL_CBF, games)
 
-    def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
-        super()._check(state, wanted, ours)
-        if not (np.abs(wanted[ours.astype(bool)]) <= LARGEST).all():
-            raise FleetError(f"a wanted command is not finite or beyond {LARGEST:g}; give a speed and a heading")
-
-    def _decide(self, state: Array, wanted: Array, ours: BoolArray) -> None:
-        kept = self._plan, self.sent, self.reason, self.certificate_m
-        decide_games(self._setup, self.name == PL_CBF, state, wanted, ours, *kept)
-
-
-def _setup(name: str, config: ShieldConfig, platforms: list[Platform], team: tuple[int, ...], read: Settings) -> Setup:
-    dt_s, is_library = config.dt_s, isinstance(read, LibrarySettings)
-    return Setup(
-        params=np.array([kind.pack() for kind in platforms]),
-        limits=np.array([input_limits(kind, dt_s).pack() for kind in platforms]),
-        team=np.array(team, dtype=np.int64),
-        library=library(),
-        switches=switch_steps(dt_s if isinstance(read, LibrarySettings) else read.switch_s, dt_s),
-        steps=max(1, round(read.horizon_s / dt_s)),
-        radius_m=config.separation_m + config.buffer_m + 2.0 * config.position_error_m,
-        dt_s=dt_s,
-        worst=name == GATEKEEPER_WORST,
-        alpha_per_s=read.alpha_per_s if isinstance(read, LibrarySettings) else 0.0,
-        pick=PICKS[read.pick] if is_library else 0,
-    )
-
-
-def make_guard(
-    name: str,
-    config: ShieldConfig,
-    games: int,
-    platforms: tuple[str | Platform, ...],
-    team: tuple[int, ...],
-    settings: Mapping[str, Any] | None = None,
-) -> RolloutGuard:
-    """The filter of that name; see `RolloutGuard`."""
-    return RolloutGuard(name, config, games, tuple(platforms), tuple(team), settings)
+    def _make_setup(self, read: Settings, team: tuple[int, ...]) -> Setup:
+        dt_s, library_s = self.config.dt_s, read if isinstance(read, LibrarySettings) else None
+        return Setup(
+            params=self.params,
+            limits=np.array([input_limits(kind, dt_s) for kind in self._platforms]),
+            team=np.array(team, dtype=np.int64),
+            library=library(),
+            switches=switch_steps(dt_s if isinstance(read, LibrarySettings) else read.switch_s, dt_s),
+            steps=max(1, round(read.horizon_s / dt_s)),
+            radius_m=self.radius_m,
+            dt_s=dt_s,
+            worst=self.name == GATEKEEPER_WORST,
+            alpha_per_s=library_s.alpha_per_s if library_s else 0.0,
+            pick=PICKS[library_s.pick] if library_s else 0,
+        )

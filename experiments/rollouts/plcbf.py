@@ -33,7 +33,7 @@ from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
-from steerclear.shield.platforms.usv import clamp, wrap_degrees
+from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
 from ..textbook.inputs import command_of_inputs, inputs_of_command
@@ -76,15 +76,6 @@ def value_of(setup: Setup, i: int, start: Array, k: int, speed: float, heading: 
 
 
 @kernel
-def _input_box(setup: Setup, i: int, state: Array, box: Array) -> None:
-    """Write least and greatest of both inputs (2, 2): a boat neither reverses nor tops its top speed."""
-    step = setup.limits[i, 2] * setup.dt_s
-    box[0, 0] = -min(1.0, max(state[L.SPEED], 0.0) / step)
-    box[0, 1] = min(setup.limits[i, 1] / setup.limits[i, 2], max(setup.limits[i, 0] - state[L.SPEED], 0.0) / step)
-    box[1, 0], box[1, 1] = -1.0, 1.0
-
-
-@kernel
 def _next_states(setup: Setup, i: int, state: Array, z0: Array, unit: float, box: Array, later: Array) -> Array:
     """Write the states (3, N_STATE) after the wanted inputs and with either of them shifted; returns the shifts."""
     shift = np.empty(2)
@@ -92,9 +83,10 @@ def _next_states(setup: Setup, i: int, state: Array, z0: Array, unit: float, box
         shift[k] = DIFFERENCE if z0[k] + DIFFERENCE <= box[k, 1] else -DIFFERENCE
     params, limits = setup.params[i], setup.limits[i]
     for k in range(3):
-        one = z0[0] + (shift[0] if k == 1 else 0.0)
-        two = z0[1] + (shift[1] if k == 2 else 0.0)
-        speed, turn = command_of_inputs(params, limits, state, one * limits[2], two * unit, setup.dt_s)
+        z = z0.copy()
+        if k > 0:
+            z[k - 1] += shift[k - 1]
+        speed, turn = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
         later[k] = state
         step_boat(params, later[k], speed, turn, setup.dt_s)
     return shift
@@ -199,17 +191,14 @@ def take_mode(
 def _decide_boat(setup: Setup, i: int, state: Array, around: Around, plan: Array, sent: Array) -> tuple[int, float]:
     """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
     params, limits = setup.params[i], setup.limits[i]
-    gain, turn, most = inputs_of_command(params, limits, state, sent[0], sent[1], setup.dt_s)
-    unit = most if most > 0.0 else 1.0
     box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
-    _input_box(setup, i, state, box)
-    z0[0], z0[1] = clamp(gain / limits[2], box[0, 0], box[0, 1]), turn / unit
+    unit = inputs_of_command(params, limits, state, sent, setup.dt_s, z0, box)
     m, need, value = take_mode(setup, i, state, sent, plan, Inputs(z0, unit, box), around, row)
     plan[1], plan[2] = _command_of_mode(setup, i, m, state, sent, plan)
     if answer_of(row, need, box, z0, z):
         same = abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME
         if not same:
-            sent[0], sent[1] = command_of_inputs(params, limits, state, z[0] * limits[2], z[1] * unit, setup.dt_s)
+            sent[0], sent[1] = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
         after = state.copy()
         step_boat(params, after, sent[0], sent[1], setup.dt_s)
         then = value_of(setup, i, after, 1, plan[1], plan[2], around)

@@ -1,6 +1,6 @@
-"""Filters from the literature, to compare the shield with on the same encounters."""
+"""Filters from the literature, to compare the shield with on the same encounters: one file each, and one loop."""
 
-from .guard import TextbookGuard, make_guard
-from .parameters import NAMES, Gains
+from .barrier import Barrier
+from .guard import BARRIERS, NAMES, TextbookGuard
 
-__all__ = ["NAMES", "Gains", "TextbookGuard", "make_guard"]
+__all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookGuard"]

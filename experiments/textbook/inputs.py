@@ -1,9 +1,8 @@
-"""A boat as the literature's filters see it: a unicycle with acceleration and turn rate as its inputs.
+"""A boat as the literature's filters see it: a unicycle, which accelerates and turns, by two inputs z.
 
-Between that model and the boat stands its autopilot, which takes a speed and a heading. Both ways are made here:
-which inputs a wanted command amounts to, and which command makes the autopilot yield the inputs chosen. Turns go
-through the autopilot's inverse, as the shield's do, so that a filter has the boat's full rudder. An acceleration a
-is commanded as the speed v + T a with T = top speed / braking, which spans the range of speed commands.
+Between it and the boat stands an autopilot, which takes a speed and a heading. Turns go through its inverse, as the
+shield's do, so that a filter has the boat's full rudder. z are shares of the boat's braking and of its largest turn
+now; a share z of braking is commanded as the speed v + z top speed, which spans the speed commands.
 """
 
 from __future__ import annotations
@@ -12,73 +11,68 @@ import math
 from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, largest_turn
-from steerclear.shield.platforms.limits import cruise
+from steerclear.shield.platforms.limits import LONGEST_S, cruise
 from steerclear.shield.platforms.usv import clamp, fresh_state, wrap_degrees
 
 from ..jit import kernel
 
-LONGEST_S = 60.0
-
 
 class InputLimits(NamedTuple):
-    """What the model of a boat may ask for: top speed, m/s, and two accelerations, m/s^2.
-
-    ``gain_mps2`` is the mean of a start from rest to 90 % of top speed, ``brake_mps2`` what stops from top speed within
-    the boat's real stopping distance.
-    """
+    """Top speed, m/s; mean acceleration from rest to 90 % of it, and braking that stops in the boat's way, m/s^2."""
 
     top_speed_mps: float
     gain_mps2: float
     brake_mps2: float
-
-    def pack(self) -> Array:
-        """(3,) top speed, gain, brake."""
-        return np.array(self)
 
 
 @lru_cache(maxsize=64)
 def input_limits(platform: Platform, dt_s: float) -> InputLimits:
     """Limits of a platform, by running its own model with step ``dt_s``, s."""
     top, steps = platform.max_speed_mps, 0
-    params, state = cruise(platform, dt_s)
+    (params, state), start = cruise(platform, dt_s), fresh_state(0.0, 0.0, 0.0)
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, 0.0, 0.0, dt_s)
         if state[L.SPEED] < 0.02 * top:
             break
-    start = fresh_state(0.0, 0.0, 0.0)
     while start[L.SPEED] < 0.9 * top and steps * dt_s < LONGEST_S:
         actuate(params, start, top, 0.0, dt_s)
         steps += 1
-    return InputLimits(
-        top, float(start[L.SPEED]) / (steps * dt_s), 0.5 * top * top / math.hypot(state[L.X], state[L.Y])
-    )
+    way_m = math.hypot(state[L.X], state[L.Y])
+    return InputLimits(top, float(start[L.SPEED]) / (steps * dt_s), 0.5 * top * top / way_m)
 
 
 @kernel
 def inputs_of_command(
-    params: Array, limits: Array, state: Array, speed_mps: float, relative_deg: float, dt_s: float
-) -> tuple[float, float, float]:
-    """Acceleration (m/s^2) and turn rate (rad/s, clockwise) a command amounts to, and the largest turn rate (rad/s).
+    params: Array, limits: Array, state: Array, command: Array, dt_s: float, z: Array, box: Array
+) -> float:
+    """Write what a command amounts to, z (2,), and the least and greatest of both inputs (2, 2).
 
-    The turn is that of the boat's own model in this step, so that an obeyed command is a fixed point.
+    A boat neither reverses nor tops its top speed in this step. The turn is that of the boat's own model in it, so that
+    an obeyed command is a fixed point.
+
+    Returns:
+        The largest turn of this step, deg.
     """
-    now = state.copy()
-    step_boat(params, now, speed_mps, relative_deg, dt_s)
-    turn = math.radians(wrap_degrees(now[L.HEADING] - state[L.HEADING])) / dt_s
-    most = max(math.radians(largest_turn(params, state, dt_s)) / dt_s, abs(turn))
-    acceleration = (clamp(speed_mps, 0.0, limits[0]) - state[L.SPEED]) * limits[2] / limits[0]
-    return clamp(acceleration, -limits[2], limits[1]), turn, most
+    now, top, step, speed = state.copy(), limits[0], limits[2] * dt_s, state[L.SPEED]
+    step_boat(params, now, command[0], command[1], dt_s)
+    turn = wrap_degrees(now[L.HEADING] - state[L.HEADING])
+    most = max(largest_turn(params, state, dt_s), abs(turn))
+    box[0, 0] = -min(1.0, max(speed, 0.0) / step)
+    box[0, 1] = min(limits[1] / limits[2], max(top - speed, 0.0) / step)
+    box[1, 0], box[1, 1] = -1.0, 1.0
+    z[0] = clamp((clamp(command[0], 0.0, top) - speed) / top, box[0, 0], box[0, 1])
+    z[1] = turn / most if most > 0.0 else 0.0
+    return most
 
 
 @kernel
 def command_of_inputs(
-    params: Array, limits: Array, state: Array, acceleration_mps2: float, turn_radps: float, dt_s: float
+    params: Array, limits: Array, state: Array, z: Array, most_deg: float, dt_s: float
 ) -> tuple[float, float]:
-    """Speed (m/s) and relative heading (deg) that make the autopilot yield the inputs, or the nearest to them."""
-    speed = clamp(state[L.SPEED] + acceleration_mps2 * limits[0] / limits[2], 0.0, limits[0])
-    return speed, command_for_turn(params, state, speed, math.degrees(turn_radps) * dt_s, dt_s)
+    """Speed, m/s, and relative heading, deg, that make the autopilot yield the inputs, or the nearest to them."""
+    speed = clamp(state[L.SPEED] + z[0] * limits[0], 0.0, limits[0])
+    return speed, command_for_turn(params, state, speed, z[1] * most_deg, dt_s)

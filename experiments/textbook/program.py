@@ -1,10 +1,8 @@
-"""The quadratic program of a filter, with the usual relaxation when it has no answer.
-
-    minimise |z - z0|^2   subject to   rows   (barriers and input limits)
-
-When no z meets all rows, each barrier row r is given a slack e_r at the price w e_r^2 and limits stay hard:
+"""The program of a filter, with the usual relaxation.
 
     minimise |z - z0|^2 + w sum e_r^2   subject to   c_r z + e_r >= d_r,   limits
+
+The slacks e_r of barriers' rows are 0 unless no z meets all rows; limits are hard.
 """
 
 from __future__ import annotations
@@ -25,18 +23,9 @@ SLACK_WEIGHT = 1e6
 
 @kernel
 def solve(C: Array, d: Array, hard: int, z0: Array, z: Array, slack: Array) -> int:
-    """Nearest point to ``z0`` that meets the rows, else the relaxed one.
+    """Write the ``z`` nearest to ``z0`` (n,) that meets C z >= d (rows, n) of unit length, the first ``hard`` limits.
 
-    Args:
-        C: (rows, n), each row of about unit length; the first ``hard`` are limits, which ``z0`` meets.
-        d: (rows,).
-        hard: how many rows have no slack.
-        z0: (n,) wanted inputs.
-        z: (n,) written: the answer; ``z0`` when the status is `UNSOLVED`.
-        slack: (rows - hard,) written: slack of each barrier row, 0 unless relaxed.
-
-    Returns:
-        `SOLVED`, `RELAXED` or `UNSOLVED`.
+    Where the status is `RELAXED` it does with ``slack`` (rows - hard,); where it is `UNSOLVED` it is ``z0``.
     """
     (rows, n), unit = C.shape, 1.0 / math.sqrt(SLACK_WEIGHT)
     slack[:] = 0.0

@@ -36,7 +36,7 @@ def run(guard, state, ours, steps, wanted=None):
     return closest
 
 
-guard_params = guard_for(scene((0, 0, 0), (0, 50, 180), (50, 0, 0)))._setup.params
+guard_params = guard_for(scene((0, 0, 0), (0, 50, 180), (50, 0, 0))).params
 
 
 def test_safe_commands_pass_bit_for_bit():

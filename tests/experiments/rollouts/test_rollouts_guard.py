@@ -88,8 +88,8 @@ def test_a_boat_already_inside_goes_on_with_what_it_committed_to(name):
     state, ours = scene((0, 0, 0), (0.5, 40, 180)), np.array([[True, False]])
     guard = guard_for(name, state)
     guard.decide(state, ahead(state), ours)
-    assert guard._plan[0, 0, 0] >= 1.0
-    first, _, _, speed, heading = guard._plan[0, 0]
+    assert guard.memory[0, 0, 0] >= 1.0
+    first, _, _, speed, heading = guard.memory[0, 0]
     state[0, 1, : L.Y + 1] = 0.0, 1.0
     for _ in range(int(first)):
         sent = guard.decide(state, ahead(state, 1.0), ours)
@@ -161,7 +161,7 @@ def test_reset_forgets_what_was_committed():
     guard = guard_for("gatekeeper", state)
     guard.decide(state, ahead(state), ours)
     guard.reset(np.array([True]))
-    assert (guard._plan == NO_PLAN).all()
+    assert (guard.memory == NO_PLAN).all()
     assert np.isinf(guard.certificate_m).all()
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.textbook import NAMES, Gains, TextbookGuard, make_guard, sweep
-from steerclear.experiments.textbook.parameters import TUNED
+from steerclear.experiments.textbook import BARRIERS, NAMES, TextbookGuard, sweep
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
@@ -20,7 +19,7 @@ POINT = Platform(name="point", kind="single_integrator", max_speed_mps=2.0, max_
 
 
 def play(name, platform, family, games=GAMES, seed=3):
-    guard = None if name is None else make_guard(name, CONFIG, games, (platform, platform), (0, 1))
+    guard = None if name is None else TextbookGuard(name, CONFIG, games, (platform, platform), (0, 1))
     return run_drill(guard, family, platform, games, seed, CONFIG)
 
 
@@ -36,9 +35,9 @@ def test_a_single_integrator_keeps_the_radius_from_straight_movers():
 @pytest.mark.parametrize(
     ("name", "gains"),
     [
-        ("exponential_cbf", Gains(0.5, first_per_s=0.5)),
-        ("collision_cone", Gains(1.0)),
-        ("parabolic", Gains(1.0, mu_share=2.0, lambda_share=2.0)),
+        ("exponential_cbf", (0.5, 0.5)),
+        ("collision_cone", (1.0,)),
+        ("parabolic", (1.0, 2.0, 2.0)),
     ],
 )
 def test_a_unicycle_keeps_the_radius_while_its_program_has_an_answer(name, gains):
@@ -75,19 +74,19 @@ def test_unknown_encounters_are_refused():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_sweep_takes_the_safest_then_the_gentlest(name, monkeypatch):
-    tried = list(sweep.candidates(name))
+    tried = list(BARRIERS[name].tried)
     assert len(set(tried)) > 5
-    assert TUNED[name, "heron"] in tried
-    assert TUNED[name, "surveyor"] in tried
+    assert BARRIERS[name].tuned["heron"] in tried
+    assert BARRIERS[name].tuned["surveyor"] in tried
     figures = {gains: {"head_on": {"breached": 1, "changed_percent": 0.0}} for gains in tried}
     figures[tried[3]] = {"head_on": {"breached": 0, "changed_percent": 40.0}}
     figures[tried[5]] = {"head_on": {"breached": 0, "changed_percent": 30.0}}
-    monkeypatch.setattr(sweep, "try_out", lambda name, platform, gains, encounters, seed: figures[gains])
+    monkeypatch.setattr(sweep, "try_out", lambda name, platform, gains: figures[gains])
     assert sweep.best(name, "heron") == tried[5]
 
 
 def test_the_sweep_plays_encounters():
-    figures = sweep.try_out("collision_cone", "heron", Gains(3.0), encounters=3, seed=1)
+    figures = sweep.try_out("collision_cone", "heron", (3.0,), n=3, seed=1)
     assert list(figures) == list(sweep.FAMILIES)
     assert figures["head_on"]["encounters"] == 3
     assert 0.0 < sweep.cost(figures)[1] < 100.0 * len(figures)

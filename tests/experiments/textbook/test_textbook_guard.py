@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from guard_scenes import ahead, scene
-from steerclear.experiments.textbook import NAMES, TextbookGuard, make_guard
-from steerclear.experiments.textbook.parameters import PUBLISHED
+from steerclear.experiments.textbook import BARRIERS, NAMES, Barrier, TextbookGuard
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.platforms import layout as L
@@ -23,7 +22,7 @@ def guard_for(name, state, team=None, platform="heron", gains=None):
 def test_safe_commands_pass_bit_for_bit(name):
     random = np.random.default_rng(1)
     state = scene((0, 0, 0), (600, 5, 90), (-700, 0, -90))
-    guard = guard_for(name, state, gains=PUBLISHED[name])
+    guard = guard_for(name, state, gains=BARRIERS[name].tried[0])
     for _ in range(50):
         wanted = np.stack([random.uniform(0, 2, (1, 3)), random.uniform(-40, 40, (1, 3))], axis=2)
         sent = guard.decide(state, wanted, np.array([[True, True, True]]))
@@ -42,7 +41,7 @@ def test_boats_of_others_are_left_alone(name):
     assert (sent[0, 0] != wanted[0, 0]).any()
     assert guard.reason[0, 0] in (1, 2)
     assert guard.reason[0, 1] == 0
-    assert guard.certificate_m[0, 0] == pytest.approx(np.hypot(0.5, 8) - guard._setup.radius_m)
+    assert guard.certificate_m[0, 0] == pytest.approx(np.hypot(0.5, 8) - guard.radius_m)
     assert np.isinf(guard.certificate_m[0, 1])
 
 
@@ -126,13 +125,29 @@ def test_shapes_and_settings_are_checked():
     with pytest.raises(FleetError, match="state has shape"):
         guard.decide(state[0], ahead(state), np.ones((1, 2), bool))
     with pytest.raises(ConfigError, match="unknown filter 'parabola'; choose one of velocity_cbf"):
-        make_guard("parabola", CONFIG, 1, ("heron",), (0,))
+        TextbookGuard("parabola", CONFIG, 1, ("heron",), (0,))
     with pytest.raises(ConfigError, match="no delay"):
-        make_guard("parabolic", ShieldConfig(delay_s=0.2), 1, ("heron",), (0,))
+        TextbookGuard("parabolic", ShieldConfig(delay_s=0.2), 1, ("heron",), (0,))
     with pytest.raises(ConfigError, match="games is 0"):
-        make_guard("parabolic", CONFIG, 0, ("heron",), (0,))
+        TextbookGuard("parabolic", CONFIG, 0, ("heron",), (0,))
     with pytest.raises(ConfigError, match="one of each per boat"):
-        make_guard("parabolic", CONFIG, 1, ("heron",), (0, 1))
+        TextbookGuard("parabolic", CONFIG, 1, ("heron",), (0, 1))
+
+
+def test_a_barrier_of_ones_own_is_a_guard(monkeypatch):
+    """The same row as the distance's, by another function: h = 3 (|p|^2 - R^2)."""
+
+    def tripled(p, v, radius_m):
+        return 3.0 * (abs(p) ** 2 - radius_m**2), 6.0 * p, 6.0 * p
+
+    monkeypatch.setitem(BARRIERS, "tripled", Barrier(tripled, tuned={}, tried=((0.5,),), of_velocity=True))
+    state, _ = openings("crossing", "heron", 6, 9)
+    state[:, 1, : L.Y + 1] *= 0.4
+    ours = np.tile([True, False], (6, 1))
+    sent = guard_for("tripled", state).decide(state, ahead(state), ours)
+    known = guard_for("velocity_cbf", state, gains=(0.5,)).decide(state, ahead(state), ours)
+    assert (sent != ahead(state)).any()
+    np.testing.assert_allclose(sent, known, atol=1e-9)
 
 
 def test_reset_forgets_what_was_reported():

@@ -1,0 +1,58 @@
+"""What a barrier of the literature is: a function h >= 0 of a pair of boats, its slope, its gains and its inputs.
+
+Places and velocities are complex numbers, east + i north, in arrays of any shape: p = p_j - p_i, m, and v = v_j - v_i,
+m/s. R is the radius to keep, m, and s = sqrt(|p|^2 - R^2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.shield.jit import Array
+
+Gains = tuple[float, ...]
+Complex = NDArray[np.complex128]
+Jet = tuple[Array, Complex, Complex]
+"""h, and its derivatives along p and along what the inputs act on: v, or p where they are velocities."""
+NEAREST_M2, STILL_MPS = 1e-4, 1e-6
+"""s^2 is cut from below there, with derivative 0, and |v| is smoothed by that: the papers leave both open."""
+RATES_PER_S = (0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
+
+
+class Barrier(NamedTuple):
+    """A barrier of the literature: its ``jet`` (p, v, R, *gains of its own) and its gains, alpha (1/s) the first.
+
+    They are ``tuned`` by platform, the winners of `sweep` of those ``tried``, of which the first are every other
+    platform's. Inputs are velocities, or those of `inputs`; the radius is ``widened`` by a factor.
+    """
+
+    jet: Callable[..., Jet]
+    tuned: dict[str, Gains]
+    tried: tuple[Gains, ...]
+    of_velocity: bool = False
+    widened: float = 1.0
+
+
+def dot(a: Any, b: Any) -> Any:
+    """Inner product of vectors in the plane."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def direction(heading_deg: Array) -> Complex:
+    """Unit vector of a heading."""
+    return np.sin(np.radians(heading_deg)) + 1j * np.cos(np.radians(heading_deg))
+
+
+def tangent(p: Complex, radius_m: float) -> tuple[Array, Complex]:
+    """s, the length of the tangent from p to the circle of the radius, m, and its derivative along p."""
+    square = dot(p, p) - radius_m**2
+    s = np.sqrt(np.maximum(square, NEAREST_M2))
+    return s, np.where(square > NEAREST_M2, p / s, 0.0)
+
+
+def pace(v: Complex) -> Array:
+    """|v|, smoothed, m/s."""
+    return np.asarray(np.sqrt(dot(v, v) + STILL_MPS**2))
