@@ -18,7 +18,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 
 from ..jit import kernel
 from ..reach_guard import ReachGuard
-from ..reach_guard.values import Setup, ahead, margins, near_pairs
+from ..reach_guard.values import Setup, ahead, least, margins, near_pairs
 from .guards import GuardMaker, build_guard
 from .play import Film
 from .scenes import DT_S, Conditions, Scenes
@@ -39,10 +39,9 @@ def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> N
         safe: (B, n) written; False for others.
     """
     for b in range(len(state)):
-        now = ahead(setup, state[b], ours, np.empty((len(ours), 2)), 0)
-        h = margins(setup, ours, near_pairs(setup, state[b], ours), now, -1)
-        for i in range(len(ours)):
-            safe[b, i] = ours[i] and (h[i] >= 0.0).all()
+        pairs = near_pairs(setup, state[b], ours)
+        h = margins(setup, pairs, ahead(setup, state[b], ours, np.empty((len(ours), 2)), 0))
+        safe[b] = ours & (least(pairs, h, len(ours)) >= 0.0)
 
 
 def safe_boats(scenes: Scenes, state: Array, conditions: Conditions) -> BoolArray:

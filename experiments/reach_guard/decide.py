@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn, thrust_after
@@ -24,7 +24,7 @@ from steerclear.shield.tables.lookup import table_gradient
 
 from ..batch_guard import Games
 from ..jit import kernel
-from .values import WAYS, Setup, ahead, joint, margins, near_pairs, others, seen
+from .values import WAYS, Setup, ahead, least, margins, near_pairs, seen
 
 ROUNDS, SWEEPS = 2, 2
 """Times the program is linearised and solved; times the boats choose backups, each knowing the others' choices."""
@@ -48,47 +48,36 @@ def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z
 
 
 @kernel
-def _rows(setup: Setup, ours: BoolArray, value_m: Array, x: Array, effect: Array, z: Array, C: Array, d: Array) -> int:
-    """Write rows of unit length: of pairs V >= ``value_m`` (n, n), -inf of none, and limits; returns how many."""
-    r, root = 0, math.sqrt(setup.speed_weight)
-    for i, j in np.ndindex(value_m.shape):
-        both = joint(setup, ours, i, j)
-        if value_m[i, j] == -np.inf or (both and j < i):
-            continue
-        for other in others(setup, ours, i, j, x):
+def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array, z: Array) -> tuple[Array, Array]:
+    """Rows C z >= d, of unit length: of pairs V >= ``need_m`` (m,), and the limits of the inputs."""
+    C, d, r = np.zeros((WAYS * len(pairs) + 2 * len(z), len(z))), np.zeros(WAYS * len(pairs) + 2 * len(z)), 0
+    for m in range(len(pairs)):
+        i, j, first, last = pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3]
+        for other in x[j, first:last]:
             slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
-            C[r] = 0.0
-            C[r, 2 * i], C[r, 2 * i + 1] = slope.own_heading * effect[i, 0], slope.own_speed * effect[i, 1]
-            if both:
-                C[r, 2 * j], C[r, 2 * j + 1] = slope.other_heading * effect[j, 0], slope.other_speed * effect[j, 1]
-            length = math.sqrt((C[r] * C[r]).sum())
+            row = C[r]
+            row[:] = 0.0
+            row[2 * i], row[2 * i + 1] = slope.own_heading * effect[i, 0], slope.own_speed * effect[i, 1]
+            if first == WAYS:
+                row[2 * j], row[2 * j + 1] = slope.other_heading * effect[j, 0], slope.other_speed * effect[j, 1]
+            length = math.sqrt((row * row).sum())
             if length >= 1e-9:
-                d[r] = (value_m[i, j] - slope.value_m + (C[r] * z).sum()) / length
-                C[r] /= length
+                d[r] = (need_m[m] - slope.value_m + (row * z).sum()) / length
+                row /= length
                 r += 1
     for c in range(len(z)):
         C[r : r + 2] = 0.0
         C[r, c], C[r + 1, c] = 1.0, -1.0
-        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -root)
+        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -math.sqrt(setup.speed_weight))
         r += 2
-    return r
+    return C[:r], d[:r]
 
 
 @kernel
-def _short(h: Array, target: Array) -> BoolArray:
-    """Boats (n,) some margin of which, (n, n), is short of its target."""
-    short = np.zeros(len(h), np.bool_)
-    for i in range(len(h)):
-        short[i] = not (h[i] >= target[i]).all()
-    return short
-
-
-@kernel
-def _program(setup: Setup, state: Array, ours: BoolArray, target: Array, asked: Array, sent: Array, h: Array) -> bool:
+def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: Array, h: Array) -> bool:
     """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
-    n, root, near = len(ours), math.sqrt(setup.speed_weight), target > -np.inf
+    state, ours, sent, n = game.state, game.ours, game.sent, len(game.ours)
     z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
-    C, d = np.zeros((WAYS * n * n + 4 * n, 2 * n)), np.zeros(WAYS * n * n + 4 * n)
     for attempt in range(ROUNDS):
         x = ahead(setup, state, ours, sent, 1)
         for i in np.flatnonzero(ours):
@@ -96,17 +85,17 @@ def _program(setup: Setup, state: Array, ours: BoolArray, target: Array, asked: 
             effect[i, 0], effect[i, 1] = found
         if attempt == 0:
             z0[:] = now
-        rows = _rows(setup, ours, setup.radius_m + target + AIM_M, x, effect, now, C, d)
-        if project(C[:rows], d[:rows], z0, z) != OPTIMAL:
+        C, d = _rows(setup, pairs, setup.radius_m + target + AIM_M, x, effect, now)
+        if project(C, d, z0, z) != OPTIMAL:
             return False
         for i in np.flatnonzero(ours):
             sent[i] = asked[i]
             if np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
-                speed = clamp(z[2 * i + 1] / root, 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
+                speed = clamp(z[2 * i + 1] / math.sqrt(setup.speed_weight), 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
                 turn = z[2 * i] * math.degrees(effect[i, 0])
                 sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
-        h[:] = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
-        if not _short(h, target).any():
+        h[:] = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
+        if (h >= target).all():
             return True
     return False
 
@@ -123,21 +112,21 @@ def _follow(setup: Setup, i: int, backup: Array, row: Array) -> tuple[float, flo
 
 
 @kernel
-def _take_backups(
-    setup: Setup, state: Array, ours: BoolArray, near: BoolArray, movers: BoolArray, sent: Array, side: Array
-) -> None:
+def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray) -> None:
     """Give the movers (n,) the backups of greatest value after ``look`` steps; others go by their commands.
 
-    A boat changes its ``side`` (n,), -1 or 1, which is written too, only for what is clearly better.
+    A boat changes the side it turns to, which is kept of it, only for what is clearly better.
     """
-    x = ahead(setup, state, ours, sent, setup.look)
+    state, sent, side = game.state, game.sent, game.memory[:, 0]
+    x = ahead(setup, state, game.ours, sent, setup.look)
     for sweep in range(SWEEPS):
         for i in np.flatnonzero(movers):
             best, chosen = -math.inf, 0
+            mine = pairs[(pairs[:, 0] == i) | ((pairs[:, 1] == i) & (pairs[:, 2] == WAYS))]
             for k in range(len(BACKUPS)):
                 x[i, WAYS] = state[i]
                 _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
-                value = margins(setup, ours, near, x, int(i))[i].min()
+                value = margins(setup, mine, x).min()
                 value -= setup.hysteresis_m if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
                 if value > best:
                     best, chosen = value, k
@@ -149,35 +138,34 @@ def _take_backups(
 
 @kernel
 def decide_game(setup: Setup, game: Games) -> None:
-    """Decide for the boats of ours in one game, (n, ...) each; what is kept of a boat is the side of its backup."""
+    """Decide for the boats of ours in one game, (n, ...) each."""
     state, wanted, ours, memory, sent, reason, certificate_m = game
-    side = memory[:, 0]
     reason[:] = np.where(ours, PASSED, NOT_COVERED)
     for i in np.flatnonzero(ours):
         if not (np.abs(wanted[i]) <= LARGEST_COMMAND).all():
             sent[i], reason[i] = 0.0, HELD
-    near, asked = near_pairs(setup, state, ours), sent.copy()
-    now = margins(setup, ours, near, ahead(setup, state, ours, sent, 0), -1)
-    target = np.where(near, np.maximum(0.0, setup.decay * np.minimum(now, setup.cap_m)), -np.inf)
-    h = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
-    movers = _short(h, target)
-    if movers.any() and _program(setup, state, ours, target, asked, sent, h):
+    n, asked, pairs = len(ours), sent.copy(), near_pairs(setup, state, ours)
+    now = margins(setup, pairs, ahead(setup, state, ours, sent, 0))
+    target = np.maximum(0.0, setup.decay * np.minimum(now, setup.cap_m))
+    h = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
+    movers = ~(least(pairs, h - target, n) >= 0.0)
+    if movers.any() and _program(setup, game, pairs, target, asked, h):
         movers[:] = False
         for i in np.flatnonzero(ours):
             reason[i] = QP if (sent[i] != asked[i]).any() else reason[i]
     elif movers.any():
         sent[:], added = asked, movers
         while added.any():  # who falls short by what others do now backs away, too
-            _take_backups(setup, state, ours, near, movers, sent, side)
-            h[:] = margins(setup, ours, near, ahead(setup, state, ours, sent, 1), -1)
-            added = _short(h, target) & ~movers
+            _take_backups(setup, game, pairs, movers)
+            h[:] = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
+            added = ~((least(pairs, h - target, n) >= 0.0) | movers)
             movers = movers | added
+    certificate_m[:] = least(pairs, h, n)
     for i in np.flatnonzero(ours):
-        certificate_m[i] = h[i].min()
         if movers[i]:
             reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
         elif reason[i] != QP:
-            side[i] = 0.0
+            memory[i] = 0.0
 
 
 @kernel

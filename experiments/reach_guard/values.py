@@ -41,21 +41,23 @@ class Setup(NamedTuple):
 
 
 @kernel
-def joint(setup: Setup, ours: BoolArray, i: int, j: int) -> bool:
-    """Whether both boats of the pair are decided for together."""
-    return ours[i] and ours[j] and setup.team[i] == setup.team[j]
+def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
+    """Pairs (m, 4) within their table's range: boat i of ours, boat j, and which of j's states of `ahead` count.
 
-
-@kernel
-def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> BoolArray:
-    """Pairs (n, n) of a boat of ours with another within their table's range."""
-    near = np.zeros(setup.table.shape, np.bool_)
-    for i, j in np.ndindex(near.shape):
-        if ours[i] and i != j and not (j < i and joint(setup, ours, i, j)):
-            gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
-            near[i, j] = gap <= table_range_m(setup.tables, int(setup.table[i, j]))
-            near[j, i] = near[i, j] if joint(setup, ours, i, j) else near[j, i]
-    return near
+    These are, from the first to before the last: the one under its commands, if both are decided for together (which
+    is a pair once), every way of an opponent, and the first of another team-mate.
+    """
+    pairs, m = np.zeros((setup.table.size, 4), np.int64), 0
+    for i, j in np.ndindex(setup.table.shape):
+        mates = setup.team[i] == setup.team[j]
+        if i == j or not ours[i] or (mates and ours[j] and j < i):
+            continue
+        gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+        if gap <= table_range_m(setup.tables, int(setup.table[i, j])):
+            first, last = (WAYS, WAYS + 1) if mates and ours[j] else (0, 1 if mates else WAYS)
+            pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3] = i, j, first, last
+            m += 1
+    return pairs[:m]
 
 
 @kernel
@@ -75,14 +77,6 @@ def ahead(setup: Setup, state: Array, ours: BoolArray, commands: Array, steps: i
 
 
 @kernel
-def others(setup: Setup, ours: BoolArray, i: int, j: int, x: Array) -> Array:
-    """States (k, N_STATE) of boat j in ``x``, see `ahead`, the worst of which counts for boat i."""
-    if joint(setup, ours, i, j):
-        return x[j, WAYS:]
-    return x[j, :WAYS] if setup.team[i] != setup.team[j] else x[j, :1]
-
-
-@kernel
 def seen(own: Array, other: Array) -> tuple[float, float, float, float, float, float]:
     """What a table is asked with: offset of the other boat, m, both headings, rad, and speeds, m/s."""
     x, y = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
@@ -90,15 +84,22 @@ def seen(own: Array, other: Array) -> tuple[float, float, float, float, float, f
 
 
 @kernel
-def margins(setup: Setup, ours: BoolArray, near: BoolArray, x: Array, of: int) -> Array:
-    """Margins (n, n) of near pairs in the states ``x``, inf of others; those of boat ``of`` only, unless it is -1."""
-    h = np.full(near.shape, np.inf)
-    for i, j in np.ndindex(near.shape):
-        both = joint(setup, ours, i, j)
-        if not near[i, j] or (both and j < i) or (of >= 0 and of != i and not (both and of == j)):
-            continue
-        for other in others(setup, ours, i, j, x):
+def margins(setup: Setup, pairs: IntArray, x: Array) -> Array:
+    """Margins (m,) of pairs in the states ``x`` of `ahead`, m."""
+    h = np.full(len(pairs), np.inf)
+    for r in range(len(pairs)):
+        i, j, first, last = pairs[r, 0], pairs[r, 1], pairs[r, 2], pairs[r, 3]
+        for other in x[j, first:last]:
             value = table_value(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
-            h[i, j] = min(h[i, j], value - setup.radius_m)
-        h[j, i] = h[i, j] if both else h[j, i]
+            h[r] = np.minimum(h[r], value - setup.radius_m)
     return h
+
+
+@kernel
+def least(pairs: IntArray, h: Array, boats: int) -> Array:
+    """Least (n,) of what is given of pairs, (m,), for the boats of ours in them."""
+    low = np.full(boats, np.inf)
+    for r in range(len(pairs)):
+        for i in pairs[r, : 2 if pairs[r, 2] == WAYS else 1]:
+            low[i] = np.minimum(low[i], h[r])
+    return low
