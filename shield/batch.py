@@ -16,16 +16,15 @@ from .exceptions import ConfigError, FleetError
 from .filter.flow import decide_compiled
 from .fleet import LARGEST, LARGEST_SPEED_MPS, usable_drives
 from .game_facts import facts_of_games, warn_of_distances
-from .jit import Array, BoolArray, IntArray, copy_row, kernel, lean_kernel
+from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .kept_barriers import KeptBarriers
 from .memory import Memory, new_memory, put_memory, take_memory
 from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
-from .scene import Boats, Scene, new_scene, path_samples
+from .scene import Scene, new_scene, path_samples
 from .setup import boats_of, plans_of, tuning_of
-from .shared import share
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.driving import driven_boats
 from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
@@ -52,15 +51,6 @@ class Asked(NamedTuple):
     known: BoolArray
 
 
-class Granted(NamedTuple):
-    """What boats are granted as opponents while nothing drives them, as in `Boats`."""
-
-    granted_turn_dps: Array
-    granted_acc_mps2: Array
-    table: IntArray
-    feared: BoolArray
-
-
 class Decided(NamedTuple):
     """What is decided: see `BatchedShield.decide`."""
 
@@ -70,26 +60,11 @@ class Decided(NamedTuple):
     cut_short: BoolArray
 
 
-@lean_kernel
-def _foresee_driven(driven: Array, known: BoolArray, granted: Granted, scene: Scene) -> None:
-    """Note what drives the boats of a game: they go their ways, and pursue nobody; see `setup.without_pursuers`."""
-    boats, work = scene.boats, scene.work
-    for j in range(known.shape[0]):
-        copy_row(work.driven[j], driven[j])
-        work.known[j] = known[j]
-        boats.granted_turn_dps[j] = 0.0 if known[j] else granted.granted_turn_dps[j]
-        boats.granted_acc_mps2[j] = 0.0 if known[j] else granted.granted_acc_mps2[j]
-        boats.feared[j] = granted.feared[j] and not known[j]
-        for i in range(known.shape[0]):
-            boats.table[i, j] = -1 if known[j] else granted.table[i, j]
-
-
 @kernel
 def decide_games(
     asked: Asked,
     decided: Decided,
     scene: Scene,
-    granted: Granted,
     memory: Memory,
     pending: Array,
     error_m: Array,
@@ -114,7 +89,7 @@ def decide_games(
             if ahead[i, L.HEADING] != state[i, L.HEADING]:
                 wanted[i, 1] += state[i, L.HEADING] - ahead[i, L.HEADING]
         copy_row(work.fear_s, asked.fear_s[b])
-        _foresee_driven(asked.driven[b], asked.known[b], granted, scene)
+        work.driven[:], work.known[:] = asked.driven[b], asked.known[b]
         take_memory(memory, b, scene.memory)
         decide_compiled(scene, ahead, wanted, margin_m, ours)
         put_memory(scene.memory, b, memory)
@@ -171,7 +146,7 @@ class BatchedShield:
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
             )
         n = len(self.platforms)
-        boats, self._granted = _boats_of_its_own(boats_of(config, self.platforms, self.team))
+        boats = boats_of(config, self.platforms, self.team)
         self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
         self._memory = new_memory(games, n)
         self._barriers = KeptBarriers(config)
@@ -247,9 +222,8 @@ class BatchedShield:
         known = ~ours & usable_drives(driven) & (driven[..., DRIVEN_S] >= self._horizon_s)
         asked = Asked(state, wanted, ours, fear_s, driven, known)
         decided = Decided(self.sent, self.reason, self.certificate_m, self.cut_short)
-        scene = self._scene, self._granted, self._memory
         self._barriers.renew()
-        decide_games(asked, decided, *scene, self._pending, self._margin, self._late_m)
+        decide_games(asked, decided, self._scene, self._memory, self._pending, self._margin, self._late_m)
         self._barriers.tell()
         return self.sent
 
@@ -308,13 +282,6 @@ class GamesFilter:
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
         return self.shield.decide(core.state, commands, ours, ~core.on_side, driven_boats(core))
-
-
-def _boats_of_its_own(boats: Boats) -> tuple[Boats, Granted]:
-    """The same constants in arrays that are nobody else's, and what in them changes with who is driven."""
-    granted = Granted(boats.granted_turn_dps, boats.granted_acc_mps2, boats.table, boats.feared)
-    own = {name: array.copy() for name, array in granted._asdict().items()}
-    return share(boats._replace(**own)), share(granted)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

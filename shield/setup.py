@@ -134,18 +134,6 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     )
 
 
-def without_pursuers(boats: Boats, known: BoolArray) -> Boats:
-    """Constants of the same boats when of those of ``known`` (n,) it is foreseen where they go: they pursue nobody."""
-    return share(
-        boats._replace(
-            granted_turn_dps=np.where(known, 0.0, boats.granted_turn_dps),
-            granted_acc_mps2=np.where(known, 0.0, boats.granted_acc_mps2),
-            table=np.where(known[None], -1, boats.table),
-            feared=boats.feared & ~known,
-        )
-    )
-
-
 @lru_cache(maxsize=256)
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""

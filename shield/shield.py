@@ -28,7 +28,7 @@ from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
 from .scene import Boats, Registered, Scene, Static, Tuning, new_scene, path_samples
-from .setup import boats_of, missing_tables, plans_of, tuning_of, without_pursuers
+from .setup import boats_of, missing_tables, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.autopilots import Autopilots, all_known, unknown_memory
 from .tracking.remembering import Known, Stayed, carry_over, meets_new
@@ -103,7 +103,6 @@ class Shield:
         self._kept_from: Static | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
-        self._foreseen: dict[bytes, Boats] = {}
         self._missing: BoolArray | None = None
         self._known: Known | None = None
         self.serves: object | None = None
@@ -185,7 +184,8 @@ class Shield:
 
     def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
         """`decide`, of boats in the order of their names."""
-        boats = self._foresee(fleet, self._scene(fleet))
+        boats = self._scene(fleet)
+        self._foresee(fleet, boats)
         feared_s = self._fear(fleet)
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
@@ -243,11 +243,10 @@ class Shield:
             boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
             self._seat(fleet, boats)
             self._boats, self._known = boats, Known.of(fleet)
-            self._foreseen = {}
         return self._boats
 
-    def _foresee(self, fleet: Fleet, boats: Boats) -> Boats:
-        """Note which boats' ways are foreseen; the boats' constants, by which those pursue nobody."""
+    def _foresee(self, fleet: Fleet, boats: Boats) -> None:
+        """Note which boats' ways are foreseen: those pursue nobody."""
         known = np.zeros(len(fleet), np.bool_)
         if fleet.driven is not None:
             horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
@@ -256,12 +255,6 @@ class Shield:
             seat.work.known[:] = known
             if fleet.driven is not None:
                 seat.work.driven[:] = fleet.driven
-        if not known.any():
-            return boats
-        key = known.tobytes()
-        if key not in self._foreseen:
-            self._foreseen[key] = without_pursuers(boats, known)
-        return self._foreseen[key]
 
     def _fear(self, fleet: Fleet) -> Array:
         """Note how long each boat may do its worst, by what the fleet says, else the settings.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..barriers.clearance import FAR
+from ..barriers.foreseen import may_pursue
 from ..barriers.opponents import first_then_rest
 from ..barriers.value_function import margin_at_once, set_place, table_answers, tabled
 from ..jit import copy_row, lean_kernel
@@ -29,7 +30,7 @@ def pursuers_run(i: int, slot: int, boats: Boats, work: Work) -> int:
         return PURSUERS if work.pursued[i] else NO_PURSUERS
     how = PURSUERS_TILL_READY if work.outnumbered[i] else NO_PURSUERS
     for j in range(work.near.shape[0]):
-        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j] or boats.granted_turn_dps[j] == 0.0:
+        if j == i or not work.near[i, j] or boats.team[i] == boats.team[j] or not may_pursue(j, boats, work):
             continue
         if not tabled(i, j, boats, work):
             return PURSUERS

@@ -14,7 +14,8 @@ from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
 from ..platforms.usv import wrap_degrees
-from ..scene import Scene
+from ..scene import Boats, Scene
+from ..work import Work
 
 DRIVEN_MPS, DRIVEN_X, DRIVEN_Y, DRIVEN_S = range(4)
 """What drives a boat: speed m/s (NaN: not driven), place it is steered at, m (NaN: none, the heading error is 0), and
@@ -28,6 +29,12 @@ def error_to(row: Array, x: float, y: float) -> float:
         return 0.0
     bearing = np.float64(math.degrees(math.atan2(x - row[L.X], y - row[L.Y])))
     return wrap_degrees(bearing - row[L.HEADING])
+
+
+@lean_kernel
+def may_pursue(j: int, boats: Boats, work: Work) -> bool:
+    """Whether boat j as an opponent is granted more than holding its course, or the way that is foreseen."""
+    return boats.granted_turn_dps[j] > 0.0 and not work.known[j]
 
 
 @lean_kernel

@@ -9,7 +9,7 @@ from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import next_thrust
 from ..scene import Scene
-from .foreseen import foresee
+from .foreseen import foresee, may_pursue
 from .value_function import find_outnumbered, run_opponents
 
 REGAIN_M = 0.01
@@ -72,8 +72,8 @@ def find_neighbours(scene: Scene, margin_m: Array) -> None:
                 work.cost[i] += 1.0
                 work.cost[j] += 1.0
                 if boats.team[i] != boats.team[j]:
-                    work.pursued[i] = work.pursued[i] or boats.granted_turn_dps[j] > 0.0
-                    work.pursued[j] = work.pursued[j] or boats.granted_turn_dps[i] > 0.0
+                    work.pursued[i] = work.pursued[i] or may_pursue(j, boats, work)
+                    work.pursued[j] = work.pursued[j] or may_pursue(i, boats, work)
                     work.cost[i] += PURSUER_COST
                     work.cost[j] += PURSUER_COST
                 least = radius - tuning.buffer_m

@@ -13,6 +13,7 @@ from ..scene import Boats, Scene
 from ..tables.lookup import WHOLE_S
 from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Search
+from .foreseen import may_pursue
 from .pursuit import Pursuer, Pursuit, roll_out_pursuer, stays_away
 from .value_function import margin_when_ready, out_of_reach, table_answers, tabled, worst_at_once
 
@@ -165,9 +166,9 @@ def first_then_rest(first: int, number: int) -> int:
 
 
 @lean_kernel
-def pursues(i: int, j: int, ours: BoolArray, boats: Boats) -> bool:
+def pursues(i: int, j: int, ours: BoolArray, boats: Boats, work: Work) -> bool:
     """Whether boat j is an opponent of boat i that is granted more than holding its course."""
-    return not ours[j] and boats.team[i] != boats.team[j] and boats.granted_turn_dps[j] > 0.0
+    return not ours[j] and boats.team[i] != boats.team[j] and may_pursue(j, boats, work)
 
 
 @lean_kernel
@@ -255,7 +256,7 @@ def worst_pursuer(i: int, slot: int, scene: Scene, level_m: float) -> None:
         first = work.first_pursuer[i]
         for number in range(state.shape[0]):
             j = first_then_rest(first, number)
-            if j == i or not work.near[i, j] or work.breach[i, j] or not pursues(i, j, ours, boats):
+            if j == i or not work.near[i, j] or work.breach[i, j] or not pursues(i, j, ours, boats, work):
                 continue
             if not _clear_of_threat(i, j, slot, level_m, scene):
                 work.first_pursuer[i] = j

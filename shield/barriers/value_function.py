@@ -58,7 +58,7 @@ def run_opponents(steps: int, scene: Scene) -> None:
     work.pursuers_known[:] = False
     work.lookup[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
-        if ours[j] or not boats.feared[j]:
+        if ours[j] or work.known[j] or not boats.feared[j]:
             continue
         params = boats.params[j]
         full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.model_s)
@@ -141,7 +141,7 @@ def set_place(i: int, slot: int, side: float, togo_deg: float, speed_mps: float,
 def tabled(i: int, j: int, boats: Boats, work: Work) -> bool:
     """Whether a table is for boat i and opponent j, and tells enough of them."""
     table = boats.table[i, j]
-    if table < 0 or work.breach[i, j]:
+    if table < 0 or work.breach[i, j] or work.known[j]:
         return False
     return work.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
 

@@ -128,7 +128,7 @@ def _pair_row(r: int, m: int, j: int, count: int, scene: Scene) -> bool:
     ours, boats, tuning, work, plan = scene.ours, scene.boats, scene.tuning, scene.work, scene.plan
     i = plan.movers[m]
     clear_of_boat(i, j, work.path[i], scene, -FAR, FAR)
-    pursuer = pursues(i, j, ours, boats)
+    pursuer = pursues(i, j, ours, boats, work)
     if pursuer and not work.breach[i, j] and not table_answers(i, j, i, boats, work):
         copy_row(work.spare2, work.out)
         clear_of_pursuer(i, j, i, scene, -FAR, tuning.margin_cap_m)
