@@ -29,16 +29,6 @@ RECOVERY_S = 1.5
 
 
 @lean_kernel
-def clear_of_opponent(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
-    """Clearance of boat i on ``path`` from boat j that is not ours to steer and holds course and speed."""
-    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
-    now, way = work.course[j], state[j, L.SPEED] * boats.sample_s
-    course = Course(work.path[0, :0], now[0], now[1], way * now[2], way * now[3])
-    search = Search(closing(i, j, scene), work.radius[i, j], floor_m, cap_m)
-    clear_of_course(path, course, boats.samples[i], tuning.tail_s / boats.sample_s, search, work.out)
-
-
-@lean_kernel
 def _rank_recovery(i: int, j: int, path: Array, scene: Scene) -> None:
     """In breach no margin is left to compare: rank by not closing further and by the distance soon after."""
     state, ours, boats, work = scene.state, scene.ours, scene.boats, scene.work
@@ -72,18 +62,23 @@ def reported_margin(i: int, state: Array, work: Work) -> float:
 
 @lean_kernel
 def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
-    """Clearance row of boat i on ``path`` from boat j, into ``work.out``."""
-    ours, boats, tuning, work = scene.ours, scene.boats, scene.tuning, scene.work
+    """Clearance row of boat i on ``path`` from boat j, into ``work.out``.
+
+    One that is not ours to steer, and whose way is not foreseen, holds course and speed.
+    """
+    state, ours, boats, tuning, work = scene.state, scene.ours, scene.boats, scene.tuning, scene.work
     floor, cap = floor_m, cap_m
     if work.breach[i, j]:
         floor, cap = -FAR, FAR
+    search = Search(closing(i, j, scene), work.radius[i, j], floor, cap)
+    tail = tuning.tail_s / boats.sample_s
     if ours[j] or work.known[j]:
         samples = min(boats.samples[i], boats.samples[j])
-        course = Course(work.path[j], 0.0, 0.0, 0.0, 0.0)
-        search = Search(closing(i, j, scene), work.radius[i, j], floor, cap)
-        clear_of_course(path, course, samples, tuning.tail_s / boats.sample_s, search, work.out)
+        clear_of_course(path, Course(work.path[j], 0.0, 0.0, 0.0, 0.0), samples, tail, search, work.out)
     else:
-        clear_of_opponent(i, j, path, scene, floor, cap)
+        now, way = work.course[j], state[j, L.SPEED] * boats.sample_s
+        course = Course(work.path[0, :0], now[0], now[1], way * now[2], way * now[3])
+        clear_of_course(path, course, boats.samples[i], tail, search, work.out)
     if work.breach[i, j]:
         _rank_recovery(i, j, path, scene)
 
