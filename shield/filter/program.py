@@ -8,7 +8,6 @@ with scaled inputs z (see `rows`). An answer counts only when it satisfies every
 from __future__ import annotations
 
 import logging
-import math
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +18,7 @@ import qpsolvers
 from scipy.sparse import csc_matrix, identity
 
 from ..exceptions import SolverError
-from ..jit import Array, kernel
+from ..jit import Array
 
 logger = logging.getLogger(__name__)
 
@@ -67,16 +66,10 @@ def _identity(n: int) -> Array:
     return np.eye(n)
 
 
-@kernel
 def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
     """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
-    for r in range(C.shape[0]):
-        total = 0.0
-        for c in range(C.shape[1]):
-            total += C[r, c] * z[c]
-        if not total >= d[r] - tolerance:
-            return False
-    return True
+    with np.errstate(all="ignore"):
+        return bool((C @ z >= d - tolerance).all())
 
 
 @lru_cache(maxsize=64)
@@ -96,26 +89,13 @@ def _ask(program: Program, solver: str) -> Any:
         return qpsolvers.solve_qp(identity_n, -program.z0, rows, -program.d, solver=solver, **options)
 
 
-@kernel
-def made_of_numbers(C: Array, d: Array, z0: Array) -> bool:
-    """Whether every number of a program is finite: some backends take half a minute over one that is not."""
-    good = True
-    for r in range(C.shape[0]):
-        good = good and math.isfinite(d[r])
-        for c in range(C.shape[1]):
-            good = good and math.isfinite(C[r, c])
-    for c in range(z0.shape[0]):
-        good = good and math.isfinite(z0[c])
-    return good
-
-
 def solve(program: Program, solver: str) -> Array | None:
     """Answer of the program, shape (n,), or None when the backend finds none that passes our own check.
 
     Fails closed: a backend that raises, or answers anything but n numbers that satisfy every row, has no answer.
     """
-    if not made_of_numbers(program.C, program.d, program.z0):
-        return None
+    if not all(np.isfinite(numbers).all() for numbers in (program.C, program.d, program.z0)):
+        return None  # some backends take half a minute over these
     try:
         answer = _ask(program, solver)
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
