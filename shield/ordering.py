@@ -17,6 +17,7 @@ from .decision import Decisions
 from .fleet import Fleet
 from .jit import IntArray
 
+_MAY_BE_GIVEN = ("age_s", "position_error_m", "driven", "visiting", "adversary_s")
 _NUMBER = re.compile(r"([0-9]+)")
 
 
@@ -49,11 +50,7 @@ def ordered(fleet: Fleet, wanted: Commands, order: IntArray) -> tuple[Fleet, Com
         platforms=tuple(fleet.platforms[i] for i in rows),
         controlled=fleet.controlled[order],
         names=tuple(fleet.names[i] for i in rows),
-        age_s=None if fleet.age_s is None else fleet.age_s[order],
-        position_error_m=None if fleet.position_error_m is None else fleet.position_error_m[order],
-        driven=None if fleet.driven is None else fleet.driven[order],
-        visiting=None if fleet.visiting is None else fleet.visiting[order],
-        adversary_s=None if fleet.adversary_s is None else fleet.adversary_s[order],
+        **{name: value[order] for name in _MAY_BE_GIVEN if (value := getattr(fleet, name)) is not None},
     )
     return boats, replace(wanted, values=wanted.values[order])
 

@@ -111,17 +111,12 @@ def refresh(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def short(i: int, memory: Memory) -> bool:
-    """Whether boat i was on its backup at the last decision, and that one short of its margin."""
-    return memory.kept[i] and memory.backing_up[i] and memory.margin_m[i] < 0.0
-
-
-@lean_kernel
 def settled(i: int, sweep: int, exhaustive: bool, memory: Memory, work: Work) -> bool:
     """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
+    was_short = memory.kept[i] and memory.backing_up[i] and memory.margin_m[i] < 0.0
     if work.rank[i] >= PAIR_SAFE or (sweep > 0 and work.rank[i] >= STRAIGHT_SAFE):
         return True
-    return not exhaustive and short(i, memory)
+    return not exhaustive and was_short
 
 
 @lean_kernel

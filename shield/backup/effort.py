@@ -22,19 +22,6 @@ ROW_COST = 0.02
 
 
 @lean_kernel
-def begin_counting(work: Work) -> None:
-    """A new decision has cost nothing yet."""
-    work.spent[0], work.cut_short[0] = 0.0, False
-    work.cost[:] = PATH_COST
-
-
-@lean_kernel
-def spend(cost: float, work: Work) -> None:
-    """Count what something costs."""
-    work.spent[0] += cost
-
-
-@lean_kernel
 def all_spent(tuning: Tuning, work: Work) -> bool:
     """Whether the decision is to search no further; it is then told that it was cut short."""
     if work.spent[0] <= tuning.search_limit:

@@ -11,7 +11,6 @@ from ..barriers.static import clear_of_near_obstacles, clear_of_static, share_be
 from ..jit import BoolArray, lean_kernel
 from ..scene import Scene
 from ..work import Work
-from .effort import spend
 
 PAIR_SAFE = 1e3
 """Rank from which a manoeuvre keeps clear of everybody, whatever they are granted, and of static constraints."""
@@ -90,7 +89,7 @@ def rank_path(i: int, slot: int, best: float, scene: Scene) -> float:
     boats, whatever the rank hangs on.
     """
     tuning, work = scene.tuning, scene.work
-    spend(work.cost[i], work)
+    work.spent[0] += work.cost[i]
     clear = work.clear[slot]
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, scene, min(floor, 0.0))

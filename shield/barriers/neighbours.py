@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..backup.effort import PURSUER_COST, begin_counting
+from ..backup.effort import PATH_COST, PURSUER_COST
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import next_thrust
@@ -41,7 +41,8 @@ def find_neighbours(scene: Scene, margin_m: Array) -> None:
     """
     state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     n = state.shape[0]
-    begin_counting(work)
+    work.spent[0], work.cut_short[0] = 0.0, False
+    work.cost[:] = PATH_COST
     run_opponents(1, scene)
     foresee(scene)
     for i in range(n):

@@ -44,14 +44,6 @@ def closing(i: int, j: int, scene: Scene) -> float:
 
 
 @lean_kernel
-def fade_over(lasts: int, i: int, boats: Boats) -> float:
-    """Factor per sample of negative margins over a pursuit of so many samples: they fade as much by the end of any."""
-    if lasts == boats.pursuit_samples[i]:
-        return boats.fade[i]
-    return boats.fade[i] ** (boats.pursuit_samples[i] / lasts)
-
-
-@lean_kernel
 def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, cap_m: float) -> None:
     """Clearance of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
@@ -99,13 +91,15 @@ def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene, cap_m: floa
 def pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, till_ready: bool, scene: Scene) -> Pursuit:
     """A pursuit of boat i by opponent j that lasts so many samples, or until thrust on the path in ``slot`` is full.
 
-    How far the pursuer leads the boat goes by how long it lasts. For ``closely`` see `Pursuit`.
+    How far the pursuer leads the boat goes by how long it lasts, and negative margins fade as much by the end of any.
+    For ``closely`` see `Pursuit`.
     """
     boats, work = scene.boats, scene.work
     samples = min(lasts, int(work.ready[slot, READY_SAMPLE])) if till_ready else lasts
-    adverse = _adverse_samples(samples, work.fear_s[j], boats)
+    adverse = samples if work.fear_s[j] >= WHOLE_S else min(samples, math.ceil(work.fear_s[j] / boats.sample_s))
     ahead = (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts
-    return Pursuit(boats.sample_s, samples, adverse, closely, ahead, fade_over(lasts, i, boats), till_ready)
+    fade = boats.fade[i] ** (boats.pursuit_samples[i] / lasts)
+    return Pursuit(boats.sample_s, samples, adverse, closely, ahead, fade, till_ready)
 
 
 @lean_kernel
@@ -131,14 +125,6 @@ def _run_pursuer(
     )
     search = Search(closing(i, j, scene), work.radius[i, j], floor_m, cap_m)
     return roll_out_pursuer(work.path[slot], pursuer, pursuit, search, work.pursuer, work.spare)
-
-
-@lean_kernel
-def _adverse_samples(samples: int, fear_s: float, boats: Boats) -> int:
-    """Sample from which on a pursuer feared for so long holds its course and speed: until then it may do its worst."""
-    if fear_s >= WHOLE_S:
-        return samples
-    return min(samples, math.ceil(fear_s / boats.sample_s))
 
 
 @lean_kernel

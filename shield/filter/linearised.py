@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..backup.assign import hold, recheck
-from ..backup.effort import ROW_COST, spend
+from ..backup.effort import ROW_COST
 from ..backup.rank import PAIR_SAFE
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
@@ -53,10 +53,10 @@ def build(count: int, scene: Scene) -> int:
     for m in range(count):
         i = plan.movers[m]
         hold(i, plan.held, work)
-        spend(work.cost[i], work)
+        work.spent[0] += work.cost[i]
     inputs_of(count, scene)
     rows = build_rows(count, scene)
-    spend(ROW_COST * rows * count, work)
+    work.spent[0] += ROW_COST * rows * count
     return rows
 
 

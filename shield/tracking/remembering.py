@@ -12,22 +12,8 @@ from ..memory import Memory
 from ..platforms import Platform
 from ..scene import Boats, Tuning
 
-_OWN = (
-    "kept",
-    "side",
-    "target_deg",
-    "speed_mps",
-    "margin_m",
-    "joint_m",
-    "static_m",
-    "backing_up",
-    "dwell_s",
-    "pressed_s",
-    "pressed_deg",
-    "free_s",
-    "gives_way",
-)
-"""What is remembered of a boat alone."""
+_OF_OTHERS = ("threat_m", "blocked_by")
+"""What is remembered of a boat and others; the rest is of it alone."""
 
 
 class Known(NamedTuple):
@@ -71,8 +57,9 @@ def carry_over(old: Memory, new: Memory, stayed: Stayed, met: BoolArray) -> None
     it is asked for no more than a margin of 0, and its backup is kept.
     """
     now, then = stayed
-    for name in _OWN:
-        getattr(new, name)[now] = getattr(old, name)[then]
+    for name, kept, found in zip(Memory._fields, new, old, strict=True):
+        if name not in _OF_OTHERS:
+            kept[now] = found[then]
     place = np.full(len(old.blocked_by) + 1, -1)  # the last for nobody
     place[then] = now
     new.blocked_by[now] = place[old.blocked_by[then]]
