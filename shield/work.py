@@ -31,8 +31,6 @@ class Work(NamedTuple):
         threats_m: (n + 1, n) the same against each, m; as far as they were looked at. Of one that is looked up without
             the run before.
         threat_by: (n + 1,) the opponent the least margin is from, -1 for none.
-        threat_at: (n + 1,) the sample at which it comes about.
-        failed_at: (n + 1,) the first sample at which one is below what must be kept; infinite when none is.
         table_m: (n + 1,) the least margin that tables tell where they are looked up first, m.
         pursuers_known: (n + 1,) whether the margins against opponents are all those of the path that is there.
         joint_m: (n + 1,) the least of these runs, m; `FAR` where none were made.
@@ -56,8 +54,7 @@ class Work(NamedTuple):
         lookup: (n, n, 5) the place of each boat at which each opponent was looked up last, and the margin there, m.
         sealed: (n + 1,) whether a table alone made the plan fail.
         outnumbered: (n,) boats that several opponents can come near to, see `barriers.value_function`.
-        ready: (n + 1, 4) what is noted of a plan's path, see `backup.paths`.
-        decided: (n + 1,) sample at which the rank of a plan that fails was decided; infinite where it hangs on more.
+        ready: (n + 1, 3) what is noted of a plan's path, see `backup.paths`.
         pursuer: (5,) where a pursuer is at the end of its run: x, y, m, heading as a unit vector, speed m/s.
         searched: (n,) changes of plans there had been when a boat was last searched for, -1 for never.
         fear_s: (n,) time from now for which each opponent may do its worst before it holds its course, s.
@@ -85,8 +82,6 @@ class Work(NamedTuple):
     threat_m: Array
     threats_m: Array
     threat_by: IntArray
-    threat_at: Array
-    failed_at: Array
     table_m: Array
     pursuers_known: BoolArray
     joint_m: Array
@@ -110,7 +105,6 @@ class Work(NamedTuple):
     sealed: BoolArray
     outnumbered: BoolArray
     ready: Array
-    decided: Array
     pursuer: Array
     searched: IntArray
     fear_s: Array
@@ -142,8 +136,6 @@ def new_work(boats: int, samples: int) -> Work:
             threat_m=np.zeros(boats + 1),
             threats_m=np.zeros((boats + 1, boats)),
             threat_by=np.full(boats + 1, -1, np.int64),
-            threat_at=np.full(boats + 1, np.inf),
-            failed_at=np.full(boats + 1, np.inf),
             table_m=np.zeros(boats + 1),
             pursuers_known=np.zeros(boats + 1, np.bool_),
             joint_m=np.zeros(boats + 1),
@@ -166,8 +158,7 @@ def new_work(boats: int, samples: int) -> Work:
             lookup=np.full((boats, boats, 5), np.nan),
             sealed=np.zeros(boats + 1, np.bool_),
             outnumbered=np.zeros(boats, np.bool_),
-            ready=np.full((boats + 1, 4), -1.0),
-            decided=np.full(boats + 1, np.inf),
+            ready=np.full((boats + 1, 3), -1.0),
             pursuer=np.zeros(5),
             searched=np.full(boats, -1, np.int64),
             fear_s=np.full(boats, np.inf),

@@ -11,10 +11,10 @@ from ..memory import Memory
 from ..platforms import layout as L
 from ..scene import Scene
 from ..work import Work
-from .candidates import DONE_DEG, candidate, hard_turn, kept_turn, preference, remembered
+from .candidates import DONE_DEG, candidate, kept_turn, preference, remembered
 from .effort import all_spent
 from .laying import lay_path, refused_by_tables, run_out, set_out
-from .paths import READY_SAMPLE, TURNING_SAMPLE, angle_to_go
+from .paths import angle_to_go
 from .rank import PAIR_SAFE, STRAIGHT_SAFE, rank_path
 
 SWEEPS = 3
@@ -46,17 +46,6 @@ def _take(i: int, slot: int, rank: float, work: Work) -> None:
 
 
 @lean_kernel
-def holds_for_longer(slot: int, work: Work) -> bool:
-    """Whether a hard turn that fails says the same of every longer one to that side, see `choose_plan`.
-
-    It does when that was decided while the boat still turned and had its thrust back by then, on which hangs how long
-    it is pursued.
-    """
-    turning = work.ready[slot, TURNING_SAMPLE]
-    return 0.0 <= work.ready[slot, READY_SAMPLE] <= turning and work.decided[slot] <= turning
-
-
-@lean_kernel
 def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``exhaustive`` the best of all.
 
@@ -64,35 +53,22 @@ def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: S
     table the choice is made anew at every step, so that is asked of the other side only. What a table refuses one step
     on it refuses for every manoeuvre: then the first that keeps clear of all else will do.
 
-    A hard turn that fails while the boat still turns, its thrust back by then, says the same of every longer one to
-    that side: until then they are one and the same, and longer ones are worth no more.
-
     Once the decision has cost its limit the best so far will do, see `effort`.
     """
-    state, boats, plans = scene.state, scene.boats, scene.plans
-    tuning, memory, work = scene.tuning, scene.memory, scene.work
+    state, boats, tuning, memory, work = scene.state, scene.boats, scene.tuning, scene.memory, scene.work
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
-    no_more_port, no_more_starboard = np.inf, np.inf
     compared = boats.table_steps[i] > 0 and done == 0  # one step on the tables say the same of all manoeuvres
     for p in range(boats.plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, scene)
-        hard = p > 0 and hard_turn(plans[p - 1])
-        if hard and togo >= (no_more_starboard if side > 0.0 else no_more_port):
-            continue
         set_out(i, trial, side, togo, speed, done, scene)
         if compared and refused_by_tables(i, trial, best, scene):
             continue
         run_out(i, trial, done, scene)
         rank = rank_path(i, trial, best, scene)
-        if hard and holds_for_longer(trial, work):
-            if side > 0.0:
-                no_more_starboard = togo
-            else:
-                no_more_port = togo
         kept_rank = rank + preference(i, p, side, togo, rank, scene)
         if kept_rank > best + SAME_RANK:
             best = kept_rank

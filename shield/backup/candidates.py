@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import Array, lean_kernel
+from ..jit import lean_kernel
 from ..memory import Memory
 from ..platforms import layout as L
 from ..scene import Scene, Tuning
@@ -49,12 +49,6 @@ def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scen
     row = plans[p - 1]
     speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
     return row[0], row[1], speed
-
-
-@lean_kernel
-def hard_turn(row: Array) -> bool:
-    """Whether a manoeuvre of the family turns with full rudder at full speed."""
-    return abs(row[0]) == 1.0 and row[1] > 0.0 and row[2] == 1.0
 
 
 @lean_kernel

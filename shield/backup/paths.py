@@ -19,9 +19,8 @@ from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
 SAG_M = 0.022
 """Most a straight line between two samples may cut off the arc sailed between them, m."""
 
-READY_SAMPLE, READY_HEADING, READY_SPEED, TURNING_SAMPLE = range(4)
-"""What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there,
-and the last sample (-1: none) up to which the boat turns as hard as it may, as in every longer turn to that side."""
+READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
+"""What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there."""
 
 STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
@@ -151,9 +150,9 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         manoeuvre: what is carried out.
         span: what is written.
         path: shape (>= samples + 1, 2), float64.
-        ready: shape (4,), what is noted, see `READY_SAMPLE`.
+        ready: shape (3,), what is noted, see `READY_SAMPLE`.
     """
-    ready[READY_SAMPLE], ready[TURNING_SAMPLE] = -1.0, -1.0
+    ready[READY_SAMPLE] = -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
         _trace_usv(params, row, manoeuvre, span, path, ready)
         return
@@ -186,21 +185,17 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
     gained = 0.0
-    turning = True
     k, step = 0, -1
     if span.done > 0:
         k, step = _note_done(span.done, span, row, path, ready)
-        ready[TURNING_SAMPLE] = k - 1.0
     while _goes_on(k, span, ready):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0
-        turning = turning and togo_deg > 0.0
         if togo_deg > 0.0 and thrust > 0.0:
             full = turn_of_rudder(params, thrust, most, dt_s)
             turn = min(full, togo_deg)
             rudder = most * turn / full
-            turning = turning and turn == full
         new_speed = next_speed(params, v, thrust, rudder, dt_s)
         if new_speed == 0.0:
             turn = 0.0
@@ -222,7 +217,6 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         step += 1
         if step % span.stride == 0:
             path[k, 0], path[k, 1] = x, y
-            ready[TURNING_SAMPLE] = k if turning else ready[TURNING_SAMPLE]
             if ready[READY_SAMPLE] < 0.0:
                 _note_ready(k, span, thrust, math.atan2(ux, uy), v, ready)
             k += 1

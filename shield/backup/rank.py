@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..barriers.boats import worst_clearance
-from ..barriers.clearance import FAR, MARGIN, SAMPLE
+from ..barriers.clearance import FAR, MARGIN
 from ..barriers.opponents import worst_pursuer
 from ..barriers.static import clear_of_near_obstacles, clear_of_static, share_before_touch
 from ..jit import BoolArray, lean_kernel
@@ -71,11 +69,10 @@ def _rank_touching(i: int, slot: int, share: float, best: float, scene: Scene) -
     rank = OBSTACLE_BASE * shallow + LATER_WORTH * share
     if work.pursued[i]:
         rank = OBSTACLE_BASE * share + shallow
-    work.decided[slot] = np.inf
     if rank <= best:
         return rank
     worst_pursuer(i, slot, scene, -FAR)
-    work.bound[slot], work.decided[slot] = touched, np.inf
+    work.bound[slot] = touched
     return rank
 
 
@@ -94,11 +91,8 @@ def rank_path(i: int, slot: int, best: float, scene: Scene) -> float:
     floor = best if best < STRAIGHT_SAFE else 0.0
     worst_clearance(i, slot, scene, min(floor, 0.0))
     work.static[slot, MARGIN] = FAR
-    work.decided[slot] = np.inf
     if clear[MARGIN] < 0.0:
         _ask_no_pursuers(slot, work)
-        if not work.breach[i, work.bound[slot]]:  # ranks there are no distances
-            work.decided[slot] = clear[SAMPLE]
         return clear[MARGIN]
     share = share_before_touch(i, slot, scene)
     if share < 1.0:
@@ -111,12 +105,8 @@ def rank_path(i: int, slot: int, best: float, scene: Scene) -> float:
         return STRAIGHT_BASE + sure
     worst_pursuer(i, slot, scene, _level_to_beat(best))
     if short or work.fails[slot]:
-        threat = work.threat_m[slot]
-        least = min(sure, threat) if short else threat
-        if least < threat or not work.fails[slot]:
-            work.decided[slot] = np.inf
+        least = min(sure, work.threat_m[slot]) if short else work.threat_m[slot]
         return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
-    work.decided[slot] = np.inf
     nearest = clear_of_static(i, slot, scene, work.static[slot])
     to_spare_m = work.static[slot, MARGIN] - work.static_target_m[i]
     spare = SPARE_WORTH * min(clear[MARGIN], tuning.margin_cap_m)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..backup.paths import READY_SAMPLE
 from ..jit import BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
@@ -14,7 +12,7 @@ from ..tables.lookup import WHOLE_S
 from ..work import Work
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Search
 from .foreseen import may_pursue
-from .pursuit import Pursuer, Pursuit, roll_out_pursuer, stays_away
+from .pursuit import Pursuer, Pursuit, roll_out_pursuer
 from .value_function import margin_when_ready, out_of_reach, table_answers, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
@@ -59,9 +57,6 @@ def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, ca
     if ready >= 0:
         closely = min(closely, ready + boats.pursuit_samples[i])
     lasts = closely + (0 if till_ready else boats.chase_samples[i, j])
-    if not till_ready and _never_near(i, j, slot, lasts, scene, cap_m):
-        work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = cap_m, lasts, 1.0, 0.0
-        return
     pursuit = pursuit_of(i, j, slot, lasts, closely, till_ready, scene)
     work.out[MARGIN] = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
@@ -76,15 +71,6 @@ def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, ca
             if work.out[MARGIN] < floor_m:
                 work.first_manner[i, j] = manner
                 return
-
-
-@lean_kernel
-def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene, cap_m: float) -> bool:
-    """Whether no run of opponent j, however it steers, ends with less than the cap: most need not be made."""
-    state, boats, work = scene.state, scene.boats, scene.work
-    way = max(boats.params[j, L.MAX_SPEED], state[j, L.SPEED]) * boats.sample_s
-    closing_m, radius_m = closing(i, j, scene), work.radius[i, j]
-    return stays_away(work.path[slot], work.course[j, 0], work.course[j, 1], way, lasts, closing_m, radius_m, cap_m)
 
 
 @lean_kernel
@@ -162,18 +148,16 @@ def _forget_threats(slot: int, work: Work) -> None:
     """Make ready for the threats to the path in ``slot``."""
     work.threats_m[slot, :] = FAR
     work.joint_m[slot], work.table_m[slot], work.threat_m[slot] = FAR, FAR, FAR
-    work.threat_by[slot], work.threat_at[slot], work.failed_at[slot] = -1, np.inf, np.inf
-    work.fails[slot], work.sealed[slot] = False, False
+    work.threat_by[slot], work.fails[slot], work.sealed[slot] = -1, False, False
 
 
 @lean_kernel
 def _note_threat(j: int, slot: int, target_m: float, work: Work) -> None:
     """Note the margin from boat j in ``work.out``: whether it is short of its target, and whether it is the least."""
-    margin, at = work.out[MARGIN], work.out[SAMPLE]
-    if margin < target_m:
-        work.fails[slot], work.failed_at[slot] = True, min(work.failed_at[slot], at)
+    margin = work.out[MARGIN]
+    work.fails[slot] = work.fails[slot] or margin < target_m
     if margin < work.threat_m[slot]:
-        work.threat_m[slot], work.threat_at[slot], work.threat_by[slot] = margin, at, j
+        work.threat_m[slot], work.threat_by[slot] = margin, j
 
 
 @lean_kernel
@@ -249,6 +233,5 @@ def worst_pursuer(i: int, slot: int, scene: Scene, level_m: float) -> None:
                 work.pursuers_known[slot] = False
                 break
         work.sealed[slot] = work.sealed[slot] and work.threat_m[slot] >= work.table_m[slot]
-        work.decided[slot] = max(work.threat_at[slot], work.failed_at[slot])
     if work.threat_m[slot] < work.clear[slot, MARGIN]:
         work.clear[slot, MARGIN], work.bound[slot] = work.threat_m[slot], work.threat_by[slot]
