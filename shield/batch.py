@@ -9,12 +9,11 @@ import numpy as np
 
 from .arrays import NoNumbersError, numbers, truths, whole_numbers
 from .barriers.boats import reported_margin
-from .barriers.foreseen import DRIVEN_S
 from .barriers.value_function import WAYS
 from .config import ShieldConfig
 from .exceptions import ConfigError, FleetError
 from .filter.flow import decide_compiled
-from .fleet import LARGEST, LARGEST_SPEED_MPS, usable_drives
+from .fleet import LARGEST, LARGEST_SPEED_MPS, foreseeable
 from .game_facts import facts_of_games, warn_of_distances
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .kept_barriers import KeptBarriers
@@ -219,7 +218,8 @@ class BatchedShield:
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
         fear_s = np.where(seen, self.config.visitor_feared_s, self.config.feared_s)
         driven = self._undriven if driven is None else _shaped("driven", driven, (*games, 4), numbers)
-        known = ~ours & usable_drives(driven) & (driven[..., DRIVEN_S] >= self._horizon_s)
+        known = np.empty(games, np.bool_)
+        foreseeable(driven.reshape(-1, 4), ours.reshape(-1), self._horizon_s, known.reshape(-1))
         asked = Asked(state, wanted, ours, fear_s, driven, known)
         decided = Decided(self.sent, self.reason, self.certificate_m, self.cut_short)
         self._barriers.renew()

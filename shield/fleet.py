@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -43,6 +44,22 @@ def sound(state: Array) -> bool:
         if abs(state[i, L.SPEED]) > LARGEST_SPEED_MPS:
             return False
     return True
+
+
+@kernel
+def foreseeable(driven: Array, controlled: BoolArray, horizon_s: float, known: BoolArray) -> bool:
+    """Mark the boats whose way is foreseen by their row of ``driven``, see `Fleet.driven`; returns whether one is.
+
+    That takes a speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at
+    all, from which everything keeps clear.
+    """
+    some = False
+    for i in range(driven.shape[0]):
+        speed_mps, x_m, y_m = driven[i, 0], driven[i, 1], driven[i, 2]
+        place = (math.isnan(x_m) and math.isnan(y_m)) or (abs(x_m) <= LARGEST and abs(y_m) <= LARGEST)
+        known[i] = not controlled[i] and place and 0.0 <= speed_mps <= LARGEST_SPEED_MPS and driven[i, 3] >= horizon_s
+        some = some or known[i]
+    return some
 
 
 @dataclass(frozen=True)
@@ -187,35 +204,14 @@ class Fleet:
                 f"state has shape {self.state.shape} of {self.state.dtype}; give (n, {L.N_STATE}) of float64, see "
                 "platforms.layout"
             )
-        for name in (
-            "team",
-            "platforms",
-            "controlled",
-            "names",
-            "age_s",
-            "position_error_m",
-            "adversary_s",
-            "visiting",
-        ):
-            self._check_length(name, n)
-        if self.driven is not None and np.shape(self.driven) != (n, 4):
-            raise FleetError(f"driven has shape {np.shape(self.driven)}; give ({n}, 4): speed m/s, x m, y m, time s")
-        if not isinstance(self.controlled, np.ndarray) or self.controlled.dtype != np.bool_:
-            kind = getattr(self.controlled, "dtype", type(self.controlled).__name__)
-            raise FleetError(f"controlled is of {kind}; give an array of True or False per boat")
-        for name, kind in (
-            ("team", np.int64),
-            ("age_s", np.float64),
-            ("position_error_m", np.float64),
-            ("driven", np.float64),
-            ("adversary_s", np.float64),
-            ("visiting", np.bool_),
-        ):
+        self._check_length("platforms", n)
+        self._check_length("names", n)
+        for name, kind, row in _ARRAYS:
             value = getattr(self, name)
-            if value is not None and not isinstance(value, np.ndarray):
-                raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
-            if value is not None and value.dtype != kind:
-                raise FleetError(f"{name} is of {value.dtype}; give {np.dtype(kind)}, or build the fleet by Fleet.of")
+            if value is None and name in _OPTIONAL:
+                continue
+            if not isinstance(value, np.ndarray) or value.dtype != kind or value.shape != (n, *row):
+                self._refuse(name, kind, n)
         if not sound(self.state):
             self._name_fault()
         error = self.position_error_m
@@ -228,13 +224,26 @@ class Fleet:
 
     def _check_length(self, name: str, n: int) -> None:
         value = getattr(self, name)
-        if value is None and name in _OPTIONAL:
-            return
         flat = value.ndim == 1 if isinstance(value, np.ndarray) else hasattr(value, "__len__")
         if not flat or isinstance(value, (str, bytes)):
             raise FleetError(f"{name} is {value!r}; give one per boat, or build the fleet by Fleet.of")
         if len(value) != n:
             raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
+
+    def _refuse(self, name: str, kind: np.dtype[Any], n: int) -> None:
+        """Raise for an array that is not what compiled code takes."""
+        value = getattr(self, name)
+        if name == "driven":
+            if np.shape(value) != (n, 4):
+                raise FleetError(f"driven has shape {np.shape(value)}; give ({n}, 4): speed m/s, x m, y m, time s")
+        else:
+            self._check_length(name, n)
+        if name == "controlled":
+            found = getattr(value, "dtype", type(value).__name__)
+            raise FleetError(f"controlled is of {found}; give an array of True or False per boat")
+        if not isinstance(value, np.ndarray):
+            raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
+        raise FleetError(f"{name} is of {value.dtype}; give {kind}, or build the fleet by Fleet.of")
 
     def _name_fault(self) -> None:
         """Raise for the first boat whose values cannot be used."""
@@ -275,7 +284,18 @@ def _laid_out(value: np.ndarray) -> np.ndarray:
     return np.require(np.asarray(value), None, ["C", "A", "W"])
 
 
-_OPTIONAL = ("age_s", "position_error_m", "adversary_s", "visiting")
+_OPTIONAL = ("age_s", "position_error_m", "driven", "adversary_s", "visiting")
+
+_ARRAYS: tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...] = (
+    ("team", np.dtype(np.int64), ()),
+    ("controlled", np.dtype(np.bool_), ()),
+    ("age_s", np.dtype(np.float64), ()),
+    ("position_error_m", np.dtype(np.float64), ()),
+    ("driven", np.dtype(np.float64), (4,)),
+    ("adversary_s", np.dtype(np.float64), ()),
+    ("visiting", np.dtype(np.bool_), ()),
+)
+"""Type of each array but the state, and shape of a boat's row in it."""
 
 _FORMS: dict[str, Callable[[Any], Any]] = {
     "state": _laid_out,
@@ -362,14 +382,3 @@ def _whole(name: str, values: ArrayLike, n: int) -> IntArray:
         return whole_numbers(values).reshape(n).copy()
     except NoNumbersError as error:
         raise FleetError(f"{name} holds {error}") from None
-
-
-def usable_drives(driven: Array) -> BoolArray:
-    """Rows of `Fleet.driven`, (..., 4), that a way can be foreseen by; of the others nothing is known.
-
-    A speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at all, from
-    which everything keeps clear.
-    """
-    speed_mps, place_m = driven[..., 0], driven[..., 1:3]
-    nowhere, somewhere = np.isnan(place_m).all(axis=-1), (np.abs(place_m) <= LARGEST).all(axis=-1)
-    return np.asarray((speed_mps >= 0.0) & (speed_mps <= LARGEST_SPEED_MPS) & (nowhere | somewhere))

@@ -34,16 +34,17 @@ class Shared:
     does not see when one is made read-only.
     """
 
-    __slots__ = ("_address", "_copy", "_tuple", "_type")  # fields of named tuples never begin with an underscore
-
     def __init__(self, row: Any) -> None:
-        self._tuple = row
-        self._type, write = _of_kind(row)
-        self._copy = np.frombuffer(write(row), np.uint8).copy()
-        self._address = int(self._copy.ctypes.data)
+        of, write = _of_kind(row)
+        copy = np.frombuffer(write(row), np.uint8).copy()
+        own = {"_tuple": row, "_type": of, "_copy": copy, "_address": int(copy.ctypes.data)}
+        self.__dict__.update(row._asdict() | own)  # fields of named tuples never begin with an underscore
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{name} of a shared tuple stays what it is; write into its array")
 
     def __getattr__(self, name: str) -> Any:
-        if name in self.__slots__:  # asked for before there is one
+        if "_tuple" not in self.__dict__:  # asked for before there is one
             raise AttributeError(name)
         return getattr(self._tuple, name)
 

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .backup.families import CERTIFICATES
-from .barriers.foreseen import DRIVEN_S
 from .barriers.value_function import WAYS
 from .commands import Commands
 from .config import ShieldConfig
@@ -20,7 +18,7 @@ from .filter.answer import Answer, less_turn, to_send
 from .filter.flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .filter.limiting import tell_of_limits, within_limits
 from .filter.program import Program, solve
-from .fleet import Fleet, usable_drives
+from .fleet import Fleet, foreseeable
 from .jit import Array, BoolArray
 from .kept_barriers import KeptBarriers
 from .memory import Memory, new_memory
@@ -31,6 +29,7 @@ from .scene import Boats, Registered, Scene, Static, Tuning, new_scene, path_sam
 from .setup import boats_of, missing_tables, plans_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.autopilots import Autopilots, all_known, unknown_memory
+from .tracking.fears import note_fears
 from .tracking.remembering import Known, Stayed, carry_over, meets_new
 from .tracking.tracks import prepare, queue_commands, steps_of_delay
 from .warming import tight_spot
@@ -103,6 +102,7 @@ class Shield:
         self._kept_from: Static | None = None
         self._seats: list[_Seat] = []
         self._boats: Boats | None = None
+        self._horizon_s = 0.0
         self._missing: BoolArray | None = None
         self._known: Known | None = None
         self.serves: object | None = None
@@ -144,8 +144,8 @@ class Shield:
         """
         if fleet is not None and not isinstance(fleet, Fleet):
             raise FleetError(f"warm_up takes a Fleet, not {type(fleet).__name__}; build it with Fleet.of(...)")
-        twin = Shield(self.config)
-        twin.decide(*tight_spot())
+        for twin in (Shield(solver=self.config.solver), Shield(self.config)):  # by its settings there may be no room
+            twin.decide(*tight_spot())
         if fleet is not None:
             fleet.check()
             order = order_of(fleet.names)
@@ -185,7 +185,7 @@ class Shield:
     def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
         """`decide`, of boats in the order of their names."""
         boats = self._scene(fleet)
-        self._foresee(fleet, boats)
+        self._foresee(fleet)
         feared_s = self._fear(fleet)
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
@@ -243,43 +243,34 @@ class Shield:
             boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
             self._seat(fleet, boats)
             self._boats, self._known = boats, Known.of(fleet)
+            self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
         return self._boats
 
-    def _foresee(self, fleet: Fleet, boats: Boats) -> None:
+    def _foresee(self, fleet: Fleet) -> None:
         """Note which boats' ways are foreseen: those pursue nobody."""
-        known = np.zeros(len(fleet), np.bool_)
-        if fleet.driven is not None:
-            horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-            known = ~fleet.controlled & usable_drives(fleet.driven) & (fleet.driven[:, DRIVEN_S] >= horizon_s)
+        driven, known = fleet.driven, self._seats[0].work.known
+        if driven is None or not foreseeable(driven, fleet.controlled, self._horizon_s, known):
+            known[:] = False
         for seat in self._seats:
             seat.work.known[:] = known
-            if fleet.driven is not None:
-                seat.work.driven[:] = fleet.driven
+            if driven is not None:
+                seat.work.driven[:] = driven
 
     def _fear(self, fleet: Fleet) -> Array:
-        """Note how long each boat may do its worst, by what the fleet says, else the settings.
-
-        Returns:
-            (n,) s, NaN for boats that are nobody's opponent; 0 where the way of one is known.
-        """
-        visiting = np.zeros(len(fleet), np.bool_) if fleet.visiting is None else fleet.visiting
-        fear_s = np.where(visiting, self.config.visitor_feared_s, self.config.feared_s)
-        if fleet.adversary_s is not None:
-            fear_s = np.where(np.isnan(fleet.adversary_s), fear_s, fleet.adversary_s)
-        if not CERTIFICATES[self.config.certificate].pursuers or self.config.feared_s == 0.0:
-            fear_s[:] = 0.0  # nobody pursues in boat constants made so: what is told is what was acted on
-        for seat in self._seats:
-            seat.work.fear_s[:] = fear_s
-            fear_s[seat.work.known] = 0.0
-        ours = np.unique(fleet.team[fleet.controlled])
-        return np.where(np.isin(fleet.team, ours) & (len(ours) == 1) | fleet.controlled, np.nan, fear_s)
+        """Note how long each boat may do its worst; (n,) s as it is told, see `note_fears`."""
+        first = self._seats[0].work
+        told_s = note_fears(fleet, self.config, first)
+        for seat in self._seats[1:]:
+            seat.work.fear_s[:] = first.fear_s
+        return told_s
 
     def _seat(self, fleet: Fleet, boats: Boats) -> None:
         """Make room for the boats of a fleet; those that were there before keep what is remembered of them."""
         n, old, sent = len(fleet), self._seats, self._pending
         rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
         team, samples = self.config.coordination == "team", path_samples(boats)
-        self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(1 if team else n)]
+        deciders = 1 if team else max(1, n)
+        self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(deciders)]
         self._pending = np.full((steps_of_delay(self.config), n, 2), np.nan)
         believed, self._autopilots = self._autopilots, None
         stayed = Stayed.between(self._known, fleet)

@@ -38,7 +38,6 @@ def warm_up(fleet: FleetFile) -> None:
     Raises:
         TableError: a value table cannot be read.
     """
-    Shield().warm_up()  # as it is by default every stage is needed; a file's margins may leave no room for some
     Shield(fleet.shield_config).warm_up(boats_of(fleet))
     for platform in set(fleet.platform_of.values()):
         step_boat(platform.pack(), fresh_state(0.0, 0.0, 0.0), 1.0, 0.0, fleet.dt_s)

@@ -39,14 +39,20 @@ def may_pursue(j: int, boats: Boats, work: Work) -> bool:
 
 @lean_kernel
 def foresee(scene: Scene) -> None:
-    """Write the ways of boats of ``work.known`` into ``work.path``: sample 0 is one step of the model from now."""
+    """Write the ways of boats of ``work.known`` into ``work.path``: sample 0 is one step of the model from now.
+
+    They are written as far as anybody looks at them: as long as the longest of backup manoeuvres.
+    """
     state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
+    last = 0
+    for i in range(state.shape[0]):
+        last = max(last, boats.samples[i])
     for j in range(state.shape[0]):
         if not work.known[j]:
             continue
         drive, path, row = work.driven[j], work.path[j], work.row
         copy_row(row, state[j])
-        for k in range(path.shape[0]):
+        for k in range(last + 1):
             for _ in range(1 if k == 0 else boats.stride):
                 error = error_to(row, drive[DRIVEN_X], drive[DRIVEN_Y])
                 step_boat(boats.params[j], row, drive[DRIVEN_MPS], error, tuning.model_s)

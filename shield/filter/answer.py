@@ -15,10 +15,12 @@ from ..work import Work
 
 
 @lean_kernel
-def read_margins(state: Array, work: Work, reason: IntArray, reported_m: Array) -> None:
-    """Write the margin reported of each boat, m; infinite for those not decided for."""
+def read_margins(state: Array, work: Work, reason: IntArray, reported_m: Array, cut_short: BoolArray) -> None:
+    """Write the margin reported of each boat, m, infinite for those not decided for, and whose search was ended."""
     for i in range(state.shape[0]):
-        reported_m[i] = np.inf if reason[i] == NOT_COVERED else reported_margin(i, state, work)
+        covered = reason[i] != NOT_COVERED
+        reported_m[i] = reported_margin(i, state, work) if covered else np.inf
+        cut_short[i] = covered and work.cut_short[0]
 
 
 @lean_kernel
@@ -41,10 +43,9 @@ class Answer:
         self.commands = plan.commands.copy()
         self.reason = plan.reason.copy()
         self.slack = plan.slack_m.copy()
-        self.margin = np.empty(n)
-        read_margins(state, work, self.reason, self.margin)
         self.bound = work.bound[:n].copy()
-        self.cut_short: BoolArray = np.asarray(work.cut_short[0] & (self.reason != NOT_COVERED), dtype=np.bool_)
+        self.margin, self.cut_short = np.empty(n), np.empty(n, np.bool_)
+        read_margins(state, work, self.reason, self.margin, self.cut_short)
 
     @classmethod
     def empty(cls, n: int) -> Answer:

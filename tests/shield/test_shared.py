@@ -220,9 +220,16 @@ def test_tuples_of_one_name_are_told_apart():
 
 def test_what_is_asked_before_it_is_made_is_an_error():
     blank = Shared.__new__(Shared)
-    with pytest.raises(AttributeError, match="_tuple"):
+    with pytest.raises(AttributeError, match="anything"):
         _ = blank.anything
     assert repr(share(Array(FROZEN))).startswith("shared Array(a=array(")
+
+
+def test_a_field_stays_what_it_is():
+    """Compiled code would not see another array in its place."""
+    shared_array = share(Array(FROZEN))
+    with pytest.raises(AttributeError, match="write into its array"):
+        shared_array.a = np.zeros(3)
 
 
 def test_an_unknown_layout_is_refused(monkeypatch):

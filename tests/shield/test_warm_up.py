@@ -61,3 +61,16 @@ def test_a_fleet_of_unknown_boats_is_refused():
     fleet = replace(fleet, platforms=("raft", "raft"))
     with pytest.raises(PlatformError, match="raft"):
         Shield().warm_up(fleet)
+
+
+@pytest.mark.parametrize("settings", [{}, {"position_error_m": 0.3, "delay_s": 0.2}, {"separation_m": 4.0}])
+def test_every_stage_is_compiled_whatever_the_settings(monkeypatch, settings):
+    """Wide margins leave no room for the program where the boats are; its check would be compiled under way."""
+    seen = []
+    for name in ("begin", "linearise", "solve", "accept", "finish"):
+        stage = getattr(shield, name)
+        monkeypatch.setattr(
+            shield, name, lambda *values, name=name, stage=stage: (seen.append(name), stage(*values))[1]
+        )
+    Shield(**settings).warm_up()
+    assert set(seen) == {"begin", "linearise", "solve", "accept", "finish"}
