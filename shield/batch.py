@@ -23,7 +23,7 @@ from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
 from .scene import Scene, new_scene, path_samples
-from .setup import boats_of, plans_of, tuning_of
+from .setup import boats_of, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.driving import driven_boats
 from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
@@ -152,7 +152,6 @@ class BatchedShield:
         self._scene = new_scene(
             boats=boats,
             around=(surroundings.pack(config), self._barriers.arrays),
-            plans=plans_of(config),
             tuning=tuning_of(config),
             memory=new_memory(n),
             work=new_work(n, path_samples(boats)),

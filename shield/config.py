@@ -13,7 +13,7 @@ from .exceptions import ConfigError
 COORDINATION = ("team", "per_boat")
 
 
-PROFILES = {"players": (12.0, 8.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
+PROFILES = {"players": (12.0, 7.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
 """`ShieldConfig.adversary_s` and `visitor_s` of each profile, s."""
 
 
@@ -38,7 +38,8 @@ class ShieldConfig:
         solver: QP backend, a name known to qpsolvers.
         adversary_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds its
             course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and the more
-            commands are changed.
+            commands are changed. Against a boat that is slow it counts from when that is under way, see
+            `barriers.feared`.
         profile: whom the opponents are taken for, see `PROFILES`: "players" of the game, "rammers" that are out to hit
             our boats, or boats that "hold-course".
         visitor_s: the same of an opponent on our side of the field, which can tag nobody there (`Fleet.visiting`), s;

@@ -233,16 +233,16 @@ class Fleet:
     def _refuse(self, name: str, kind: np.dtype[Any], n: int) -> None:
         """Raise for an array that is not what compiled code takes."""
         value = getattr(self, name)
-        if name == "driven":
-            if np.shape(value) != (n, 4):
-                raise FleetError(f"driven has shape {np.shape(value)}; give ({n}, 4): speed m/s, x m, y m, time s")
-        else:
-            self._check_length(name, n)
         if name == "controlled":
+            self._check_length(name, n)
             found = getattr(value, "dtype", type(value).__name__)
             raise FleetError(f"controlled is of {found}; give an array of True or False per boat")
+        if name != "driven":
+            self._check_length(name, n)
         if not isinstance(value, np.ndarray):
             raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
+        if name == "driven" and value.shape != (n, 4):
+            raise FleetError(f"driven has shape {value.shape}; give ({n}, 4): speed m/s, x m, y m, time s")
         raise FleetError(f"{name} is of {value.dtype}; give {kind}, or build the fleet by Fleet.of")
 
     def _name_fault(self) -> None:

@@ -28,6 +28,7 @@ class Boats(NamedTuple):
         fastest_mps: speed no boat of the kind exceeds over ground, (n,); the stored speed may lag behind it.
         granted_turn_dps: turn rate granted to each boat as an opponent at its top speed, (n,).
         granted_acc_mps2: acceleration granted to each boat as an opponent, (n,).
+        regain_s: time each boat takes from rest to its top speed at its highest acceleration, (n,), s.
         granted_dec_mps2: rate at which each boat, as an opponent, loses speed in a turn, (n,).
         granted_loss: share of its top speed that each boat, as an opponent, loses in its granted turn, (n,).
         samples: path samples of each boat's horizon, (n,).
@@ -43,7 +44,8 @@ class Boats(NamedTuple):
         static_samples: samples over which static constraints are looked at, (n,).
         stride: model steps between path samples.
         sample_s: time between path samples, s.
-        plans: backup manoeuvres each boat looks at, the first so many of the family, (n,).
+        plans: (n, most, 3) backup manoeuvres each boat looks at, see `backup.families`; NaN beyond its own.
+        n_plans: (n,) how many those are.
         decay: factor by which each boat's margin may shrink in one step; 0 lets it fall to 0 at once, (n,).
         cap_m: margins above this may shrink freely, (n,), m.
         dwell_s: least time each boat carries on with a backup from opponents, (n,), s.
@@ -65,6 +67,7 @@ class Boats(NamedTuple):
     fastest_mps: Array
     granted_turn_dps: Array
     granted_acc_mps2: Array
+    regain_s: Array
     granted_dec_mps2: Array
     granted_loss: Array
     samples: IntArray
@@ -77,7 +80,8 @@ class Boats(NamedTuple):
     static_samples: IntArray
     stride: int
     sample_s: float
-    plans: IntArray
+    plans: Array
+    n_plans: IntArray
     decay: Array
     cap_m: Array
     dwell_s: Array
@@ -177,7 +181,6 @@ class Scene(NamedTuple):
         boats: their constants.
         static: things that do not move.
         registered: barriers of other people's.
-        plans: the family of backup manoeuvres.
         tuning: the settings.
         memory: what is kept from one decision to the next.
         work: scratch of one decision.
@@ -189,7 +192,6 @@ class Scene(NamedTuple):
     boats: Boats
     static: Static
     registered: Registered
-    plans: Array
     tuning: Tuning
     memory: Memory
     work: Work
@@ -199,7 +201,6 @@ class Scene(NamedTuple):
 def new_scene(
     boats: Boats,
     around: tuple[Static, Registered],
-    plans: Array,
     tuning: Tuning,
     memory: Memory,
     work: Work,
@@ -207,9 +208,7 @@ def new_scene(
 ) -> Scene:
     """A scene that nothing is to be decided about yet."""
     n = len(boats.team)
-    return share(
-        Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, *around, plans, tuning, memory, work, plan)
-    )
+    return share(Scene(np.zeros((n, L.N_STATE)), np.zeros(n, np.bool_), boats, *around, tuning, memory, work, plan))
 
 
 def path_samples(boats: Boats) -> int:

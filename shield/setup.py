@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .backup.families import CERTIFICATES
+from .backup.families import CERTIFICATES, Certificate
 from .backup.paths import SAG_M
 from .config import ShieldConfig
 from .exceptions import TableError
@@ -69,19 +69,18 @@ def tuning_of(config: ShieldConfig) -> Tuning:
     )
 
 
+def fears_somebody(config: ShieldConfig) -> bool:
+    """Whether opponents are granted more than to hold their course, at least where nothing else is told of them."""
+    return CERTIFICATES[config.certificate].pursuers and config.feared_s > 0.0
+
+
 def _mates_are_known(config: ShieldConfig) -> bool:
     """Whether what team-mates will do is known: one program decides for all, and sees and steers them as they are.
 
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    feared = CERTIFICATES[config.certificate].pursuers and config.feared_s > 0.0
-    return config.coordination == "team" and exact and feared
-
-
-def plans_of(config: ShieldConfig) -> Array:
-    """Backup manoeuvres of the certificate chosen, (m, 3)."""
-    return CERTIFICATES[config.certificate].plans
+    return config.coordination == "team" and exact and fears_somebody(config)
 
 
 @lru_cache(maxsize=256)
@@ -94,7 +93,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.model_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    granted = 1.0 if certificate.pursuers and config.feared_s > 0.0 else 0.0
+    granted = 1.0 if fears_somebody(config) else 0.0
     strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     lookup = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
@@ -109,12 +108,13 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             fastest_mps=np.array([kind.fastest_mps(config.model_s) for kind in kinds]),
             granted_turn_dps=np.array([granted * limit.turn_rate_dps for limit in limits]),
             granted_acc_mps2=np.array([limit.acceleration_mps2 if granted > 0.0 else 0.0 for limit in limits]),
+            regain_s=np.array([limit.regain_s for limit in limits]),
             granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
             granted_loss=np.array([granted * _lasting_loss(limit) for limit in limits]),
             ready_thrust=_ready_thrust(params, limits, with_table),
             stride=stride,
             sample_s=stride * config.model_s,
-            plans=np.array([certificate.ways(*boat) for boat in zip(kinds, with_table, strict=True)], dtype=np.int64),
+            **_plans(certificate, kinds, with_table),
             decay=np.where(
                 with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
             ),
@@ -137,8 +137,8 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 @lru_cache(maxsize=256)
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
-    certificate, sides = CERTIFICATES[config.certificate], np.array(team)
-    wanted = certificate.pursuers and config.feared_s > 0.0
+    sides = np.array(team)
+    wanted = fears_somebody(config)
     limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
     kinds = [get_platform(name) for name in platforms]
     uses = np.array(
@@ -253,6 +253,15 @@ def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
     except TableError as error:
         _LOG.warning("%s; opponents are run through as pursuers instead", error)
         return None
+
+
+def _plans(certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray) -> dict[str, Any]:
+    """`Boats.plans` and `Boats.n_plans`."""
+    families = [certificate.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
+    plans = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
+    for rows, family in zip(plans, families, strict=True):
+        rows[: len(family)] = family
+    return {"plans": plans, "n_plans": np.array([len(family) for family in families], dtype=np.int64)}
 
 
 def _decay(response_per_s: float, config: ShieldConfig) -> float:

@@ -26,7 +26,7 @@ from .ordering import as_given, order_of, ordered
 from .plan import Plan, new_plan
 from .platforms import layout as L
 from .scene import Boats, Registered, Scene, Static, Tuning, new_scene, path_samples
-from .setup import boats_of, missing_tables, plans_of, tuning_of
+from .setup import boats_of, missing_tables, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.autopilots import Autopilots, all_known, unknown_memory
 from .tracking.fears import note_fears
@@ -48,10 +48,10 @@ class _Seat:
     plan: Plan
     scene: Scene | None = None
 
-    def scene_of(self, boats: Boats, static: Static, registered: Registered, plans: Array, tuning: Tuning) -> Scene:
+    def scene_of(self, boats: Boats, static: Static, registered: Registered, tuning: Tuning) -> Scene:
         """The scene with these boats and static constraints; manoeuvres and settings are always the shield's."""
         if self.scene is None or self.scene.boats is not boats or self.scene.static is not static:
-            self.scene = new_scene(boats, (static, registered), plans, tuning, self.memory, self.work, self.plan)
+            self.scene = new_scene(boats, (static, registered), tuning, self.memory, self.work, self.plan)
         return self.scene
 
 
@@ -94,7 +94,6 @@ class Shield:
         self.config = config if config is not None else ShieldConfig.of(**settings)
         self.surroundings = surroundings
         self._tuning = tuning_of(self.config)
-        self._plans = plans_of(self.config)
         self._barriers = KeptBarriers(self.config)
         self._packed: dict[Surroundings, Static] = {}
         self._last_around: tuple[Surroundings, Static] | None = None
@@ -339,7 +338,7 @@ class Shield:
         self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, static: Static
     ) -> None:
         """The stages of `flow` with the QP backend in between."""
-        scene = seat.scene_of(boats, static, self._barriers.arrays, self._plans, self._tuning)
+        scene = seat.scene_of(boats, static, self._barriers.arrays, self._tuning)
         todo = begin(scene, state, wanted, margin, ours)
         if todo == PASSES:
             return

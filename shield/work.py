@@ -22,7 +22,8 @@ class Work(NamedTuple):
         known: (n,) boats whose way is foreseen, in ``path``, see `barriers.foreseen`.
         row: (N_STATE,) state being run through a manoeuvre.
         plan: (n + 1, 3) side, turn to go deg, speed m/s.
-        path: (n + 1, samples + 1, 2) positions along the plans, m.
+        path: (n + 1, samples + 1, 2) positions along the plans, m; the ways of foreseen boats
+            go as far as the longest plan.
         clear: (n + 1, N_CLEARANCE) worst clearance from boats.
         static: (n + 1, N_CLEARANCE) worst clearance from static constraints.
         out, spare, spare2: (N_CLEARANCE,).

@@ -36,7 +36,7 @@ BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0
 
 @kernel
 def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z: Array) -> tuple[float, float]:
-    """Write boat i's z (2,) and return d(psi)/d(z_t), the full turn of this step, rad, and d(v)/d(z_s), m/s."""
+    """Write boat i's z (2,) and return the full turn of this step, deg, and d(v)/d(z_s), m/s."""
     params, top, row, root = setup.params[i], setup.params[i, L.MAX_SPEED], state.copy(), math.sqrt(setup.speed_weight)
     rudder = min(params[L.MAX_RUDDER], 100.0)
     full = abs(turn_of_rudder(params, thrust_after(params, state, command[0], setup.dt_s), rudder, setup.dt_s))
@@ -44,7 +44,7 @@ def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z
     z[0], z[1] = clamp(turn / full, -1.0, 1.0), root * clamp(command[0] / top, 0.0, 1.0)
     step = -0.1 * top if command[0] > 0.5 * top else 0.1 * top
     step_boat(params, row, command[0] + step, command[1], setup.dt_s)
-    return math.radians(full), (row[L.SPEED] - later[L.SPEED]) / step * top / root
+    return full, (row[L.SPEED] - later[L.SPEED]) / step * top / root
 
 
 @kernel
@@ -57,12 +57,19 @@ def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array,
             slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
             row = C[r]
             row[:] = 0.0
-            row[2 * i], row[2 * i + 1] = slope.own_heading * effect[i, 0], slope.own_speed * effect[i, 1]
+            row[2 * i], row[2 * i + 1] = slope.own_heading * math.radians(effect[i, 0]), slope.own_speed * effect[i, 1]
             if first == WAYS:
-                row[2 * j], row[2 * j + 1] = slope.other_heading * effect[j, 0], slope.other_speed * effect[j, 1]
-            length = math.sqrt((row * row).sum())
-            if length >= 1e-9:
-                d[r] = (need_m[m] - slope.value_m + (row * z).sum()) / length
+                row[2 * j], row[2 * j + 1] = (
+                    slope.other_heading * math.radians(effect[j, 0]),
+                    slope.other_speed * effect[j, 1],
+                )
+            length, lack, most = math.sqrt((row * row).sum()), need_m[m] - slope.value_m, 0.0
+            d[r] = lack
+            for c in range(len(z)):
+                d[r] += row[c] * z[c]
+                most += abs(row[c]) * (2.0 if c % 2 == 0 else math.sqrt(setup.speed_weight))
+            if length >= 1e-9 and lack + most >= 0.0:  # else no inputs can break or change it
+                d[r] /= length
                 row /= length
                 r += 1
     for c in range(len(z)):
@@ -92,7 +99,7 @@ def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: A
             sent[i] = asked[i]
             if np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
                 speed = clamp(z[2 * i + 1] / math.sqrt(setup.speed_weight), 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
-                turn = z[2 * i] * math.degrees(effect[i, 0])
+                turn = z[2 * i] * effect[i, 0]
                 sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
         h[:] = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
         if (h >= target).all():

@@ -29,7 +29,6 @@ from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
@@ -37,7 +36,7 @@ from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
 from ..textbook.inputs import command_of_inputs, inputs_of_command
-from ..textbook.program import TOLERANCE
+from ..textbook.program import TOLERANCE, holds
 from .area import share_left
 from .paths import NO_PLAN, Around, Setup, advance, command_of, gap_at, mark_near, predict_all, roll_plan
 from .settings import AREA
@@ -57,7 +56,7 @@ SAME = 1e-9
 
 
 class Inputs(NamedTuple):
-    """The wanted inputs ``z0`` (2,), the largest turn, deg, and the least and greatest of both inputs (2, 2)."""
+    """The wanted inputs ``z0`` (2,), the largest turn rate, rad/s, and the least and greatest of both inputs (2, 2)."""
 
     z0: Array
     unit: float

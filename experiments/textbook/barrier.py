@@ -1,21 +1,19 @@
 """What a barrier of the literature is: a function h >= 0 of a pair of boats, its slope, its gains and its inputs.
 
-Places and velocities are complex numbers, east + i north, in arrays of any shape: p = p_j - p_i, m, and v = v_j - v_i,
-m/s. R is the radius to keep, m, and s = sqrt(|p|^2 - R^2).
+Vectors are arrays of their two parts, east and north, of any further shape: p = p_j - p_i, m, and v = v_j - v_i, m/s.
+R is the radius to keep, m, and s = sqrt(|p|^2 - R^2).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from steerclear.shield.jit import Array
 
 Gains = tuple[float, ...]
-Complex = NDArray[np.complex128]
-Jet = tuple[Array, Complex, Complex]
+Jet = tuple[Array, Array, Array]
 """h, and its derivatives along p and along what the inputs act on: v, or p where they are velocities."""
 NEAREST_M2, STILL_MPS = 1e-4, 1e-6
 """s^2 is cut from below there, with derivative 0, and |v| is smoothed by that: the papers leave both open."""
@@ -36,23 +34,18 @@ class Barrier(NamedTuple):
     widened: float = 1.0
 
 
-def dot(a: Any, b: Any) -> Any:
-    """Inner product of vectors in the plane."""
-    return a.real * b.real + a.imag * b.imag
+def dot(a: Array, b: Array) -> Array:
+    """Inner product."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1])
 
 
-def direction(heading_deg: Array) -> Complex:
-    """Unit vector of a heading."""
-    return np.sin(np.radians(heading_deg)) + 1j * np.cos(np.radians(heading_deg))
-
-
-def tangent(p: Complex, radius_m: float) -> tuple[Array, Complex]:
-    """s, the length of the tangent from p to the circle of the radius, m, and its derivative along p."""
-    square = dot(p, p) - radius_m**2
+def tangent(p: Array, radius_m: float) -> tuple[Array, Array]:
+    """s, the length of the tangent from p to the circle of the radius, m, and k of its derivative k p."""
+    square = dot(p, p) - radius_m * radius_m
     s = np.sqrt(np.maximum(square, NEAREST_M2))
-    return s, np.where(square > NEAREST_M2, p / s, 0.0)
+    return s, np.where(square > NEAREST_M2, 1.0 / s, 0.0)
 
 
-def pace(v: Complex) -> Array:
+def pace(v: Array) -> Array:
     """|v|, smoothed, m/s."""
-    return np.asarray(np.sqrt(dot(v, v) + STILL_MPS**2))
+    return np.asarray(np.sqrt(dot(v, v) + STILL_MPS * STILL_MPS))

@@ -7,13 +7,15 @@ Thontepu et al. 2022, arXiv 2209.11524.
 
 from itertools import product
 
-from .barrier import RATES_PER_S, Barrier, Complex, Jet, dot, pace, tangent
+from steerclear.shield.jit import Array
+
+from .barrier import RATES_PER_S, Barrier, Jet, dot, pace, tangent
 
 
-def jet(p: Complex, v: Complex, radius_m: float) -> Jet:
+def jet(p: Array, v: Array, radius_m: float) -> Jet:
     """h, m^2/s, and its derivatives."""
-    (s, s_p), speed = tangent(p, radius_m), pace(v)
-    return dot(p, v) + speed * s, v + speed * s_p, p + s / speed * v
+    (s, k), speed = tangent(p, radius_m), pace(v)
+    return dot(p, v) + speed * s, v + speed * k * p, p + s * v / speed
 
 
 BARRIER = Barrier(jet, tuned={"heron": (3.0,), "surveyor": (5.0,)}, tried=((1.0,), *product(RATES_PER_S)))

@@ -9,14 +9,14 @@ from itertools import product
 
 from steerclear.shield.jit import Array
 
-from .barrier import Barrier, Complex, Jet, dot
+from .barrier import Barrier, Jet, dot
 
 A1_A2_PER_S = product((0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0), repeat=2)
 
 
-def jet(p: Complex, v: Complex, radius_m: float, a1: Array) -> Jet:
+def jet(p: Array, v: Array, radius_m: float, a1: Array) -> Jet:
     """h, m^2/s, and its derivatives; a1 in 1/s."""
-    return 2.0 * dot(p, v) + a1 * (dot(p, p) - radius_m**2), 2.0 * (v + a1 * p), 2.0 * p
+    return 2.0 * dot(p, v) + a1 * (dot(p, p) - radius_m * radius_m), 2.0 * (v + a1 * p), 2.0 * p
 
 
 BARRIER = Barrier(

@@ -1,10 +1,11 @@
 """`TextbookGuard`: a barrier of the literature in the place where the shield stands, and the loop that all share.
 
 Every boat of ours has two inputs z: its velocity (east, north, m/s), or those of `inputs`. Others keep their velocity;
-two boats of ours both answer their row. With V the velocities that are no input, and B z what inputs do to velocities
-(velocities as inputs: what they are), a pair's row dh/dt >= -alpha h reads
+two boats of ours both answer their row. With B z what inputs do to velocities, a pair's row dh/dt >= -alpha h reads
 
-    <dh/dp, V_j - V_i> + <dh/dv, B_j z_j - B_i z_i> >= -alpha h      (velocities as inputs: dh/dp in both places).
+    <dh/dp, v> + <dh/dv, B_j z_j - B_i z_i> >= -alpha h
+
+and of velocities as inputs, with v_j of a boat that is not ours, <dh/dp, z_j or v_j> - <dh/dp, z_i> >= -alpha h.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
@@ -24,9 +24,9 @@ from steerclear.shield.platforms.usv import clamp, wrap_degrees
 from ..batch_guard import BatchGuard, Games
 from ..jit import kernel
 from . import collision_cone, exponential_cbf, parabolic, velocity_cbf
-from .barrier import Complex, Gains, direction, dot
+from .barrier import Gains, dot
 from .inputs import command_of_inputs, input_limits, inputs_of_command
-from .program import SOLVED, UNSOLVED, solve
+from .program import SOLVED, UNSOLVED, holds, solve
 
 NAMES = ("velocity_cbf", "exponential_cbf", "collision_cone", "parabolic")
 FILES = (velocity_cbf, exponential_cbf, collision_cone, parabolic)
@@ -75,53 +75,69 @@ class TextbookGuard(BatchGuard):
 
     def _decide(self, games: Games) -> None:
         state, ours = games.state, games.ours
-        V = state[..., L.SPEED] * direction(state[..., L.HEADING])
-        V = np.where(ours, 0.0, V) if self._barrier.of_velocity else V
-        p, v = _between(state[..., L.X] + 1j * state[..., L.Y]), _between(V)
+        e, x = headings(state), np.moveaxis(state[..., [L.X, L.Y]], -1, 0)
+        p, v = _between(x), _between(state[..., L.SPEED] * e)
         i, j = self._gains[:, None, :, None], self._gains[:, None, None, :]
         alpha, *gains = np.where(ours[:, None, :], 0.5 * (i + j), i)
         h, h_p, acts = self._barrier.jet(p, v, self.radius_m, *gains)
-        decide_games(self._setup, games, acts, -alpha * h - dot(h_p, v))
-        gap = np.where(np.eye(len(self.params), dtype=bool), np.inf, abs(p)).min(axis=2)
+        if self._barrier.of_velocity:
+            need = -alpha * h - np.where(ours, 0.0, state[..., L.SPEED])[:, None] * dot(h_p, e[:, :, None])
+        else:
+            need = -alpha * h - h_p[0] * v[0] - h_p[1] * v[1]
+        acts, need = np.ascontiguousarray(np.moveaxis(acts, 0, 3)), np.ascontiguousarray(need)
+        decide_games(self._setup, games, acts, need)
+        gap = np.where(np.eye(len(self.params), dtype=bool), np.inf, np.hypot(*p)).min(axis=2)
         games.certificate_m[ours] = (gap - self.radius_m)[ours]
 
 
-def _between(of: Complex) -> Complex:
-    """What boat j has more than boat i, (B, n, n)."""
-    return of[:, None, :] - of[:, :, None]
+def _between(of: Array) -> Array:
+    """What boat j has more than boat i, (2, B, n, n)."""
+    return of[:, :, None, :] - of[:, :, :, None]
+
+
+@kernel
+def headings(state: Array) -> Array:
+    """Unit vectors (2, B, n) of the boats' headings."""
+    e = np.empty((2, *state.shape[:2]))
+    for b, i in np.ndindex(state.shape[:2]):
+        course = math.radians(state[b, i, L.HEADING])
+        e[0, b, i], e[1, b, i] = math.sin(course), math.cos(course)
+    return e
 
 
 @kernel
 def _inputs(
-    setup: Setup, i: int, state: Array, wanted: Array, z: Array, B: Complex, box: Array, C: Array, d: Array
+    setup: Setup, i: int, state: Array, wanted: Array, z: Array, B: Array, box: Array, C: Array, d: Array
 ) -> float:
-    """Write boat i's wanted inputs z (2,), B (2,), least and greatest z (2, 2), and limits C z >= d.
+    """Write boat i's wanted inputs z (2,), B (2, 4), least and greatest z (2, 2), and limits C z >= d.
+
+    What an input does to the velocity is B[:2] times B[2] times B[3].
 
     Returns:
-        The largest turn of this step, deg.
+        The largest turn rate of this step, rad/s.
     """
-    top, ahead = setup.limits[i, 0], math.radians(state[L.HEADING])
+    top, ahead, B[:] = setup.limits[i, 0], math.radians(state[L.HEADING]), 1.0
     if setup.of_velocity:
         speed, course = clamp(wanted[0], 0.0, top), math.radians(state[L.HEADING] + wanted[1])
-        z[0], z[1], B[0], B[1] = speed * math.sin(course), speed * math.cos(course), 1.0, 1j
+        z[0], z[1], B[0, 1], B[1, 0] = speed * math.sin(course), speed * math.cos(course), 0.0, 0.0
         box[:, 0], box[:, 1] = -top, top
         for k in range(FACETS):
             side = course + (2 * k + 1) * math.pi / FACETS
             C[k, 0], C[k, 1], d[k] = -math.sin(side), -math.cos(side), -top * math.cos(math.pi / FACETS)
         return 0.0
     most = inputs_of_command(setup.params[i], setup.limits[i], state, wanted, setup.dt_s, z, box)
-    e = complex(math.sin(ahead), math.cos(ahead))
-    B[0], B[1] = setup.limits[i, 2] * e, math.radians(most) / setup.dt_s * state[L.SPEED] * -1j * e
+    B[0, 0], B[0, 1], B[0, 3] = math.sin(ahead), math.cos(ahead), setup.limits[i, 2]
+    B[1, 0], B[1, 1], B[1, 2], B[1, 3] = math.cos(ahead), -math.sin(ahead), state[L.SPEED], most
     C[0, 0], C[1, 0], C[2, 1], C[3, 1] = 1.0, -1.0, 1.0, -1.0
     d[0], d[1], d[2], d[3] = box[0, 0], -box[0, 1], box[1, 0], -box[1, 1]
     return most
 
 
 @kernel
-def _command(setup: Setup, i: int, state: Array, wanted: Array, z: Array, most_deg: float) -> tuple[float, float]:
+def _command(setup: Setup, i: int, state: Array, wanted: Array, z: Array, most_radps: float) -> tuple[float, float]:
     """Speed and relative heading of boat i that yield its inputs z (2,)."""
     if not setup.of_velocity:
-        return command_of_inputs(setup.params[i], setup.limits[i], state, z, most_deg, setup.dt_s)
+        return command_of_inputs(setup.params[i], setup.limits[i], state, z, most_radps, setup.dt_s)
     speed = math.hypot(z[0], z[1])
     if speed <= SAME:
         return 0.0, wanted[1]
@@ -129,30 +145,34 @@ def _command(setup: Setup, i: int, state: Array, wanted: Array, z: Array, most_d
 
 
 @kernel
-def _pair_rows(ours: BoolArray, acts: Complex, need: Array, B: Complex, box: Array, C: Array, d: Array) -> IntArray:
+def _pair_rows(ours: BoolArray, acts: Array, need: Array, B: Array, box: Array, C: Array, d: Array) -> IntArray:
     """Write the rows that some inputs could break, of unit length unless none has an effect; their pairs (rows, 2)."""
     pairs, r = np.zeros((len(d), 2), np.int64), 0
-    for i, j in np.ndindex(acts.shape):
+    for i, j in np.ndindex(need.shape):
         if i == j or not ours[i] or (ours[j] and j < i):
             continue
-        row, along = C[r], acts[i, j].conjugate()
+        row, x, y = C[r], acts[i, j, 0], acts[i, j, 1]
         row[:] = 0.0
-        row[2 * i : 2 * i + 2], row[2 * j : 2 * j + 2] = -(along * B[i]).real, (along * B[j]).real
+        for k in range(2):
+            row[2 * i + k] = -(x * B[i, k, 0] + y * B[i, k, 1]) * B[i, k, 2] * B[i, k, 3]
+            row[2 * j + k] = (x * B[j, k, 0] + y * B[j, k, 1]) * B[j, k, 2] * B[j, k, 3]
         length = math.sqrt((row * row).sum())
-        row *= 1.0 / length if length > SAME else 0.0
-        d[r] = need[i, j] / length if length > SAME else need[i, j]
-        if np.minimum(row * box[:, 0], row * box[:, 1]).sum() < d[r]:
+        if length <= SAME:
+            row[:], length = 0.0, 1.0
+        row /= length
+        d[r] = need[i, j] / length
+        if not np.minimum(row * box[:, 0], row * box[:, 1]).sum() >= d[r]:  # one of NaN counts
             pairs[r, 0], pairs[r, 1], r = i, j, r + 1
     return pairs[:r]
 
 
 @kernel
-def decide_game(setup: Setup, game: Games, acts: Complex, need: Array) -> None:
+def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
     """Decide for the boats of ours in one game, (n, ...) each."""
     state, wanted, ours, own = game.state, game.wanted, game.ours, np.flatnonzero(game.ours)
     n, sides = len(ours), FACETS if setup.of_velocity else 4
     z0, most, hard = np.zeros(2 * n), np.zeros(n), sides * len(own)
-    B, box = np.zeros((n, 2), np.complex128), np.zeros((2 * n, 2))
+    B, box = np.zeros((n, 2, 4)), np.zeros((2 * n, 2))
     C, d = np.zeros((hard + n * len(own), 2 * n)), np.zeros(hard + n * len(own))
     for m, i in enumerate(own):
         at, limits = slice(2 * i, 2 * i + 2), slice(sides * m, sides * m + sides)
@@ -176,7 +196,7 @@ def decide_game(setup: Setup, game: Games, acts: Complex, need: Array) -> None:
 
 
 @kernel
-def decide_games(setup: Setup, games: Games, acts: Complex, need: Array) -> None:
+def decide_games(setup: Setup, games: Games, acts: Array, need: Array) -> None:
     """`decide_game` for every game; arrays carry a leading games axis."""
     state, wanted, ours, memory, sent, reason, clear_m = games
     for b in range(len(state)):

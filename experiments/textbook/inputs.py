@@ -55,24 +55,25 @@ def inputs_of_command(
     an obeyed command is a fixed point.
 
     Returns:
-        The largest turn of this step, deg.
+        The largest turn rate of this step, rad/s, of which the second input is a share.
     """
-    now, top, step, speed = state.copy(), limits[0], limits[2] * dt_s, state[L.SPEED]
+    now, (top, gain, brake), speed = state.copy(), (limits[0], limits[1], limits[2]), state[L.SPEED]
     step_boat(params, now, command[0], command[1], dt_s)
-    turn = wrap_degrees(now[L.HEADING] - state[L.HEADING])
-    most = max(largest_turn(params, state, dt_s), abs(turn))
-    box[0, 0] = -min(1.0, max(speed, 0.0) / step)
-    box[0, 1] = min(limits[1] / limits[2], max(top - speed, 0.0) / step)
+    turn = math.radians(wrap_degrees(now[L.HEADING] - state[L.HEADING])) / dt_s
+    most = max(math.radians(largest_turn(params, state, dt_s)) / dt_s, abs(turn))
+    unit = most if most > 0.0 else 1.0
+    box[0, 0] = -min(1.0, max(speed, 0.0) / (brake * dt_s))
+    box[0, 1] = min(gain / brake, max(top - speed, 0.0) / (brake * dt_s))
     box[1, 0], box[1, 1] = -1.0, 1.0
-    z[0] = clamp((clamp(command[0], 0.0, top) - speed) / top, box[0, 0], box[0, 1])
-    z[1] = turn / most if most > 0.0 else 0.0
-    return most
+    acceleration = clamp((clamp(command[0], 0.0, top) - speed) * brake / top, -brake, gain)
+    z[0], z[1] = clamp(acceleration / brake, box[0, 0], box[0, 1]), turn / unit
+    return unit
 
 
 @kernel
 def command_of_inputs(
-    params: Array, limits: Array, state: Array, z: Array, most_deg: float, dt_s: float
+    params: Array, limits: Array, state: Array, z: Array, most_radps: float, dt_s: float
 ) -> tuple[float, float]:
     """Speed, m/s, and relative heading, deg, that make the autopilot yield the inputs, or the nearest to them."""
-    speed = clamp(state[L.SPEED] + z[0] * limits[0], 0.0, limits[0])
-    return speed, command_for_turn(params, state, speed, z[1] * most_deg, dt_s)
+    speed = clamp(state[L.SPEED] + z[0] * limits[2] * limits[0] / limits[2], 0.0, limits[0])
+    return speed, command_for_turn(params, state, speed, math.degrees(z[1] * most_radps) * dt_s, dt_s)

@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.filter.program import holds
 from steerclear.shield.jit import Array
 
 from ..jit import kernel
@@ -19,6 +18,18 @@ from ..jit import kernel
 SOLVED, RELAXED, UNSOLVED = 1, 2, 3
 TOLERANCE = 1e-7
 SLACK_WEIGHT = 1e6
+
+
+@kernel
+def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
+    """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
+    for r in range(len(d)):
+        total = 0.0
+        for c in range(len(z)):
+            total += C[r, c] * z[c]
+        if not total >= d[r] - tolerance:
+            return False
+    return True
 
 
 @kernel

@@ -7,12 +7,14 @@ Ames et al. 2019 (ECC); pairwise as Wang, Ames, Egerstedt 2017 (T-RO).
 
 from itertools import product
 
-from .barrier import RATES_PER_S, Barrier, Complex, Jet, dot
+from steerclear.shield.jit import Array
+
+from .barrier import RATES_PER_S, Barrier, Jet, dot
 
 
-def jet(p: Complex, v: Complex, radius_m: float) -> Jet:
+def jet(p: Array, v: Array, radius_m: float) -> Jet:
     """h, m^2, and its derivatives."""
-    return dot(p, p) - radius_m**2, 2.0 * p, 2.0 * p
+    return dot(p, p) - radius_m * radius_m, 2.0 * p, 2.0 * p
 
 
 BARRIER = Barrier(

@@ -60,7 +60,7 @@ def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: S
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
     compared = boats.table_steps[i] > 0 and done == 0  # one step on the tables say the same of all manoeuvres
-    for p in range(boats.plans[i] + 1):
+    for p in range(boats.n_plans[i] + 1):
         if p == 0 and not remembered(i, done, heading, memory):
             continue
         side, togo, speed = candidate(i, p, wanted_mps, heading, scene)

@@ -43,10 +43,10 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
 @lean_kernel
 def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
     """Manoeuvre number p of boat i: 0 is the one in memory, the rest the family; (side, turn deg, speed m/s)."""
-    boats, plans, memory = scene.boats, scene.plans, scene.memory
+    boats, memory = scene.boats, scene.memory
     if p == 0:
         return memory.side[i], kept_turn(i, heading_deg, memory), memory.speed_mps[i]
-    row = plans[p - 1]
+    row = boats.plans[i, p - 1]
     speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
     return row[0], row[1], speed
 

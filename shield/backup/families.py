@@ -7,6 +7,7 @@ A certificate of this kind is a family of manoeuvres; h is as in `manoeuvre`. Ea
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +18,17 @@ from ..platforms.limits import Limits, limits_of
 from .candidates import COMMANDED
 
 TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
+"""Hard turns of boats whose opponents are run through. The finer, the sooner one is found that is small enough."""
 
-GENTLE_TURNS_DEG = (30.0, 90.0, 180.0)
-GENTLE_SHARES = (0.75, 0.5, 0.25)
-"""Turns and rudders that boats with a value table look at besides: a hard turn costs speed, and with it room."""
+LOOKED_UP_TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0)
+"""The same of boats with a value table, which tells what play after the next step is worth, wherever a turn ends."""
+
+GENTLE_SHARES = (0.5, 0.25)
+"""Rudders of half turns that boats with a value table look at besides: a hard turn costs speed, and with it room."""
 
 SLOWING_TURNS_DEG = (45.0, 90.0, 180.0)
 SLOWING_SPEEDS = (0.5, 0.0)
-"""Turns made at less than full speed, which boats that steer without thrust look at besides, see `Certificate.ways`."""
+"""Turns made at less than full speed, which boats that steer without thrust look at besides: `Certificate.slowing`."""
 
 SLOW_TO_REGAIN_S = 5.0
 """Boats that take longer than this to be up to speed again are looked up under the certificate "auto".
@@ -42,40 +46,37 @@ LONGEST_PURSUIT_S = 60.0
 
 @dataclass(frozen=True)
 class Certificate:
-    """A family of backup manoeuvres with its horizon.
+    """Families of backup manoeuvres, rows of side, turn deg, speed, with their horizon.
 
     Attributes:
         name: its name in settings.
         summary: what h means, one line.
-        plans: (m, 3) rows of side, turn deg, speed.
+        plans: (m, 3) manoeuvres of boats whose opponents are run through.
+        looked_up: (m, 3) manoeuvres of boats whose opponents are looked up in value tables.
+        slowing: (m, 3) what boats look at besides that steer without thrust; others lose their rudder with it.
         braking: whether the horizon is the stopping time rather than the time of a turn.
         pursuers: whether opponents are granted a turn against us.
         tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
-        slowing: number of manoeuvres, the last ones, for boats that steer without thrust.
     """
 
     name: str
     summary: str
     plans: Array
+    looked_up: Array
+    slowing: Array
     braking: bool
     pursuers: bool
     tables: str = "none"
-    slowing: int = 0
 
     def horizon_s(self, platform: Platform, dt_s: float) -> float:
         """Time over which the manoeuvres are followed, s."""
         limits = limits_of(platform, dt_s)
         return limits.stop_s + 1.0 if self.braking else limits.half_turn_s + REACTION_S
 
-    def ways(self, platform: Platform, with_table: bool) -> int:
-        """Number of manoeuvres, the first ones, that a boat looks at.
-
-        The last ones, ``slowing``, are for boats that turn whatever their thrust: others lose their rudder with it.
-        """
-        if platform.kind == "rate":
-            return len(self.plans)
-        tabled = len(self.plans) - self.slowing
-        return tabled if with_table else int((np.abs(self.plans[:tabled, 0]) == 1.0).sum())
+    def manoeuvres(self, platform: Platform, with_table: bool) -> Array:
+        """(m, 3) manoeuvres that a boat looks at, in the order in which they are tried."""
+        plans = self.looked_up if with_table else self.plans
+        return np.vstack([plans, self.slowing]) if platform.kind == "rate" else plans
 
     def uses_table(self, limits: Limits) -> bool:
         """Whether a boat looks opponents up where there is a table."""
@@ -84,29 +85,31 @@ class Certificate:
 
     def pursuit_s(self, limits: Limits) -> float:
         """Time over which pursuing opponents are followed, s: a boat outruns them only once it is up to speed again."""
-        regain_s = limits.top_speed_mps / max(limits.acceleration_mps2, 1e-6)
-        return min(LONGEST_PURSUIT_S, limits.half_turn_s + REACTION_S + regain_s)
+        return min(LONGEST_PURSUIT_S, limits.half_turn_s + REACTION_S + limits.regain_s)
 
 
-SLOWING = [(1.0, 0.0, 0.5)]
-SLOWING += [(side, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for side in (1.0, -1.0)]
-
-
-def _turning_family(gentle: bool = False) -> Array:
+def _turning(turns_deg: Sequence[float], gentle_shares: Sequence[float] = ()) -> Array:
     rows = [(1.0, 0.0, COMMANDED)]
-    for turn in TURNS_DEG:
+    for turn in turns_deg:
         rows += [(1.0, turn, 1.0), (-1.0, turn, 1.0)]
     rows += [(1.0, 0.0, 1.0), (1.0, 0.0, 0.0)]
-    for share in GENTLE_SHARES if gentle else ():
-        for turn in GENTLE_TURNS_DEG:
-            rows += [(share, turn, 1.0), (-share, turn, 1.0)]
-    return np.array(rows + SLOWING)
+    for share in gentle_shares:
+        rows += [(share, 180.0, 1.0), (-share, 180.0, 1.0)]
+    return np.array(rows)
+
+
+def _slowing() -> Array:
+    rows = [(1.0, 0.0, 0.5)]
+    rows += [(side, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for side in (1.0, -1.0)]
+    return np.array(rows)
 
 
 BRAKING = Certificate(
     "braking",
     "distance left after stopping straight ahead while the others hold their course (the textbook form)",
-    np.array([(1.0, 0.0, 0.0)]),
+    plans=np.array([(1.0, 0.0, 0.0)]),
+    looked_up=np.array([(1.0, 0.0, 0.0)]),
+    slowing=np.zeros((0, 3)),
     braking=True,
     pursuers=False,
 )
@@ -114,20 +117,18 @@ BRAKING = Certificate(
 TURNING_CIRCLE = Certificate(
     "turning_circle",
     "distance kept on the best turning circle, either side, any exit; opponents may pursue with their granted share",
-    _turning_family(),
+    plans=_turning(TURNS_DEG),
+    looked_up=_turning(LOOKED_UP_TURNS_DEG, GENTLE_SHARES),
+    slowing=_slowing(),
     braking=False,
     pursuers=True,
-    slowing=len(SLOWING),
 )
 
-VALUE_TABLE = Certificate(
-    "value_table",
-    "distance that can be kept from the worst opponent, by value table; without a table as turning_circle",
-    _turning_family(gentle=True),
-    braking=False,
-    pursuers=True,
+VALUE_TABLE = replace(
+    TURNING_CIRCLE,
+    name="value_table",
+    summary="distance that can be kept from the worst opponent, by value table; without a table as turning_circle",
     tables="all",
-    slowing=len(SLOWING),
 )
 
 AUTO = replace(

@@ -140,6 +140,27 @@ def _speed_after(speed_mps: float, steady_mps: float, acc_mps2: float, dec_mps2:
 
 
 @lean_kernel
+def stays_away(
+    own: Array, x: float, y: float, way: float, samples: int, closing_m: float, radius_m: float, cap_m: float
+) -> bool:
+    """Whether nobody who starts at (x, y) and goes at most ``way`` per sample, m, lowers the margin from its cap.
+
+    That is wherever it steers: the boat stays clear of all points it may have reached by then, and by so much more that
+    the longest strides of `roll_out_pursuer` make no difference. False when in doubt; for the rest see there.
+    """
+    spare = 0.5 * CHASE_STRIDE
+    root = radius_m + cap_m
+    k = 0
+    while k <= samples:
+        dx, dy = own[k, 0] - x, own[k, 1] - y
+        free = (math.sqrt(dx * dx + dy * dy) - way * k - root) / closing_m - spare
+        if not free >= 1.0:
+            return False
+        k += int(min(free, samples + 1))
+    return True
+
+
+@lean_kernel
 def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Search, end: Array, out: Array) -> float:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
 

@@ -24,6 +24,7 @@ from ..tables.grid import CAP
 from ..tables.lookup import Gradient, own_speed_cell, table_gradient, table_value
 from ..work import Work
 from .clearance import FAR
+from .feared import feared_for
 
 WAYS = 3
 """Ways an opponent may move: straight on, hard to port, hard to starboard."""
@@ -160,7 +161,7 @@ def margin_when_ready(i: int, j: int, slot: int, boats: Boats, work: Work) -> fl
     value = table_value(
         boats.tables,
         table,
-        work.fear_s[j],
+        feared_for(i, j, ready[READY_SPEED], boats, work),
         pursuer[0] - path[k, 0],
         pursuer[1] - path[k, 1],
         ready[READY_HEADING],
@@ -180,13 +181,14 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, boa
     Once it is down to ``enough_m`` no more of them are looked at.
     """
     table, kept_m = boats.table[i, j], work.radius[i, j] + boats.table_margin_m
+    feared_s = feared_for(i, j, own[PLACE_SPEED], boats, work)
     least = FAR
     for way in range(others.shape[0]):
         other = others[way]
         value = table_value(
             boats.tables,
             table,
-            work.fear_s[j],
+            feared_s,
             other[PLACE_X] - own[PLACE_X],
             other[PLACE_Y] - own[PLACE_Y],
             own[PLACE_HEADING],
@@ -231,7 +233,7 @@ def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
     return table_gradient(
         boats.tables,
         boats.table[i, j],
-        work.fear_s[j],
+        feared_for(i, j, own[PLACE_SPEED], boats, work),
         other[PLACE_X] - own[PLACE_X],
         other[PLACE_Y] - own[PLACE_Y],
         own[PLACE_HEADING],

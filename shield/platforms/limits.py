@@ -52,6 +52,11 @@ class Limits:
     thrust_s: float
     stop_s: float
 
+    @property
+    def regain_s(self) -> float:
+        """Time from rest to top speed at the highest acceleration, s."""
+        return self.top_speed_mps / max(self.acceleration_mps2, 1e-6)
+
 
 @lru_cache(maxsize=64)
 def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:

@@ -158,8 +158,7 @@ def _fitted_horizon(boats: tuple[Platform, Platform]) -> float:
     turns_s = 7.0 * max(own.half_turn_s, other.half_turn_s)
     if boats[1].max_speed_mps > boats[0].max_speed_mps:
         return min(max(20.0, turns_s), LONGEST_CHASE_S)
-    regain_s = own.top_speed_mps / max(own.acceleration_mps2, 1e-6)
-    return min(max(20.0, turns_s + regain_s), LONGEST_S)
+    return min(max(20.0, turns_s + own.regain_s), LONGEST_S)
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from ..backup.families import CERTIFICATES
 from ..config import ShieldConfig
 from ..fleet import Fleet
 from ..jit import Array, BoolArray, IntArray, kernel
+from ..setup import fears_somebody
 from ..work import Work
 
 _NOBODY = np.zeros(0, np.bool_)
@@ -38,11 +38,6 @@ def note_fears(fleet: Fleet, config: ShieldConfig, work: Work) -> Array:
     return told_s
 
 
-def fears_somebody(config: ShieldConfig) -> bool:
-    """Whether opponents pursue at all: boat constants are made by it, so nothing that is told later changes it."""
-    return CERTIFICATES[config.certificate].pursuers and config.feared_s > 0.0
-
-
 @kernel
 def _note(
     team: IntArray,
@@ -56,7 +51,7 @@ def _note(
     fear_s: Array,
     told_s: Array,
 ) -> None:
-    ours = one_team_of(team, controlled)
+    ours = _one_team_of(team, controlled)
     for i in range(team.shape[0]):
         time_s = 0.0
         if feared:
@@ -69,7 +64,7 @@ def _note(
 
 
 @kernel
-def one_team_of(team: IntArray, controlled: BoolArray) -> int:
+def _one_team_of(team: IntArray, controlled: BoolArray) -> int:
     """A controlled boat, when all such are of one team; -1: there is none, or there are several teams."""
     first = -1
     for i in range(team.shape[0]):

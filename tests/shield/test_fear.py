@@ -30,7 +30,7 @@ def certificate_m(fleet, **settings):
 @pytest.mark.parametrize(
     ("settings", "always_s", "visiting_s"),
     [
-        ({}, 12.0, 8.0),
+        ({}, 12.0, 7.0),
         ({"profile": "rammers"}, np.inf, np.inf),
         ({"profile": "hold-course"}, 0.0, 0.0),
         ({"adversary_s": 9.0}, 9.0, 9.0),
@@ -51,7 +51,7 @@ def test_a_time_that_is_none_is_refused(value):
 
 def test_a_visitor_is_feared_as_if_all_were_for_its_time():
     visiting = near(visiting=np.array([False, True]))
-    assert certificate_m(visiting) == certificate_m(near(), adversary_s=8.0)
+    assert certificate_m(visiting) == certificate_m(near(), adversary_s=7.0)
     assert certificate_m(visiting) > certificate_m(near()) + 0.1, "else the scene shows nothing"
 
 
@@ -68,7 +68,7 @@ def test_what_the_caller_says_of_a_boat_comes_first():
 
 def test_a_decision_says_how_long_it_feared_whom():
     told = Shield().decide(near(visiting=np.array([False, True])), STRAIGHT)
-    assert [decision.feared_s for decision in told] == [None, 8.0]
+    assert [decision.feared_s for decision in told] == [None, 7.0]
     assert [d.feared_s for d in Shield(profile="rammers").decide(near(), STRAIGHT)] == [None, np.inf]
     assert [d.feared_s for d in Shield(certificate="braking").decide(near(), STRAIGHT)] == [None, 0.0]
     told = Shield(profile="hold-course").decide(near(adversary_s=np.array([np.nan, 20.0])), STRAIGHT)

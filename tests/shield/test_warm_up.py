@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from steerclear.shield import Commands, Fleet, Reason, Shield, shield, warming
 from steerclear.shield.exceptions import PlatformError
+from steerclear.shield.fleet import foreseeable
 
 
 def head_on(platform="heron", speed_mps=2.0):
@@ -74,3 +75,9 @@ def test_every_stage_is_compiled_whatever_the_settings(monkeypatch, settings):
         )
     Shield(**settings).warm_up()
     assert set(seen) == {"begin", "linearise", "solve", "accept", "finish"}
+
+
+def test_so_is_what_only_games_ask_for():
+    Shield().warm_up()
+    assert foreseeable.signatures
+    assert warming.tight_spot()[0].driven is not None

@@ -23,9 +23,8 @@ speeds = st.floats(-5.0, 5.0)
 
 
 def jet(file, point):
-    px, py, vx, vy = point
-    h, h_p, h_v = file.jet(np.complex128(px + 1j * py), np.complex128(vx + 1j * vy), RADIUS_M, *GAINS[file])
-    return np.array([h, h_p.real, h_p.imag, h_v.real, h_v.imag])
+    h, h_p, h_v = file.jet(np.array(point[:2]), np.array(point[2:]), RADIUS_M, *GAINS[file])
+    return np.array([h, *h_p, *h_v])
 
 
 @ALL

@@ -138,16 +138,28 @@ def test_a_barrier_of_ones_own_is_a_guard(monkeypatch):
     """The same row as the distance's, by another function: h = 3 (|p|^2 - R^2)."""
 
     def tripled(p, v, radius_m):
-        return 3.0 * (abs(p) ** 2 - radius_m**2), 6.0 * p, 6.0 * p
+        return 3.0 * ((p * p).sum(axis=0) - radius_m**2), 6.0 * p, 6.0 * p
 
-    monkeypatch.setitem(BARRIERS, "tripled", Barrier(tripled, tuned={}, tried=((0.5,),), of_velocity=True))
+    monkeypatch.setitem(BARRIERS, "tripled", Barrier(tripled, tuned={}, tried=((0.025,),), of_velocity=True))
     state, _ = openings("crossing", "heron", 6, 9)
     state[:, 1, : L.Y + 1] *= 0.4
     ours = np.tile([True, False], (6, 1))
     sent = guard_for("tripled", state).decide(state, ahead(state), ours)
-    known = guard_for("velocity_cbf", state, gains=(0.5,)).decide(state, ahead(state), ours)
+    known = guard_for("velocity_cbf", state, gains=(0.025,)).decide(state, ahead(state), ours)
     assert (sent != ahead(state)).any()
     np.testing.assert_allclose(sent, known, atol=1e-9)
+
+
+def test_a_barrier_that_gives_no_number_lets_nothing_through(monkeypatch):
+    def broken(p, v, radius_m):
+        return np.full(p.shape[1:], np.nan), 6.0 * p, 6.0 * p
+
+    monkeypatch.setitem(BARRIERS, "broken", Barrier(broken, tuned={}, tried=((0.025,),), of_velocity=True))
+    state = scene((0, 0, 0), (0.5, 3.0, 180))
+    guard = guard_for("broken", state)
+    sent = guard.decide(state, ahead(state), np.array([[True, False]]))
+    assert guard.reason[0, 0] == 3
+    assert sent[0, 0, 0] == 0.0
 
 
 def test_reset_forgets_what_was_reported():

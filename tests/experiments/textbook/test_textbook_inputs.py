@@ -45,7 +45,8 @@ def test_a_turn_asked_for_is_the_turn_made(name, share):
     assert z[0] == pytest.approx(0.0, abs=1e-9)
     before = state[L.HEADING]
     step_boat(params, state, speed, relative, 0.1)
-    assert (state[L.HEADING] - before + 180.0) % 360.0 - 180.0 == pytest.approx(z[1] * again)
+    turned_deg = (state[L.HEADING] - before + 180.0) % 360.0 - 180.0
+    assert np.radians(turned_deg) / 0.1 == pytest.approx(z[1] * again)
 
 
 def test_speed_commands_span_their_range():

@@ -12,7 +12,7 @@ from steerclear.shield.kept_barriers import KeptBarriers
 from steerclear.shield.memory import new_memory
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.scene import Scene, path_samples
-from steerclear.shield.setup import boats_of, plans_of, tuning_of
+from steerclear.shield.setup import boats_of, tuning_of
 from steerclear.shield.shared import share
 from steerclear.shield.work import new_work
 
@@ -25,7 +25,6 @@ class Stages(NamedTuple):
     boats: object
     static: object
     registered: object
-    plans: np.ndarray
     tuning: object
     memory: object
     work: object
@@ -49,7 +48,6 @@ def stages_of(config, state, platforms, team, surroundings=None):
         boats,
         (surroundings or Surroundings()).pack(config),
         KeptBarriers(config).arrays,
-        plans_of(config),
         tuning_of(config),
         new_memory(n),
         work,

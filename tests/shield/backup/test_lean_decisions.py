@@ -45,7 +45,7 @@ def test_arrays_stay_their_callers():
     seat = shield._seats[0]
     arrays = [array for part in (seat.memory, seat.work, seat.plan, shield._boats) for array in part]
     arrays += [array for fleet in fleets for array in (fleet.state, fleet.team, fleet.controlled)]
-    arrays += [wanted.values, shield._pending, shield._plans]
+    arrays += [wanted.values, shield._pending]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
     before = [sys.getrefcount(array) for array in arrays]
     for k in range(100):
