@@ -24,6 +24,7 @@ from ..deploy.dashboard import Dashboard
 from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
+from ..deploy.rules import game_config
 from ..deploy.run import deploy as run_boats
 from ..deploy.tally import distance_words
 from ..spec import check_seed
@@ -31,7 +32,7 @@ from ..store import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out
-from .policies_tried import say_what_runs
+from .policies_tried import say_of_elsewhere, say_what_runs
 
 Fleet = Annotated[
     Path | None, typer.Argument(metavar="FLEET.yaml", help="Boats, links, geofence, limits.", show_default=False)
@@ -75,6 +76,8 @@ def deploy(
     say_what_runs((policy,), trust)
     orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog, trust))
     file = load_fleet(orders.fleet_file)
+    if file.agent_ids:
+        say_of_elsewhere((policy,), game_config(file))
     dashboard = d.on_terminal() and not plain
     operator, console, started = Operator(), out(), time.perf_counter()
 

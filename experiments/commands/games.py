@@ -53,7 +53,7 @@ def check_settings(settings: AblationSettings) -> None:
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
-    try_policies((settings.own, *settings.opponents), settings.trust)
+    try_policies((settings.own, *settings.opponents), settings.trust, game)
     check_current(settings.conditions, game)
 
 

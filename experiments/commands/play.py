@@ -131,7 +131,7 @@ def _play(spec: MatchSpec, save: Sequence[Path], window: bool, speed: float) -> 
     check_current(spec.conditions, spec.config())
     if spec.shield is not None:
         say_of_distance(check_shield(spec.shield, spec.config()).separation_m, spec.config())
-    try_policies((spec.own, spec.opponent), spec.trust)
+    try_policies((spec.own, spec.opponent), spec.trust, spec.config())
     if KEYBOARD in (spec.own, spec.opponent):
         err().print(STEERING, soft_wrap=True)
     if window:

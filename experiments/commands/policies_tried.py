@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from steerclear import policies
+from steerclear.env.config import GameConfig
 from steerclear.policies.registry import SB3_PREFIX
 from steerclear.policies.sb3 import check_origin, code_warning
 
 from ..entries.team import is_entry, make_team
+from ..learned_elsewhere import words_of_elsewhere
 from .console import err
 
 
-def try_policies(names: Sequence[str], trust: bool) -> None:
-    """Load each policy once, those from files in a process of their own.
+def try_policies(names: Sequence[str], trust: bool, game: GameConfig) -> None:
+    """Load each policy once, those from files in a process of their own; say which learned in another game.
 
     Raises:
         PolicyError: one cannot be loaded, or is a model of others and not trusted.
@@ -24,6 +26,18 @@ def try_policies(names: Sequence[str], trust: bool) -> None:
         team = make_team(name, trust=trust)
         if hasattr(team, "close"):
             team.close()
+    say_of_elsewhere(names, game)
+
+
+def say_of_elsewhere(names: Sequence[str], game: GameConfig) -> None:
+    """Say, once a command, of each policy that learned by the rules of another preset than the game's.
+
+    Raises:
+        PolicyError: the file of one cannot be read.
+    """
+    for name in dict.fromkeys(names):
+        if words := words_of_elsewhere(name, game):
+            err().print(words, markup=False, soft_wrap=True)
 
 
 def say_what_runs(names: Sequence[str], trust: bool) -> None:

@@ -125,7 +125,7 @@ def _check(settings: TournamentSettings) -> None:
     if KEYBOARD in settings.teams:
         raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
     check_current(CALM, game)
-    try_policies(settings.teams, settings.trust)
+    try_policies(settings.teams, settings.trust, game)
 
 
 def _run(settings: TournamentSettings, folder: Path, workers: Workers, resume: bool, replays: bool) -> dict[str, Any]:

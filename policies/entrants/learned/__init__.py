@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from .network import preset_in
 from .play import LearnedBatch, LearnedTeam
 from .weights_file import read_weights
 
@@ -66,3 +67,18 @@ def batch_builder(name: str) -> Builder | None:
     if name in FILES:
         return Builder(load_weights_batch, (FILES[name],))
     return None
+
+
+def learned_in(name: str) -> str:
+    """Preset that the policy of that name learned in; empty where it is no learned one, or does not say.
+
+    Raises:
+        PolicyError: its file cannot be read.
+    """
+    from .entered import FILES
+    from .sb3_file import read_card
+
+    if name.startswith(SB3):
+        return preset_in(read_card(Path(name.removeprefix(SB3)).expanduser()))
+    path = name.removeprefix(WEIGHTS) if name.startswith(WEIGHTS) else FILES.get(name)
+    return "" if path is None else read_weights(path).preset

@@ -80,7 +80,7 @@ class Network:
     @property
     def preset(self) -> str:
         """Rules of the game it learned in; empty where its card does not say."""
-        return str(self.card.get("preset", ""))[:40]
+        return preset_in(self.card)
 
     @property
     def roles(self) -> int:
@@ -130,3 +130,8 @@ class Network:
             action = np.clip(outputs.astype(np.float64), -1.0, 1.0)
             pairs = np.stack([0.5 * (action[:, 0] + 1.0), 180.0 * action[:, 1]], axis=1)
         return pairs * np.stack([top_mps, np.ones_like(top_mps)], axis=1)
+
+
+def preset_in(card: Mapping[str, Any]) -> str:
+    """Rules of the game that a card names; empty where it names none."""
+    return str(card.get("preset", ""))[:40]

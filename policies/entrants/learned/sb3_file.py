@@ -53,12 +53,21 @@ def add_card(file: Path, card: Mapping[str, Any]) -> None:
         archive.writestr(CARD, json.dumps(dict(card)))
 
 
-def _card(file: Path) -> dict[str, Any]:
-    """The card of a model of ours; empty where there is none.
+def read_card(file: Path) -> dict[str, Any]:
+    """The card of a model of ours; empty where there is none. Nothing else of the zip is read.
 
     Raises:
-        ValueError: it is too large, or no card.
+        PolicyError: the zip or its card cannot be read.
     """
+    try:
+        return _card(file)
+    except UNREADABLE as error:
+        why = " ".join(str(error).split())[:160]
+        raise PolicyError(f"{file} has no card that can be read ({why}); {REMEDY}") from error
+
+
+def _card(file: Path) -> dict[str, Any]:
+    """The card, or what is wrong with it as one of `UNREADABLE`."""
     with zipfile.ZipFile(file) as archive:
         if CARD not in archive.namelist():
             return {}
