@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -60,6 +61,5 @@ def _read(model: Path, interval: int | None) -> Network:
 
 
 def _held(network: Network, interval: int) -> Network:
-    from dataclasses import replace
-
-    return replace(network, interval=interval)
+    second = None if network.carrying is None else _held(network.carrying, interval)
+    return replace(network, interval=interval, carrying=second)

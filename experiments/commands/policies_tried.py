@@ -7,6 +7,7 @@ from pathlib import Path
 
 from steerclear import policies
 from steerclear.env.config import GameConfig
+from steerclear.policies.entrants.learned.sb3_file import check_whole, read_card
 from steerclear.policies.registry import SB3_PREFIX
 from steerclear.policies.sb3 import check_origin, code_warning
 
@@ -44,11 +45,12 @@ def say_what_runs(names: Sequence[str], trust: bool) -> None:
     """Say of each model, before any is loaded, that loading runs its code.
 
     Raises:
-        PolicyError: there is no such model, or it is one of others and not trusted.
+        PolicyError: there is no such model, it is one network of two, or one of others and not trusted.
     """
     for name in dict.fromkeys(names):
         if is_entry(name) and name.startswith(SB3_PREFIX):
             policies.check(name)
             path = Path(name.removeprefix(SB3_PREFIX)).expanduser()
             check_origin(path, trust or None)
+            check_whole(path, read_card(path))
             err().print(code_warning(path), markup=False, soft_wrap=True)

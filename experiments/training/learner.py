@@ -19,7 +19,7 @@ from torch import nn
 from .games import PlacedVecEnv
 from .networks import BoatPolicy, TeamFeatures, features_of, load_actor, network_of
 from .settings import TrainingSettings
-from .taking_over import FirstPart, first_of, pair_of
+from .taking_over import ONE_OF_TWO, FirstPart, first_of, pair_of
 
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
@@ -91,8 +91,11 @@ class Learner:
         }
 
     def _begin_with(self, path: str) -> None:
+        network = read_weights(path)
+        if network.carrying is not None:
+            raise ConfigError(f"start {path} holds two networks, and one learns; {ONE_OF_TWO}")
         try:
-            load_actor(self.model.policy, read_weights(path))
+            load_actor(self.model.policy, network)
         except ValueError as error:
             raise ConfigError(f"start {path} does not fit this network: {error}; give its own net settings") from None
 

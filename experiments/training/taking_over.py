@@ -16,6 +16,7 @@ from .settings import TrainingSettings
 
 FIRST = "first"
 """The option that names the weights that play until the flag is held."""
+ONE_OF_TWO = "give weights of a single network, such as play/final.npz of a training by qmix+ppo"
 
 
 def first_of(settings: TrainingSettings, core: Any) -> Network | None:
@@ -30,6 +31,8 @@ def first_of(settings: TrainingSettings, core: Any) -> Network | None:
     if FIRST not in settings.options:
         return None
     network = read_weights(str(settings.options[FIRST]))
+    if network.carrying is not None:
+        raise ConfigError(f"{FIRST}: {settings.options[FIRST]} holds two networks, and one plays first; {ONE_OF_TWO}")
     wanted = {"n_obs": core.n_obs, "interval": settings.interval, "kind": "discrete"}
     for name, value in wanted.items():
         if getattr(network, name) != value or settings.actions != "discrete":

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from steerclear.policies.entrants.learned.sb3_file import add_card
+from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 
@@ -79,7 +79,7 @@ class Training:
         if not (self.folder / BEST).exists():
             write_weights(self.learner.network(), self.folder / BEST)
         self.learner.model.save(self.folder / MODEL)
-        add_card(self.folder / MODEL, self._card())
+        add_card(self.folder / MODEL, {**self._card(), TAKES_OVER: self.learner.first is not None})
 
     def _iterate(self) -> None:
         began = time.perf_counter()

@@ -54,7 +54,7 @@ def test_a_card_that_is_none_is_refused(tmp_path):
     policy = model(tmp_path / "model.zip", None)
     with zipfile.ZipFile(tmp_path / "model.zip", "a") as archive:
         archive.writestr("steerclear_card.json", "[]")
-    with pytest.raises(PolicyError, match="no card that can be read"):
+    with pytest.raises(PolicyError, match="its card is none"):
         words_of_elsewhere(policy, GameConfig.preset("aamas2024"))
 
 

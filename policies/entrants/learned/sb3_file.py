@@ -21,6 +21,8 @@ ABOUT = "steerclear."
 """Our own tensors among a model's begin like this."""
 CARD, MOST_CARD_BYTES = "steerclear_card.json", 2**16
 """Member of the zip that says what game the model learned; SB3 does not look at it."""
+TAKES_OVER = "takes_over"
+"""Entry of the card: the model plays only while the flag is held, and another network until then."""
 REMEDY = "give a PPO or A2C zip with an MlpPolicy, or one of steerclear train"
 
 
@@ -40,8 +42,10 @@ def read_sb3(path: str | Path, interval: int | None = None) -> Network:
     saved = saved_settings(file)
     if (algorithm := algorithm_of(saved)) not in PLAYABLE:
         raise PolicyError(f"{file} is a model of {algorithm}, whose actor is another kind of network; {REMEDY}")
+    card = read_card(file)
+    check_whole(file, card)
     try:
-        return network_of_tensors(_tensors(file), _activation(saved), interval, {**_card(file), "source": file.name})
+        return network_of_tensors(_tensors(file), _activation(saved), interval, {**card, "source": file.name})
     except (*UNREADABLE, TypeError, IndexError) as error:
         why = " ".join(str(error).split())[:160]
         raise PolicyError(f"{file} has no actor this can play ({type(error).__name__}: {why}); {REMEDY}") from error
@@ -63,7 +67,20 @@ def read_card(file: Path) -> dict[str, Any]:
         return _card(file)
     except UNREADABLE as error:
         why = " ".join(str(error).split())[:160]
-        raise PolicyError(f"{file} has no card that can be read ({why}); {REMEDY}") from error
+        raise PolicyError(f"{file} is not a Stable-Baselines3 model: {why}; {REMEDY}") from error
+
+
+def check_whole(file: Path, card: Mapping[str, Any]) -> None:
+    """Refuse a model that is half of what plays.
+
+    Raises:
+        PolicyError: it is.
+    """
+    if card.get(TAKES_OVER):
+        raise PolicyError(
+            f"{file} holds one network of two, the one that takes over while the flag is held; give final.npz or "
+            "best.npz of its training, which hold both (to play: weights:FINAL.npz)"
+        )
 
 
 def _card(file: Path) -> dict[str, Any]:

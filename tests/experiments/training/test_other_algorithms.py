@@ -2,15 +2,19 @@ import json
 
 import numpy as np
 import pytest
+from steerclear.experiments.cli import app
 from steerclear.experiments.training.algorithms import training_of
 from steerclear.experiments.training.cloning import fitted
 from steerclear.experiments.training.config_file import read_config
 from steerclear.experiments.training.games import learners_of
 from steerclear.experiments.training.taking_over import FirstPart
+from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, read_chooser
 from steerclear.policies.entrants.learned.network import Features, Network
+from steerclear.policies.entrants.learned.weights_file import joined, write_weights
 from steerclear.shield.exceptions import ConfigError, PolicyError
+from typer.testing import CliRunner
 
 NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 
@@ -93,6 +97,43 @@ def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(
     assert again.decisions == 72  # nothing is left
     again.run()
     assert again.decisions == 72
+    check_half_a_pair_is_refused(tmp_path / "run" / "model.zip", tmp_path / "team.npz")
+
+
+def check_half_a_pair_is_refused(model, out):
+    """The model that SB3 saved is what plays once the flag is held, and nothing else."""
+    for words in (
+        ("export", model, "--out", out),
+        ("evaluate", f"sb3:{model}", "--trust", "--opponents", "hold", "--games", 1, "--out", out.parent / "x"),
+    ):
+        result = CliRunner().invoke(app, [str(word) for word in words])
+        assert result.exit_code == 2, result.output
+        assert "holds one network of two" in result.stderr
+        assert "final.npz" in result.stderr
+    with pytest.raises(PolicyError, match="one network of two"):
+        make_batch(f"sb3:{model}")
+    assert not out.exists()
+
+
+def test_a_training_does_not_begin_with_two_networks(tiny, tmp_path):
+    path = str(write_weights(a_pair(), tmp_path / "pair.npz"))
+    for changes in ({"start": path}, {"options": {"first": path}}):
+        with pytest.raises(ConfigError, match="holds two networks"):
+            training_of(read_config(tiny(**changes)), tmp_path / "run", False)
+
+
+def a_pair():
+    play = Network([np.zeros((1, 61, 17), np.float32)], [np.eye(17, dtype=np.float32)[3][None]], NONE, "tanh",
+                   "discrete", 10, 61)  # fmt: skip
+    return joined(play, play, np.array([8]))
+
+
+def test_both_networks_of_a_pair_hold_decisions_as_long_as_export_is_asked(tmp_path):
+    path = write_weights(a_pair(), tmp_path / "pair.npz")
+    result = CliRunner().invoke(app, ["export", str(path), "--interval", "5", "--out", str(tmp_path / "team.npz")])
+    assert result.exit_code == 0, result.output
+    team = read_weights(tmp_path / "team.npz")
+    assert (team.interval, team.carrying.interval) == (5, 5)
 
 
 def test_the_first_part_decides_where_nobody_holds_the_flag(tiny):
