@@ -16,7 +16,7 @@ from ..store import write_table
 from ..tables import game_table
 from . import options as o
 from .console import command, err, out
-from .files import check_ending
+from .files import check_ending, check_new
 from .play import Opponent, Shield, Side, Speed, _until_closed
 
 File = Annotated[Path, typer.Option("--out", metavar="FILE.parquet", help="Where demonstrations go.")]
@@ -103,7 +103,6 @@ def _check(opponent: str, file: Path) -> None:
     if opponent not in OPPONENTS:
         raise ConfigError(f"--opponent is {opponent!r}; demonstrations are against {' or '.join(OPPONENTS)}")
     check_ending(file, "--out", (".parquet",))
-    if file.exists():
-        raise ConfigError(f"{file} is there already; name another --out")
+    check_new(file, "--out")
     if find_spec("pyarrow") is None:
         raise ConfigError('Parquet files need pyarrow; pip install "steerclear[parquet]"')

@@ -16,7 +16,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..training.checkpoints import is_checkpoint, network_in
 from ..training.submission import write_submission
 from .console import command, out
-from .files import check_ending
+from .files import check_ending, check_new
 
 Model = Annotated[
     Path,
@@ -24,9 +24,9 @@ Model = Annotated[
         metavar="MODEL", help="A model.zip of PPO or A2C, exported weights or a training's checkpoint (.npz)."
     ),
 ]
-Weights = Annotated[Path | None, typer.Option("--out", metavar="FILE.npz", help="Where the weights go.")]
+Weights = Annotated[Path | None, typer.Option("--out", metavar="FILE.npz", help="Where the weights go; a new file.")]
 Submission = Annotated[
-    Path | None, typer.Option("--submission", metavar="FILE.zip", help="Where a competition entry goes.")
+    Path | None, typer.Option("--submission", metavar="FILE.zip", help="Where a competition entry goes; a new file.")
 ]
 Interval = Annotated[
     int | None, typer.Option(metavar="N", help="Game steps a decision is held for.", show_default="as it learned")
@@ -43,6 +43,8 @@ def export(model: Model, file: Weights = None, submission: Submission = None, in
         raise ConfigError("nothing to write; give --out weights.npz, --submission solution.zip or both")
     check_ending(file, "--out", (".npz",))
     check_ending(submission, "--submission", (".zip",))
+    check_new(file, "--out")
+    check_new(submission, "--submission")
     if interval is not None and not 1 <= interval <= 1000:
         raise ConfigError(f"--interval is {interval}; give 1 to 1000")
     network = _read(model, interval)

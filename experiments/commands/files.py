@@ -91,6 +91,16 @@ def check_ending(path: Path | None, option: str, endings: tuple[str, ...]) -> No
         raise ConfigError(f"{option} {path} does not end in {' or '.join(endings)}; give a name that does")
 
 
+def check_new(path: Path | None, option: str) -> None:
+    """Refuse a name that a file has already: what a person made, learned or handed in is not written over.
+
+    Raises:
+        ConfigError: it is there.
+    """
+    if path is not None and (path.exists() or path.is_symlink()):
+        raise ConfigError(f"{path} is there already; name another {option}, or remove it")
+
+
 def _files(value: Any) -> Iterator[Path]:
     """Paths in an argument that are files, or will be."""
     for path in value if isinstance(value, list | tuple) else (value,):

@@ -17,7 +17,7 @@ from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASU
 
 from ..fit.words import about_the_boat, promise
 from .console import command, out
-from .files import check_ending
+from .files import check_ending, check_new
 
 app = typer.Typer(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
 Named = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")]
@@ -87,8 +87,7 @@ def new(
         )
     path = file or Path(f"{name}.yaml")
     check_ending(path, "--out", (".yaml", ".yml"))
-    if path.exists():
-        raise ConfigError(f"{path} is there already; choose another with --out")
+    check_new(path, "--out")
     text = to_text(PlatformFile(replace(file_of(begin).platform, name=name)), "Edit, then: steerclear platform check")
     try:
         path.write_text(text, encoding="utf-8")

@@ -7,6 +7,7 @@ from logged_runs import header_of, write_log
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.files import check_apart, check_json_file
+from steerclear.policies.entrants.learned.entered import FILES
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
@@ -89,3 +90,16 @@ def test_a_new_platform_of_a_plain_name_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, ["platform", "new", "my-boat_2.b"]).exit_code == 0
     assert (tmp_path / "my-boat_2.b.yaml").exists()
+
+
+@pytest.mark.parametrize("option", ["--out there.npz", "--out new.npz --submission there.zip"])
+def test_an_export_writes_over_no_file(option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("there.npz", "there.zip"):
+        Path(name).write_text("mine")
+    done = CliRunner().invoke(app, ["export", str(FILES["jin"]), *option.split()], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    name, place = option.split()[::-1][:2]
+    assert f"{name} is there already; name another {place}" in done.stderr
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["there.npz", "there.zip"]
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
