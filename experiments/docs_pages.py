@@ -171,9 +171,15 @@ def bench_page(content: Mapping[str, Any]) -> str:
     return "\n".join([*lines, "## Bars", "", *bars_table(content["bars"]), ""])
 
 
+KEYS_WORDS = (
+    "`*` stands for a name that depends on the run, `[]` for every entry. Shares are fractions, 0 to 1, "
+    "unless the meaning says %."
+)
+
+
 def keys_page() -> str:
     """Write the page of JSON keys."""
-    lines = ["# JSON keys", "", MADE, "", "`*` stands for a name that depends on the run, `[]` for every entry.", ""]
+    lines = ["# JSON keys", "", MADE, "", KEYS_WORDS, ""]
     for command, keys in KEYS.items():
         rows = [(f"`{name}`", words) for name, words in keys.items()]
         lines += [f"## `steerclear {command} --json`", "", *table(["key", "meaning"], rows), ""]

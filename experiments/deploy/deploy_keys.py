@@ -13,7 +13,7 @@ DEPLOY = {
     "log": "path of the black box, or of the kept preflight; null: none",
     "figures.ticks": "turns of the loop",
     "figures.decided": "of those, with a decision",
-    "figures.changed_share": "share of own boats' commands that the shield changed",
+    "figures.changed_share": "share of own boats' commands that the shield changed, 0 to 1",
     "figures.best_effort_commands": "own boats' commands for which no manoeuvre kept the margin",
     "figures.ticks_with_actions": "turns with a declared response, an override or STOP ALL",
     "figures.closest_m": "closest approach of an own boat to any other, as believed, m",

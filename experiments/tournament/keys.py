@@ -14,7 +14,7 @@ _SIDE = {
     "closest_m": "closest distance of a boat of the side to any other, m",
     "avoidable_teammate": "hits of team-mates that own commands could have avoided; null when not judged",
     "avoidable_opponent": "the same with opponents",
-    "changed_share": "share of its boat-steps in which the shield changed the command; null without a shield",
+    "changed_share": "share of its boat-steps whose command the shield changed, 0 to 1; null without a shield",
     "deadlocks": "pairs of its boats that want to move and stood still for over 10 s",
     "failures": "times its policy raised or answered nonsense, or was gone; its boats held",
     "usable_steps": "steps in which its policy gave some boat a usable answer",

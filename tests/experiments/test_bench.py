@@ -11,8 +11,9 @@ from steerclear.experiments.bench.sampling import programs_of, questions_of_game
 from steerclear.experiments.bench.solvers import solver_times
 from steerclear.experiments.bench.timing import memory_mib, quantiles_us, time_calls
 from steerclear.experiments.docs_pages import write_pages
-from steerclear.experiments.keys import BENCH, KEYS, undocumented
+from steerclear.experiments.keys import BENCH, GAME_COLUMNS, KEYS, undocumented
 from steerclear.experiments.store import finite, write_json
+from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.filter.program import Program
@@ -130,6 +131,15 @@ def test_the_page_of_keys_holds_every_key(tmp_path):
     write_pages([], tmp_path)
     text = (tmp_path / "json_keys.md").read_text()
     assert all(f"`{key}`" in text for keys in KEYS.values() for key in keys)
+
+
+def test_every_key_of_changed_commands_says_whether_it_is_a_fraction_or_percent():
+    tables = (*KEYS.values(), GAME_COLUMNS, TOURNAMENT_GAME)
+    found = {key: words for keys in tables for key, words in keys.items() if "changed_share" in key}
+    assert len(found) == 6
+    for key, words in found.items():
+        assert ("%" in words) == ("metrics" in key), key
+        assert ("0 to 1" in words) == ("metrics" not in key), key
 
 
 def test_no_page_is_made_of_other_results(tmp_path):
