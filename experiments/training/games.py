@@ -49,17 +49,28 @@ def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
         actions=settings.actions,
         seed=settings.seed,
         interval=settings.interval,
-        reward=WeightedSum(settings.reward_weights()),
+        reward=WeightedSum(settings.reward_weights(settings.stages[0])),
     )
     if settings.shielded_training and settings.shield_every > 1:
         SeldomAsked(batch, settings.shield_every)
     return batch
 
 
-def set_tag_probability(core: BatchedMctf, stage: Stage) -> None:
-    """Tags succeed as often as a stage says from now on, or the rules where it says nothing."""
+def set_stage(batch: TeamBatch, settings: TrainingSettings, stage: Stage, guard: tuple[Any, Any]) -> None:
+    """Play as a stage says from now on: how often tags succeed, what earns how much, the shield or none.
+
+    Args:
+        batch: the games.
+        settings: of the training.
+        stage: what is to be.
+        guard: shield and command filter of the stages that have one.
+    """
+    core = batch.core
     wanted = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
     core.rules = share(core.rules._replace(tag_probability=float(wanted)))
+    batch.shield, batch._filter = guard if stage.shielded else (None, None)
+    batch.reward = WeightedSum(settings.reward_weights(stage))
+    batch.reward.begin(batch, np.ones(core.n_games, np.bool_))
 
 
 def stagger(batch: TeamBatch, seed: int) -> None:

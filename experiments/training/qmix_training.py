@@ -15,7 +15,7 @@ from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
 from .curve import write_curve
-from .games import learners_of, set_tag_probability, stagger
+from .games import learners_of, set_stage, stagger
 from .learner import DivergedError
 from .networks import TeamFeatures, features_of
 from .playing import play_games, summary_of
@@ -52,7 +52,7 @@ class QmixTraining:
         self._rng = np.random.default_rng([settings.seed, 9])
         pool = Pool(settings.stages[0].opponents, settings.league, settings.seed, settings.stages[0].cooldown_s)
         self.batch = learners_of(settings, pool)
-        set_tag_probability(self.batch.core, settings.stages[0])
+        set_stage(self.batch, settings, settings.stages[0], (self.batch.shield, self.batch._filter))
         self.boats = len(self.batch.boats)
         core, features = self.batch.core, features_of(self.batch.core, settings.net.features)
         looks = TeamFeatures(_Space(core.n_obs), features, core.n_obs, settings.interval)

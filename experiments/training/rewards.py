@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -168,11 +169,34 @@ class Advance(Progress):
     share_back = 1.0
 
 
+class Denied(Advance):
+    """The opponents' `Advance`, all of them together, with a minus sign and shared by the team.
+
+    A tag earns at once what the tagged boat had gained, most from one that comes home with the flag: credit for
+    defending long before a capture is lost.
+    """
+
+    def begin(self, batch: Any, games: BoolArray) -> None:
+        """Remember the opponents' ways."""
+        super().begin(_other_team(batch), games)
+
+    def reward(self, batch: Any, changed: BoolArray) -> Array:
+        """(B, n) of the last game step."""
+        theirs = super().reward(_other_team(batch), changed).sum(axis=1, keepdims=True)
+        return -np.repeat(theirs, len(batch.boats), axis=1)
+
+
+def _other_team(batch: Any) -> Any:
+    """The games as the other team's."""
+    return SimpleNamespace(core=batch.core, boats=batch.others, team=1 - batch.team)
+
+
 TERMS: dict[str, Callable[[], Any]] = {
     "sparse": Sparse,
     "captures": Captures,
     "progress": Progress,
     "advance": Advance,
+    "denied": Denied,
     "own": Own,
     "tags": Tags,
     "tagging": Tagging,

@@ -38,6 +38,8 @@ class Stage:
             home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
         cooldown_s: time in which an opponent that has tagged cannot tag again in this stage, at least the rules'; with
             more, a team learns to draw a tag first and to use the time after it. None: as in the rules.
+        rewards: weights of reward terms that replace the training's in this stage; what is not named stays.
+        shielded: with a shield in training, whether it stands in the games of this stage.
     """
 
     opponents: tuple[str, ...] = ("medium",)
@@ -46,6 +48,8 @@ class Stage:
     most: int = 0
     tag_probability: float | None = None
     cooldown_s: float | None = None
+    rewards: Mapping[str, float] = field(default_factory=dict)
+    shielded: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
@@ -56,6 +60,12 @@ class Stage:
             number("tag_probability", self.tag_probability, 0.0, 1.0)
         if self.cooldown_s is not None:
             number("cooldown_s", self.cooldown_s, 0.0, 1e6)
+        if not isinstance(self.rewards, Mapping):
+            raise ConfigError(f"rewards is {self.rewards!r}; give names and weights, such as {{collision: 0.1}}")
+        for name, weight in self.rewards.items():
+            number(f"rewards.{name}", weight, -1000.0, 1000.0)
+        if not isinstance(self.shielded, bool):
+            raise ConfigError(f"shielded is {self.shielded!r}; give true or false")
 
 
 @dataclass(frozen=True)
@@ -241,9 +251,9 @@ class TrainingSettings:
         except ConfigError as error:
             raise ConfigError(f"shield_settings: {error}") from None
 
-    def reward_weights(self) -> dict[str, float]:
-        """Weights of the reward terms, the shield mode's own among them."""
-        weights = dict(self.rewards)
+    def reward_weights(self, stage: Stage) -> dict[str, float]:
+        """Weights of the reward terms in a stage, the shield mode's own among them."""
+        weights = {**self.rewards, **stage.rewards}
         if self.shield == "training+intervention":
             weights.setdefault("intervention", INTERVENTION_WEIGHT)
         return weights

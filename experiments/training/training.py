@@ -18,10 +18,11 @@ from steerclear.shield.exceptions import ConfigError
 from ..provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
-from .games import Timed, learners_of, set_tag_probability, stagger
+from .games import Timed, learners_of, set_stage, stagger
 from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
+from .rewards import WeightedSum
 from .settings import TrainingSettings
 from .state import live_arrays, pool_facts, put_arrays, put_pool, put_rng, rng_facts
 
@@ -112,6 +113,7 @@ class Training:
         self._in_shield = Timed(self.batch._filter) if self.batch._filter is not None else None
         self.batch.step = self._in_games
         self.batch._filter = self._in_shield
+        self._guard = (self.batch.shield, self._in_shield)
 
     def _parts(self, rollout_s: float) -> dict[str, float]:
         """Where the time of a rollout went: simulator with opponents and rewards, shield, acting network."""
@@ -172,18 +174,22 @@ class Training:
     def _begin_games(self, more: int = 0) -> None:
         if self.batch.opponent.learns and not self.batch.opponent.members:
             self._add_snapshot()
-        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
+        self._set_stage()
         self.batch._seed = self.settings.seed + more
         self.learner.begin()
         stagger(self.batch, self.settings.seed + more)
+
+    def _set_stage(self) -> None:
+        set_stage(self.batch, self.settings, self.settings.stages[self.stage], self._guard)
 
     def _pool(self) -> Pool:
         stage = self.settings.stages[self.stage]
         return Pool(stage.opponents, self.settings.league, self.settings.seed, stage.cooldown_s)
 
     def _checked_opponents(self) -> None:
-        """Build every pool once, so that a missing opponent is found before long work."""
+        """Build every pool and reward once, so that what is missing is found before long work."""
         for stage in self.settings.stages:
+            WeightedSum(self.settings.reward_weights(stage))
             Pool(stage.opponents, self.settings.league, 0)
         for name in self.settings.evaluation.opponents:
             Pool((name,), self.settings.league, 0)
@@ -231,7 +237,7 @@ class Training:
         self._best = -np.inf if facts["best"] is None else facts["best"]
         self._wall_s = facts["wall_s"]
         self._recent = deque(facts["recent"], maxlen=self.settings.stages[self.stage].games)
-        set_tag_probability(self.batch.core, self.settings.stages[self.stage])
+        self._set_stage()
         pool = self._pool()
         pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
         for name in facts["pool"]["members"]:

@@ -79,6 +79,32 @@ def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, roles, whole
         np.testing.assert_array_equal(one, two)
 
 
+def test_a_stage_may_have_rewards_of_its_own_and_no_shield_and_resumes_bit_for_bit(tiny, tmp_path):
+    without = {"opponents": ["hold"], "games": 2, "net": -5, "shielded": False, "rewards": {"tagging": 0.5}}
+    stages = [without, {"opponents": ["medium"], "rewards": {"sparse": 2.0}}]
+    config = tiny(shield="training", shield_every=5, stages=stages)
+    reference = Training(read_config(config), tmp_path / "whole")
+    assert (reference.batch.shield, reference.batch._filter) == (None, None)
+    assert reference.batch.reward.weights == {"sparse": 1.0, "progress": 1.0, "tagging": 0.5}
+    reference.run()
+    assert reference.stage == 1
+    assert reference.batch.shield is not None
+    assert reference.batch.reward.weights == {"sparse": 2.0, "progress": 1.0}
+    for stop in (36, 72):
+        with pytest.raises(KeyboardInterrupt):
+            Training(read_config(config), tmp_path / "half", resume=True).run(stop_at(stop))
+    again = trained(config, tmp_path / "half", resume=True)
+    assert without_time(again.curve) == without_time(reference.curve)
+    shield_s = [row["wall"]["shield_s"] for row in again.curve]
+    assert (min(shield_s) == 0.0, shield_s[-1] > 0.0) == (True, True)
+
+
+def test_an_unknown_reward_of_a_later_stage_is_found_before_the_first_rollout(tiny, tmp_path):
+    stages = [{"opponents": ["hold"], "games": 2}, {"opponents": ["hold"], "rewards": {"capture": 1.0}}]
+    with pytest.raises(ConfigError, match="unknown reward term 'capture'; did you mean captures"):
+        Training(read_config(tiny(stages=stages)), tmp_path / "run")
+
+
 def test_what_is_interrupted_is_kept_up_to_the_last_rollout(tiny, tmp_path):
     training = Training(read_config(tiny(checkpoint_every=100)), tmp_path / "run")
 

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from steerclear.experiments.training.rewards import Advance, Own, Progress, Tagging
+from steerclear.experiments.training.rewards import Advance, Denied, Own, Progress, Tagging
 from steerclear.shield.platforms.layout import N_STATE, X, Y
 
 NOW = np.ones(1, np.bool_)
@@ -21,7 +21,7 @@ def game():
         config=SimpleNamespace(env_bounds_m=(80.0, 40.0)),
     )
     core.state[0, 0, [X, Y]] = 10.0, 20.0
-    return SimpleNamespace(core=core, boats=np.array([0]), team=0)
+    return SimpleNamespace(core=core, boats=np.array([0]), others=np.zeros(0, np.int64), team=0)
 
 
 def played(term, batch, moments):
@@ -74,3 +74,32 @@ def test_who_tags_is_paid_and_nobody_else():
     made = np.array([[-1, 4, -1, -1, 0, -1]])
     ours = SimpleNamespace(core=SimpleNamespace(made_tag=made), boats=np.arange(3), team=0)
     assert Tagging().reward(ours, NOW).tolist() == [[0.0, 1.0, 0.0]]
+
+
+def seen_by_the_others(batch):
+    """The same game with the learners, two of them, in the other team."""
+    core = batch.core
+    learners = np.array([1, 2])
+    core.state, core.has_flag, core.is_tagged = (
+        np.concatenate([a, a, a], axis=1) for a in (core.state, core.has_flag, core.is_tagged)
+    )
+    return SimpleNamespace(core=core, boats=learners, others=batch.boats, team=1)
+
+
+def earned_by_defending(moments):
+    """The sum of `Denied` for two learners over moments (x, carries, tagged, captured) of one opponent."""
+    batch, term = seen_by_the_others(game()), Denied()
+    term.begin(batch, NOW)
+    total = np.zeros((1, 2))
+    for x, carries, tagged, _ in moments:
+        core = batch.core
+        core.state[0, 0, X], core.has_flag[0, 0], core.is_tagged[0, 0] = x, carries, tagged
+        core.flag_taken[0, 1] = carries
+        total += term.reward(batch, NOW)
+    return total
+
+
+def test_a_tag_gives_the_defenders_what_the_tagged_boat_had_gained():
+    np.testing.assert_allclose(earned_by_defending(TAGGED[:3]), -(20.0 + 10.0) / 80.0)
+    np.testing.assert_allclose(earned_by_defending(TAGGED), 0.0, atol=1e-12)
+    np.testing.assert_allclose(earned_by_defending(BROUGHT_HOME), -kept_at_home() + 1.0 / 80.0)  # it sails 1 m off

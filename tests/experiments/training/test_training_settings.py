@@ -19,6 +19,8 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
         ({"games": True}, "games is True; give a whole number from 1"),
         ({"ppo": {"learning_rate": float("nan")}}, "learning_rate is nan; give a number"),
         ({"stages": [{"cooldown_s": -1.0}]}, "a stage in the config: cooldown_s is -1.0; give a number"),
+        ({"stages": [{"rewards": [1]}]}, r"a stage in the config: rewards is \[1\]; give names and weights"),
+        ({"stages": [{"shielded": "no"}]}, "a stage in the config: shielded is 'no'; give true or false"),
         ({"net": {"hidden": []}}, r"hidden is \[\]; give a list of widths"),
         ([], "the config is list; give keys and values"),
     ],
@@ -44,8 +46,9 @@ def test_a_missing_opponent_and_an_unknown_reward_are_found_at_once():
 
 
 def test_the_intervention_term_comes_with_its_shield_mode():
-    assert "intervention" in settings_of({"shield": "training+intervention"}).reward_weights()
-    assert "intervention" not in settings_of({"shield": "training"}).reward_weights()
+    for shield, there in (("training+intervention", True), ("training", False)):
+        settings = settings_of({"shield": shield})
+        assert ("intervention" in settings.reward_weights(settings.stages[0])) is there
 
 
 def test_those_who_beat_the_learner_come_more_often():
