@@ -73,6 +73,10 @@ class Learner:
         self.model.ep_success_buffer = deque(maxlen=1)
         if settings.start:
             self._begin_with(settings.start)
+        self._learned = 0
+        for name, parameter in self.model.policy.named_parameters():
+            if "policy" in name or name.startswith(("action_net", "log_std")):
+                parameter.register_hook(self._held_back)
 
     def _policy(self, batch: TeamBatch) -> dict[str, Any]:
         net = self.settings.net
@@ -99,6 +103,10 @@ class Learner:
         except ValueError as error:
             raise ConfigError(f"start {path} does not fit this network: {error}; give its own net settings") from None
 
+    def _held_back(self, gradient: torch.Tensor) -> torch.Tensor:
+        """The gradient of a parameter of the actor: nothing while the critic learns alone."""
+        return torch.zeros_like(gradient) if self._learned < self.settings.ppo.critic_first else gradient
+
     def begin(self) -> None:
         """Start all games."""
         self.model._last_obs = self.env.reset()
@@ -121,6 +129,7 @@ class Learner:
             self.model.train()
         except ValueError as error:  # torch's distributions refuse parameters that are not finite
             raise DivergedError(self._diverged()) from error
+        self._learned += 1
         told = {name: float(value) for name, value in self.model.logger.name_to_value.items()}
         self.model.logger.name_to_value.clear()
         self.model.logger.name_to_count.clear()
@@ -144,7 +153,7 @@ class Learner:
         for k, state in self.model.policy.optimizer.state_dict()["state"].items():
             found |= {f"adam/{k}/{name}": torch.as_tensor(value).cpu().numpy() for name, value in state.items()}
         found["torch"] = torch.get_rng_state().numpy()
-        found["counts"] = np.array([self.model._n_updates, self.model.num_timesteps])
+        found["counts"] = np.array([self.model._n_updates, self.model.num_timesteps, self._learned])
         found["last_obs"], found["starts"] = self.model._last_obs, self.model._last_episode_starts
         return {name: np.array(value) for name, value in found.items()}
 
@@ -166,7 +175,7 @@ class Learner:
         optimizer = self.model.policy.optimizer
         optimizer.load_state_dict({**optimizer.state_dict(), "state": self._moments(arrays)})
         torch.set_rng_state(torch.as_tensor(arrays["torch"]))
-        self.model._n_updates, self.model.num_timesteps = (int(count) for count in arrays["counts"])
+        self.model._n_updates, self.model.num_timesteps, self._learned = (int(count) for count in arrays["counts"])
         for key, name in (("last_obs", "_last_obs"), ("starts", "_last_episode_starts")):
             if arrays[key].shape != getattr(self.model, name).shape:
                 raise ValueError(f"{key} has another shape")

@@ -73,7 +73,8 @@ class Ppo:
     """Settings of PPO, ours by default: large batches and few epochs keep the network's share of the time small.
 
     Attributes are as in Stable-Baselines3; ``batch`` is the size of its minibatches, and a rollout is ``steps``
-    decisions of every boat in every game.
+    decisions of every boat in every game. ``critic_first``: so many rollouts teach the critic alone. Weights to start
+    with are an actor's; a critic that knows nothing yet would lead it astray.
     """
 
     steps: int = 128
@@ -86,8 +87,10 @@ class Ppo:
     entropy: float = 0.01
     value: float = 0.5
     max_grad_norm: float = 0.5
+    critic_first: int = 0
 
     def __post_init__(self) -> None:
+        count("critic_first", self.critic_first, 0, 10**6)
         for name, most in (("steps", 100_000), ("batch", 10**7), ("epochs", 1000)):
             count(name, getattr(self, name), 1, most)
         for name in ("learning_rate", "clip", "max_grad_norm"):

@@ -99,6 +99,34 @@ def test_a_stage_may_have_rewards_of_its_own_and_no_shield_and_resumes_bit_for_b
     assert (min(shield_s) == 0.0, shield_s[-1] > 0.0) == (True, True)
 
 
+@pytest.mark.parametrize("roles", ["placed", "each"])
+def test_the_critic_may_learn_alone_at_first_and_a_resumed_training_knows_how_long(tiny, tmp_path, roles):
+    config = tiny(ppo={"steps": 6, "batch": 18, "epochs": 2, "critic_first": 3}, net={"hidden": [16], "roles": roles})
+    begun = Training(read_config(config), tmp_path / "run")
+    at_first, critic = begun.learner.network(), critic_of(begun)
+    with pytest.raises(KeyboardInterrupt):
+        begun.run(stop_at(72))
+    resumed = Training(read_config(config), tmp_path / "run", resume=True)
+    with pytest.raises(KeyboardInterrupt):
+        resumed.run(stop_at(108))
+    assert changes_of(at_first, resumed.learner.network()) == 0.0
+    assert max(float(np.abs(one - two).max()) for one, two in zip(critic, critic_of(resumed), strict=True)) > 0.0
+    resumed.run()
+    assert changes_of(at_first, resumed.learner.network()) > 0.0
+
+
+def critic_of(training):
+    """The critic's weights."""
+    values = training.learner.model.policy.state_dict().items()
+    return [value.numpy().copy() for name, value in values if "value" in name]
+
+
+def changes_of(one, two):
+    """Greatest change of an actor's numbers."""
+    pairs = zip([*one.weights, *one.biases], [*two.weights, *two.biases], strict=True)
+    return max(float(np.abs(a - b).max()) for a, b in pairs)
+
+
 def test_an_unknown_reward_of_a_later_stage_is_found_before_the_first_rollout(tiny, tmp_path):
     stages = [{"opponents": ["hold"], "games": 2}, {"opponents": ["hold"], "rewards": {"capture": 1.0}}]
     with pytest.raises(ConfigError, match="unknown reward term 'capture'; did you mean captures"):
