@@ -37,7 +37,7 @@ GuardNames = Annotated[
     ),
 ]
 Radius = Annotated[float, typer.Option(metavar="M", help="Separation to keep, m.")]
-Delay = Annotated[float, typer.Option(metavar="S", help="From an own boat's command to its effect, s.")]
+Delay = Annotated[float, typer.Option(metavar="S", help="From own command to effect, s, in whole steps, rounded up.")]
 Noise = Annotated[float, typer.Option(metavar="M", help="Bound on the error of positions seen, m.")]
 Current = Annotated[float, typer.Option(metavar="M/S", help="Speed of a current; the guard is told it, not where to.")]
 Workers = Annotated[

@@ -57,7 +57,7 @@ Judge = Annotated[
 ]
 Delay = Annotated[
     float,
-    typer.Option(metavar="S", help="From an own boat's command to its effect, s; the shield's delay_s follows it."),
+    typer.Option(metavar="S", help="From own command to effect, s, in whole steps, rounded up; the shield is told."),
 ]
 Noise = Annotated[
     float,

@@ -40,7 +40,7 @@ Wind = Annotated[str, typer.Option(metavar="MPS@DEG", help="Wind, and where it c
 Current = Annotated[str, typer.Option(metavar="MPS@DEG", help="Current, and where it goes to.")]
 Noise = Annotated[float, typer.Option(metavar="X", help="Noise of GPS and compass: 0 none, 1 as measured.")]
 Loss = Annotated[float, typer.Option(metavar="SHARE", help="Share of packets lost, either way.")]
-Delay = Annotated[float, typer.Option(metavar="S", help="Delay of every packet, one way.")]
+Delay = Annotated[float, typer.Option(metavar="S", help="Delay of every packet, one way, s, rounded up to 0.02.")]
 Jitter = Annotated[float, typer.Option(metavar="S", help="Further delay, drawn for each packet.")]
 Duration = Annotated[float | None, typer.Option(metavar="S", help="Simulated time.", show_default="until Ctrl-C")]
 Boot = Annotated[float, typer.Option(metavar="S", help="From power on until the autopilot arms; 42 was measured.")]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.preflight.response import counted_words
 from steerclear.shield.bridge.preflight.result import CheckResult
 from steerclear.shield.exceptions import BridgeError
 
@@ -84,8 +85,9 @@ def check_drill(
     if bad:
         return CheckResult("drill", False, f"{bad[0]}: {checks[bad[0]]['text']}")
     delay = measured_delay_s(fleet, boat)
+    counted = counted_words(fleet.shield_config.delay_s, fleet.dt_s)
     figures = {} if delay is None else {"delay_s": delay}
-    return CheckResult("drill", True, f"boats drilled {age / 60.0:.0f} min ago", figures)
+    return CheckResult("drill", True, f"boats drilled {age / 60.0:.0f} min ago{counted}", figures)
 
 
 def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:

@@ -16,7 +16,7 @@ from ..config import ShieldConfig
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
-from ..tracking.tracks import thrust_at
+from ..tracking.tracks import steps_of_delay, thrust_at
 from .link import BoatReading, Sent
 from .overruns import left_out
 from .tick import Action
@@ -120,7 +120,7 @@ class Delays:
     """
 
     def __init__(self, platforms: Mapping[str, Platform], config: ShieldConfig) -> None:
-        self._declared_s = config.delay_s
+        self._declared_s, self._counted_s = config.delay_s, steps_of_delay(config) * config.dt_s
         self._meters = {name: DelayMeter(platform, config.dt_s) for name, platform in platforms.items()}
 
     def update(self, readings: Mapping[str, BoatReading], sent: Mapping[str, Sent]) -> None:
@@ -141,7 +141,7 @@ class Delays:
                 name,
                 "delay",
                 "none",
-                f"{name}: commands work after {delay:.1f} s, the shield counts on {self._declared_s:.1f} s; "
+                f"{name}: commands work after {delay:.1f} s, the shield counts on {self._counted_s:.1f} s; "
                 "run preflight again, or set shield.delay_s",
             )
             for name, delay in self.measured_s().items()

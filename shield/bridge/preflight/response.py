@@ -13,6 +13,7 @@ import numpy as np
 from ...jit import Array
 from ...platforms import Platform, fresh_state, step_boat
 from ...platforms import layout as L
+from ...tracking.tracks import whole_steps
 from ..fleet_file import FleetFile
 from .drill import Drill, DrillSample
 from .missed import Missed, check_model
@@ -26,6 +27,8 @@ HEADING_DEG = 12.0
 SPEED_MPS = 0.35
 LONGEST_DELAY_STEPS = 8
 LONGEST_DELAY_S = 0.6
+SAME_S = 0.005
+"""Delays that are told apart by less are told as the same, s."""
 TURNED_DEG = 15.0
 LONG_ENOUGH_S = 3.0
 """Only where a heading was told for so long it is judged whether the boat turned away from it."""
@@ -120,9 +123,17 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
         fault += f"{disturbed}: repeat it on clear water before you believe it"
     text = fault or (
         f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
-        f"effect after {delay_s:.2f} s{disturbed}"
+        f"effect after {delay_s:.2f} s{disturbed}{counted_words(delay_s, dt_s)}"
     )
     return CheckResult(name, not fault, text, figures)
+
+
+def counted_words(delay_s: float, dt_s: float) -> str:
+    """What to add where a shield counts a delay as more than it is; nothing where it is whole turns already."""
+    counted_s = whole_steps(delay_s, dt_s) * dt_s
+    if counted_s - delay_s < SAME_S:
+        return ""
+    return f"; a delay of {delay_s:.4g} s is counted as {counted_s:.4g} s, in whole turns of the loop"
 
 
 def _measured(sample: DrillSample) -> tuple[float, float]:

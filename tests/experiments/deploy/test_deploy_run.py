@@ -289,6 +289,23 @@ def test_a_drill_counts_for_the_same_file_for_a_while_and_when_it_passed(fleet_f
     assert "no preflight" in check().text
 
 
+@pytest.mark.parametrize(
+    ("declared", "measured_s", "told"),
+    [
+        ("", 0.03, "; a delay of 0.03 s is counted as 0.1 s, in whole turns of the loop"),
+        ("", 0.2, ""),
+        ("\nshield: {delay_s: 0.23}\n", 0.03, "; a delay of 0.23 s is counted as 0.3 s, in whole turns of the loop"),
+    ],
+)
+def test_it_is_said_what_the_shield_counts_a_delay_as(declared, measured_s, told, fleet_file):
+    text = fleet_file.read_text() + declared
+    fleet_file.write_text(text)
+    fleet = load_fleet(fleet_file)
+    keep(fleet, text, None, [good("course"), good("response", delay_s=measured_s), good("model")], [])
+    result = check_drill(read_fleet(orders_of(fleet_file))[0], text, None, ["blue_1"])
+    assert result.text == f"boats drilled 0 min ago{told}"
+
+
 def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(fleet_file):
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == pytest.approx(0.1)
     assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.0, "a demonstration"

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 from bridge_fakes import FakeLink
+from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.latency import DelayMeter
+from steerclear.shield.bridge.latency import DelayMeter, Delays
 from steerclear.shield.bridge.overruns import left_out
 from steerclear.shield.platforms import get_platform
 
@@ -73,3 +74,10 @@ def test_gaps_and_faults_start_anew_and_break_nothing():
         meter.sent(math.nan, 0.0)
         clock.sleep_until(clock.now_s() + DT_S)
     assert meter.delay_s is None
+
+
+def test_it_is_told_what_the_shield_counts_on(monkeypatch):
+    """A delay of 0.03 s is a whole turn of the loop to the shield."""
+    delays = Delays({}, ShieldConfig(dt_s=0.1, delay_s=0.03))
+    monkeypatch.setattr(delays, "measured_s", lambda: {"blue_1": 0.4})
+    assert "work after 0.4 s, the shield counts on 0.1 s" in delays.actions()[0].text

@@ -11,7 +11,7 @@ from steerclear.shield.bridge.foresight import Foresight
 from steerclear.shield.bridge.link import BoatReading, Sent
 from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
 from steerclear.shield.bridge.preflight.missed import Missed, check_model
-from steerclear.shield.bridge.preflight.response import check_course, check_response, drill_checks
+from steerclear.shield.bridge.preflight.response import check_course, check_response, counted_words, drill_checks
 from steerclear.shield.bridge.preflight.result import run_checks
 from steerclear.shield.bridge.tick import Tick
 from steerclear.shield.bridge.wanted import Snapshot
@@ -124,6 +124,14 @@ def test_the_delay_is_measured(steps):
     result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
     assert result.passed, result.text
     assert result.figures["delay_s"] == pytest.approx(steps * DT_S, abs=0.06)
+
+
+def test_a_delay_says_what_it_is_counted_as():
+    assert counted_words(0.03, DT_S) == "; a delay of 0.03 s is counted as 0.1 s, in whole turns of the loop"
+    assert [counted_words(steps * DT_S, DT_S) for steps in range(9)] == [""] * 9
+    drill, _ = driven(delay_steps=2, noise=0.01)
+    result = check_response("blue_1", drill.samples["blue_1"], HERON, DT_S)
+    assert counted_words(result.figures["delay_s"], DT_S) in result.text
 
 
 def test_a_delay_that_is_too_long_is_found():
