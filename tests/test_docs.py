@@ -36,6 +36,15 @@ def test_programs_are_included_by_markers_that_are_whole(page):
         assert (DOCS / found[1]).exists()
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_blocks_of_code_end_on_a_line_of_their_own(page):
+    """A formatter that runs a block's lines together leaves all that follows in it."""
+    text = page.read_text(encoding="utf-8")
+    fences = re.findall(r"^ *```.*$", text, flags=re.MULTILINE)
+    assert len(fences) == text.count("```")
+    assert all(fence.strip() == "```" for fence in fences[1::2])
+
+
 def test_every_example_is_on_its_page():
     text = (DOCS / "examples.md").read_text(encoding="utf-8")
     for example in (DOCS / "examples").glob("*.py"):

@@ -1,8 +1,12 @@
 """Every command of the page "from your boat to a shielded boat", as it stands there, on simulated boats."""
 
+import re
+
 import pytest
-from boat_page import commands, follow
+import yaml
+from boat_page import PAGE, commands, follow
 from steerclear.experiments.cli import app
+from steerclear.experiments.deploy.observing import NEED_NO_GAME
 from steerclear.shield.platforms.files import load_platform
 from typer.testing import CliRunner
 
@@ -25,6 +29,13 @@ def test_the_first_description_is_one_that_the_shield_takes(tmp_path, monkeypatc
         assert result.exit_code == 0, (words, result.output)
     assert load_platform("my_boat.yaml").platform.name == "my_boat"
     assert "turns 90 deg" in result.output
+
+
+def test_the_first_run_is_by_a_policy_that_the_fleet_of_the_page_can_play():
+    (fleet,) = re.findall(r"^```yaml\n(.*?)^```$", PAGE.read_text(), flags=re.M | re.S)
+    assert not any("agent" in boat for boat in yaml.safe_load(fleet)["boats"])
+    (deploy,) = [words for words in commands() if words[1] == "deploy"]
+    assert deploy[deploy.index("--policy") + 1] in NEED_NO_GAME
 
 
 @pytest.mark.study
