@@ -27,6 +27,7 @@ _HEADS = (
     "tags, on - off",
     "primary, on - off",
     "games",
+    "version",
 )
 
 
@@ -38,9 +39,8 @@ def is_dial(content: Mapping[str, Any]) -> bool:
 
 ADVICE = (
     "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats "
-    "are slow to get away (surveyors that hold still are what single rammers hit: see "
-    "[encounters by family](measured/comparison.md), `at_rest`), and on boats, as `FLEET.yaml` does; `hold-course` "
-    "where opponents are traffic and not a team."
+    "often lie still (which single rammers hit: see [encounters by family](measured/comparison.md), `at_rest`), and on "
+    "boats, as `FLEET.yaml` does; `hold-course` where opponents are traffic and not a team."
 )
 """Beside the figures: which of the profiles is for whom."""
 
@@ -57,7 +57,8 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
         "How long an opponent may do its worst before it holds its course (`adversary_s`) decides what safety costs. "
         "Hits are entries into the distance kept, per game; differences are paired, shield on less off, same seeds; "
         "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is "
-        "for those on our side of the field (`visitor_s`), which can tag nobody there."
+        "for those on our side of the field (`visitor_s`), which can tag nobody there. Each row is of the version that "
+        "measured it: from 0.5.0 on boats that are slow fear for longer."
     )
     lines = ["# Safety and its price", "", MADE, "", words, "", ADVICE, ""]
     picture = folder / f"{STEM}.png"
@@ -113,6 +114,7 @@ def _row(fear_s: _Fear, content: Mapping[str, Any], summary: Mapping[str, Any], 
         told("tags", "difference"),
         told("primary", "difference"),
         f"{summary['games_on']}",
+        str(content.get("versions", {}).get("steerclear", "-")),
     ]
 
 

@@ -28,6 +28,7 @@ def ablation(shield, changed, hits, radius="2.5"):
     return {
         "command": "ablate",
         "settings": {"preset": "mctf2025", "shield": shield},
+        "versions": {"steerclear": "1.2.3"},
         "pairings": [{"pairing": "medium vs easy", "games_on": 6, "games_off": 6, "metrics": metrics}],
     }
 
@@ -50,6 +51,7 @@ def test_a_row_for_each_time_the_least_first(tmp_path):
         ["inf", "21.5", "0.00"],
     ]
     assert "12.5" in far
+    assert "| 1.2.3 |" in far, "a row is of the version that measured it"
     assert (tmp_path / "price.png").stat().st_size > 10_000
 
 
