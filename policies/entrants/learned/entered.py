@@ -22,7 +22,8 @@ ABOUT = {
     "jin": ("capture-seeking PPO, a stand-in: the team's code was never shared", "Jin-Indep"),
     "leprell": ("decentralised PPO on captures and grabs alone (Leprell-USMA)", "Leprell-USMA"),
     "richley": ("QMIX, and PPO once the flag is held (Richley-NIWC-ATL)", "Richley-NIWC-ATL"),
-    "ours": ("PPO in the game of 2025, begun with jin: the team to start from, with the shield", ""),
+    "surge": ("PPO in the game of 2025 against medium alone, begun with jin", ""),
+    "ours": ("PPO in the game of 2025, begun with surge: the team to start from, with the shield", ""),
 }
 FILES = {name: TEAMS / f"{name}.npz" for name in ABOUT if (TEAMS / f"{name}.npz").exists()}
 """Weights of the teams that are networks from observations to actions."""
