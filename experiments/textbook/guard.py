@@ -66,8 +66,11 @@ class TextbookGuard(BatchGuard):
                  team: tuple[int, ...], gains: Gains | None = None) -> None:  # fmt: skip
         if name not in BARRIERS:
             raise ConfigError(f"unknown filter {name!r}; choose one of {', '.join(NAMES)}")
+        it = BARRIERS[name]
+        if gains is not None and len(gains) != len(it.tried[0]):
+            raise ConfigError(f"{len(gains)} gains for {name}; give {len(it.tried[0])}, alpha (1/s) the first")
         super().__init__(name, config, games, platforms, team)
-        self._barrier = it = BARRIERS[name]
+        self._barrier = it
         self.radius_m *= it.widened
         self._gains = np.array([gains or it.tuned.get(kind.name, it.tried[0]) for kind in self._platforms]).T
         limits = np.array([input_limits(kind, config.dt_s) for kind in self._platforms])

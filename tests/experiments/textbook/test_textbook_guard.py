@@ -134,6 +134,11 @@ def test_shapes_and_settings_are_checked():
         TextbookGuard("parabolic", CONFIG, 1, ("heron",), (0, 1))
 
 
+def test_gains_of_another_filter_are_refused():
+    with pytest.raises(ConfigError, match="3 gains for velocity_cbf; give 1"):
+        TextbookGuard("velocity_cbf", CONFIG, 1, ("heron", "heron"), (0, 1), gains=(1.0, 2.0, 3.0))
+
+
 def test_a_barrier_of_ones_own_is_a_guard(monkeypatch):
     """The same row as the distance's, by another function: h = 3 (|p|^2 - R^2)."""
 
