@@ -40,6 +40,24 @@ def number(name: str, value: Any, low: float, high: float) -> None:
         raise ConfigError(f"{name} is {value!r}; give a number from {low:g} to {high:g}")
 
 
+def span(name: str, value: Any, low: float, high: float) -> Any:
+    """Return a number as it is, and a list of two, least and most, as a tuple.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    if not isinstance(value, (list, tuple)):
+        number(name, value, low, high)
+        return value
+    if len(value) != 2:
+        raise ConfigError(f"{name} is {value!r}; give a number, or two: least and most")
+    for one in value:
+        number(name, one, low, high)
+    if value[0] > value[1]:
+        raise ConfigError(f"{name} is {value!r}; give the least first")
+    return tuple(value)
+
+
 def texts(name: str, value: Any) -> tuple[str, ...]:
     """Return a list of names as a tuple.
 

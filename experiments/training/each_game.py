@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 from steerclear import policies
+from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.observe import observe_games  # noqa: F401 (its kernel fills the twin's observations)
 from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.platforms import layout as L
 
 from ..entries.team import make_team
 
@@ -18,11 +20,13 @@ class EachGame:
 
     Args:
         name: of the policy, as `steerclear.policies.make` takes it.
+        every: game steps between two questions to it. The policy is told that a step is so long, and what it answers is
+            held as a course steered: cheaper, and a coarser player of the same kind.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, every: int = 1) -> None:
         policies.check(name)
-        self.name = name
+        self.name, self.every = name, every
         self._teams: dict[int, Any] = {}
 
     def reset(self, core: Any, team: int, seed: int) -> None:
@@ -33,6 +37,8 @@ class EachGame:
         self._twins: dict[int, Any] = {}
         self._out = np.zeros((core.n_games, self._own.size, 2))
         self._mine = np.ones(core.n_games, np.bool_)
+        self._left = np.zeros(core.n_games, np.int64)
+        self._course_deg = np.zeros((core.n_games, self._own.size))
 
     def plays(self, games: BoolArray) -> None:
         """Only these games (B,) are played from now on."""
@@ -43,17 +49,27 @@ class EachGame:
         for game in np.flatnonzero(chosen):
             self._seeds[int(game)] = seed + int(game)
             self._twins.pop(int(game), None)
+        self._left[chosen] = 0
 
     def act(self, core: Any, team: int) -> Array:
         """Commands (B, n_team, 2); the array is reused by the next call."""
-        for game in np.flatnonzero(self._mine):
+        heading_deg = core.state[:, self._own, L.HEADING]
+        self._out[..., 1] = (self._course_deg - heading_deg + 180.0) % 360.0 - 180.0
+        for game in np.flatnonzero(self._mine & (self._left == 0)):
             self._out[game] = self._ask(core, int(game))
+            self._course_deg[game] = heading_deg[game] + self._out[game, :, 1]
+            self._left[game] = self.every
+        self._left[self._mine] -= 1
         return self._out
+
+    def _seen_as(self, config: GameConfig) -> GameConfig:
+        """The rules with steps as long as the time between two questions."""
+        return config if self.every == 1 else config.replace(decision_steps=config.decision_steps * self.every)
 
     def _ask(self, core: Any, game: int) -> Array:
         fresh = game not in self._twins
         if fresh:
-            self._twins[game] = MctfEnv(core.config, action_kind="continuous")
+            self._twins[game] = MctfEnv(self._seen_as(core.config), action_kind="continuous")
             self._twins[game].reset(seed=0)
         env = self._twins[game]
         env.core.restore(core.view(game))

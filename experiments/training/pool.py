@@ -14,15 +14,19 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 
 from .each_game import EachGame
-from .settings import League
+from .settings import League, Span, Stage
 
 SELF = "self"
 LAST = 50
 """Games that a mean score is over."""
 
 
-def opponent_of(name: str) -> Any:
+def opponent_of(name: str, every: int = 1) -> Any:
     """The batch policy of a name: scripted and learned ones at once, others one game after another.
+
+    Args:
+        name: of the policy.
+        every: game steps between two questions to one that plays one game after another.
 
     Raises:
         PolicyError: there is none.
@@ -30,24 +34,26 @@ def opponent_of(name: str) -> Any:
     if name in ENTRIES or batch_builder(name) is not None:
         return policies.make_batch(name)
     policies.check(name)
-    return EachGame(name)
+    return EachGame(name, every)
 
 
 class Pool:
     """A `BatchPolicy` made of several.
 
     Args:
-        names: of the members; "self" stands for the snapshots added by `add_snapshot`.
+        stage: whose opponents they are, how fast they sail and how long they wait between tags; "self" among them
+            stands for the snapshots added by `add_snapshot`.
         league: the matching rule and how many snapshots are kept.
-        seed: of the draw.
-        cooldown_s: time between tags of its boats where it is longer than the rules'.
+        seed: of the draws.
+        every: game steps between two questions to members that play one game after another.
     """
 
-    def __init__(self, names: tuple[str, ...], league: League, seed: int, cooldown_s: float | None = None) -> None:
+    def __init__(self, stage: Stage, league: League, seed: int, every: int = 1) -> None:
+        names = stage.opponents
         self.name = ",".join(names)
         self.league = league
-        self.cooldown_s = cooldown_s
-        self.members = {name: opponent_of(name) for name in names if name != SELF}
+        self.stage = stage
+        self.members = {name: opponent_of(name, every) for name in names if name != SELF}
         self.learns = SELF in names
         if not self.members and not self.learns:
             raise PolicyError("the pool of opponents is empty; name one at least")
@@ -78,7 +84,20 @@ class Pool:
         for member in self.members.values():
             member.reset(core, team, seed)
         self.playing = np.array([self._draw() for _ in range(core.n_games)], dtype=object)
+        self.speeds, self.waits_s = np.ones(core.n_games), np.zeros(core.n_games)
+        self._handicap(np.ones(core.n_games, np.bool_))
         self._out = np.zeros((core.n_games, int(np.sum(core.team == team)), 2))
+
+    def _handicap(self, chosen: BoolArray) -> None:
+        """Draw speeds and times between tags of the chosen games (B,)."""
+        self.speeds[chosen] = self._drawn(self.stage.speed, chosen)
+        self.waits_s[chosen] = self._drawn(self.stage.cooldown_s or 0.0, chosen)
+
+    def _drawn(self, span: Span, chosen: BoolArray) -> Array:
+        """A number of the span for each of the chosen games."""
+        if not isinstance(span, tuple):
+            return np.full(int(np.sum(chosen)), span)
+        return self._rng.uniform(*span, int(np.sum(chosen)))
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
         """Begin the chosen games (B,) anew, each with an opponent drawn anew."""
@@ -86,17 +105,19 @@ class Pool:
             member.restart(chosen, seed)
         for game in np.flatnonzero(chosen):
             self.playing[game] = self._draw()
+        self._handicap(chosen)
 
     def act(self, core: Any, team: int) -> Array:
         """Commands (B, n_team, 2); the array is reused by the next call."""
-        if self.cooldown_s is not None:
-            hold_back(core, team, self.cooldown_s)
+        if self.stage.cooldown_s is not None:
+            hold_back(core, team, self.waits_s)
         for name, member in self.members.items():
             mine = self.playing == name
             if mine.any():
                 if isinstance(member, EachGame):
                     member.plays(mine)
                 self._out[mine] = member.act(core, team)[mine]
+        self._out[..., 0] *= self.speeds[:, None]
         return self._out
 
     def ended(self, core: Any, games: BoolArray) -> None:
@@ -118,13 +139,13 @@ class Pool:
         return str(self._rng.choice(list(weights), p=share / share.sum()))
 
 
-def hold_back(core: Any, team: int, cooldown_s: float) -> None:
-    """Slow the clocks that a team's boats recharge by, so that a whole cool-down takes ``cooldown_s``.
+def hold_back(core: Any, team: int, cooldown_s: Array) -> None:
+    """Slow the clocks that a team's boats recharge by, so that a whole cool-down takes ``cooldown_s`` (B,).
 
     Boats see the share of the cool-down that is over, so what they see means the same.
     """
     boats = np.flatnonzero(core.team == team)
     elapsed_s, whole_s = core.tagging_cooldown_s, core.config.tagging_cooldown_s
-    share = min(1.0, whole_s / max(cooldown_s, 1e-9))
+    share = np.minimum(1.0, whole_s / np.maximum(cooldown_s, 1e-9))[:, None]
     rests = (elapsed_s[:, boats] > 0.0) & (elapsed_s[:, boats] < whole_s)
     elapsed_s[:, boats] -= rests * (1.0 - share) * core.config.decision_s

@@ -50,7 +50,7 @@ class QmixTraining:
         self.options = {**DEFAULTS, **settings.options}
         torch.manual_seed(settings.seed)
         self._rng = np.random.default_rng([settings.seed, 9])
-        pool = Pool(settings.stages[0].opponents, settings.league, settings.seed, settings.stages[0].cooldown_s)
+        pool = Pool(settings.stages[0], settings.league, settings.seed, settings.entrants_every)
         self.batch = learners_of(settings, pool)
         set_stage(self.batch, settings, settings.stages[0], (self.batch.shield, self.batch._filter))
         self.boats = len(self.batch.boats)

@@ -11,13 +11,16 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..kept_distance import check_shield
 from ..spec import near
-from .checks import choice, count, number, texts
+from .checks import choice, count, number, span, texts
 
 SHIELDS = ("none", "deployment", "training", "training+intervention")
 ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning")
 DEVICES = ("auto", "cpu", "cuda")
 INTERVENTION_WEIGHT = 0.02
 """Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""
+
+Span = float | tuple[float, float]
+"""A number, or two that each game draws its own between."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,11 @@ class Stage:
         most: decisions.
         tag_probability: chance that a tag of either team succeeds in this stage, so that boats learn to bring flags
             home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
+        speed: share of the speed they ask for at which opponents sail in this stage; slow ones are outrun, and faster
+            ones have to be led astray first. Two numbers: each game draws its own between them.
         cooldown_s: time in which an opponent that has tagged cannot tag again in this stage, at least the rules'; with
-            more, a team learns to draw a tag first and to use the time after it. None: as in the rules.
+            more, a team learns to draw a tag first and to use the time after it. Two numbers: each game draws its own
+            between them. None: as in the rules.
         rewards: weights of reward terms that replace the training's in this stage; what is not named stays.
         shielded: with a shield in training, whether it stands in the games of this stage.
     """
@@ -47,7 +53,8 @@ class Stage:
     games: int = 30
     most: int = 0
     tag_probability: float | None = None
-    cooldown_s: float | None = None
+    cooldown_s: Span | None = None
+    speed: Span = 1.0
     rewards: Mapping[str, float] = field(default_factory=dict)
     shielded: bool = True
 
@@ -59,7 +66,8 @@ class Stage:
         if self.tag_probability is not None:
             number("tag_probability", self.tag_probability, 0.0, 1.0)
         if self.cooldown_s is not None:
-            number("cooldown_s", self.cooldown_s, 0.0, 1e6)
+            object.__setattr__(self, "cooldown_s", span("cooldown_s", self.cooldown_s, 0.0, 1e6))
+        object.__setattr__(self, "speed", span("speed", self.speed, 0.0, 1.0))
         if not isinstance(self.rewards, Mapping):
             raise ConfigError(f"rewards is {self.rewards!r}; give names and weights, such as {{collision: 0.1}}")
         for name, weight in self.rewards.items():
@@ -186,6 +194,8 @@ class TrainingSettings:
         shield_settings: of its `ShieldConfig`.
         shield_every: game steps between two questions to the shield in the games learned in; with more than 1 it
             guarantees nothing there. Evaluations ask it in every game step.
+        entrants_every: game steps between two questions to opponents that play one game after another, in the games
+            learned in; with more than 1 they hold their courses in between and cost less. Evaluations ask each step.
         seed: of everything.
         device: where the network learns; "auto" takes a GPU where there is one.
         threads: of the network on a CPU. One is fastest for networks this small: more wait for one another, the more so
@@ -207,6 +217,7 @@ class TrainingSettings:
     shield: str = "none"
     shield_settings: Mapping[str, Any] = field(default_factory=dict)
     shield_every: int = 1
+    entrants_every: int = 1
     ppo: Ppo = field(default_factory=Ppo)
     net: Net = field(default_factory=Net)
     evaluation: Evaluation = field(default_factory=Evaluation)
@@ -227,6 +238,7 @@ class TrainingSettings:
         count("interval", self.interval, 1, 1000)
         count("seed", self.seed, 0, 2**40)
         count("shield_every", self.shield_every, 1, 1000)
+        count("entrants_every", self.entrants_every, 1, 1000)
         count("threads", self.threads, 1, 1024)
         count("checkpoint_every", self.checkpoint_every, 1, 10**6)
         if not self.stages:

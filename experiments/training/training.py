@@ -23,7 +23,7 @@ from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
 from .rewards import WeightedSum
-from .settings import TrainingSettings
+from .settings import Stage, TrainingSettings
 from .state import live_arrays, pool_facts, put_arrays, put_pool, put_rng, rng_facts
 
 BEST, FINAL, MODEL, SNAPSHOTS = "best.npz", "final.npz", "model.zip", "snapshots"
@@ -183,16 +183,16 @@ class Training:
         set_stage(self.batch, self.settings, self.settings.stages[self.stage], self._guard)
 
     def _pool(self) -> Pool:
-        stage = self.settings.stages[self.stage]
-        return Pool(stage.opponents, self.settings.league, self.settings.seed, stage.cooldown_s)
+        settings = self.settings
+        return Pool(settings.stages[self.stage], settings.league, settings.seed, settings.entrants_every)
 
     def _checked_opponents(self) -> None:
         """Build every pool and reward once, so that what is missing is found before long work."""
         for stage in self.settings.stages:
             WeightedSum(self.settings.reward_weights(stage))
-            Pool(stage.opponents, self.settings.league, 0)
+            Pool(stage, self.settings.league, 0)
         for name in self.settings.evaluation.opponents:
-            Pool((name,), self.settings.league, 0)
+            Pool(Stage((name,)), self.settings.league, 0)
 
     def _packed(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         """Facts and copies of arrays of this moment."""

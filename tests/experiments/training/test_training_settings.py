@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.each_game import EachGame
 from steerclear.experiments.training.games import core_of, learners_of
 from steerclear.experiments.training.pool import Pool
-from steerclear.experiments.training.settings import League, settings_of
+from steerclear.experiments.training.settings import League, Stage, settings_of
 from steerclear.shield.exceptions import ConfigError, PolicyError
+from steerclear.shield.platforms import layout as L
 
 
 @pytest.mark.parametrize(
@@ -40,7 +42,7 @@ def test_a_file_that_is_none_or_no_yaml(tmp_path):
 
 def test_a_missing_opponent_and_an_unknown_reward_are_found_at_once():
     with pytest.raises(PolicyError, match="unknown policy 'mediun'; did you mean medium"):
-        Pool(("mediun",), League(), 0)
+        Pool(Stage(("mediun",)), League(), 0)
     with pytest.raises(ConfigError, match="unknown reward term 'capture'; did you mean captures"):
         learners_of(settings_of({"games": 1, "rewards": {"capture": 1.0}}), None)
 
@@ -52,7 +54,7 @@ def test_the_intervention_term_comes_with_its_shield_mode():
 
 
 def test_those_who_beat_the_learner_come_more_often():
-    pool = Pool(("hold", "easy"), League(power=2.0, floor=0.1), 0)
+    pool = Pool(Stage(("hold", "easy")), League(power=2.0, floor=0.1), 0)
     pool.scores["hold"].extend([1.0] * 10)
     pool.scores["easy"].extend([0.0] * 10)
     assert pool.weights() == pytest.approx({"hold": 0.1, "easy": 1.1})
@@ -62,7 +64,7 @@ def test_those_who_beat_the_learner_come_more_often():
 
 def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_rules_say():
     core = core_of(settings_of({"rules": {"tagging_cooldown_s": 10.0}}), 1, 0)
-    pool = Pool(("hold",), League(), 0, cooldown_s=40.0)
+    pool = Pool(Stage(("hold",), cooldown_s=40.0), League(), 0)
     core.reset(seed=0)
     pool.reset(core, 1, 0)
     core.tagging_cooldown_s[:] = 0.0
@@ -77,3 +79,42 @@ def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_r
                 waited[team].append((k + 1) * core.config.decision_s)
     assert min(waited[0]) == pytest.approx(10.0, abs=0.11)
     assert min(waited[1]) == pytest.approx(40.0, abs=0.5)
+
+
+def test_each_game_draws_its_own_handicaps_and_slow_opponents_sail_at_their_share():
+    core = core_of(settings_of({}), 50, 0)
+    stage = Stage(("medium_attack",), cooldown_s=(10.0, 30.0), speed=(0.5, 0.9))
+    core.reset(seed=0)
+    free, slowed = Pool(Stage(("medium_attack",)), League(), 0), Pool(stage, League(), 0)
+    for pool in (free, slowed):
+        pool.reset(core, 1, 0)
+    wanted = free.act(core, 1)
+    assert (slowed.act(core, 1)[..., 0] == wanted[..., 0] * slowed.speeds[:, None]).all()
+    assert (slowed.act(core, 1)[..., 1] == wanted[..., 1]).all()
+    for drawn, least, most in ((slowed.waits_s, 10.0, 30.0), (slowed.speeds, 0.5, 0.9)):
+        assert least <= drawn.min() < least + 0.2 * (most - least)
+        assert most - 0.2 * (most - least) < drawn.max() <= most
+    before = slowed.waits_s.copy()
+    chosen = np.arange(50) < 10
+    slowed.restart(chosen, 1)
+    assert ((slowed.waits_s != before) == chosen).all()
+
+
+@pytest.mark.parametrize("wrong", [[20, 10], [10], [10, 20, 30], ["a", "b"], [-1, 5]])
+def test_a_span_is_two_numbers_the_least_first(wrong):
+    with pytest.raises(ConfigError, match="cooldown_s"):
+        settings_of({"stages": [{"cooldown_s": wrong}]})
+
+
+def test_a_policy_of_single_games_that_is_asked_seldom_holds_its_courses_in_between():
+    core = core_of(settings_of({}), 1, 0)
+    core.reset(seed=3)
+    seldom = EachGame("meo", 10)
+    seldom.reset(core, 1, 0)
+    courses, commands = [], np.zeros((1, core.n_boats, 2))
+    for _ in range(30):
+        commands[:, 3:] = seldom.act(core, 1)
+        courses.append((core.state[0, 3:, L.HEADING] + commands[0, 3:, 1]) % 360.0)
+        core.step(commands)
+    changed = [k for k in range(1, 30) if not np.allclose(courses[k], courses[k - 1], atol=1e-6)]
+    assert changed == [10, 20]
