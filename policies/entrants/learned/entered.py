@@ -22,6 +22,7 @@ ABOUT = {
     "jin": ("capture-seeking PPO, a stand-in: the team's code was never shared", "Jin-Indep"),
     "leprell": ("decentralised PPO on captures and grabs alone (Leprell-USMA)", "Leprell-USMA"),
     "richley": ("QMIX, and PPO once the flag is held (Richley-NIWC-ATL)", "Richley-NIWC-ATL"),
+    "swell": ("PPO by the rules of aamas2024 against medium alone, begun with jin", ""),
     "surge": ("PPO in the game of 2025 against medium alone, begun with jin", ""),
     "ours": ("PPO in the game of 2025, begun with surge: the team to start from, with the shield", ""),
 }
