@@ -14,7 +14,7 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 
 from .each_game import EachGame
-from .settings import League, Span, Stage
+from .settings import League, Stage
 
 SELF = "self"
 LAST = 50
@@ -41,8 +41,8 @@ class Pool:
     """A `BatchPolicy` made of several.
 
     Args:
-        stage: whose opponents they are, how fast they sail and how long they wait between tags; "self" among them
-            stands for the snapshots added by `add_snapshot`.
+        stage: whose opponents they are, and how long they wait between tags; "self" among them stands for the snapshots
+            added by `add_snapshot`.
         league: the matching rule and how many snapshots are kept.
         seed: of the draws.
         every: game steps between two questions to members that play one game after another.
@@ -84,20 +84,13 @@ class Pool:
         for member in self.members.values():
             member.reset(core, team, seed)
         self.playing = np.array([self._draw() for _ in range(core.n_games)], dtype=object)
-        self.speeds, self.waits_s = np.ones(core.n_games), np.zeros(core.n_games)
-        self._handicap(np.ones(core.n_games, np.bool_))
+        self.waits_s = self._waits(core.n_games)
         self._out = np.zeros((core.n_games, int(np.sum(core.team == team)), 2))
 
-    def _handicap(self, chosen: BoolArray) -> None:
-        """Draw speeds and times between tags of the chosen games (B,)."""
-        self.speeds[chosen] = self._drawn(self.stage.speed, chosen)
-        self.waits_s[chosen] = self._drawn(self.stage.cooldown_s or 0.0, chosen)
-
-    def _drawn(self, span: Span, chosen: BoolArray) -> Array:
-        """A number of the span for each of the chosen games."""
-        if not isinstance(span, tuple):
-            return np.full(int(np.sum(chosen)), span)
-        return self._rng.uniform(*span, int(np.sum(chosen)))
+    def _waits(self, games: int) -> Array:
+        """Times between tags, s, of so many games (games,)."""
+        cooldown_s = self.stage.cooldown_s or 0.0
+        return self._rng.uniform(*cooldown_s, games) if isinstance(cooldown_s, tuple) else np.full(games, cooldown_s)
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
         """Begin the chosen games (B,) anew, each with an opponent drawn anew."""
@@ -105,7 +98,7 @@ class Pool:
             member.restart(chosen, seed)
         for game in np.flatnonzero(chosen):
             self.playing[game] = self._draw()
-        self._handicap(chosen)
+        self.waits_s[chosen] = self._waits(int(np.sum(chosen)))
 
     def act(self, core: Any, team: int) -> Array:
         """Commands (B, n_team, 2); the array is reused by the next call."""
@@ -117,7 +110,6 @@ class Pool:
                 if isinstance(member, EachGame):
                     member.plays(mine)
                 self._out[mine] = member.act(core, team)[mine]
-        self._out[..., 0] *= self.speeds[:, None]
         return self._out
 
     def ended(self, core: Any, games: BoolArray) -> None:

@@ -39,8 +39,6 @@ class Stage:
         most: decisions.
         tag_probability: chance that a tag of either team succeeds in this stage, so that boats learn to bring flags
             home before they learn to keep away from tags; None: as in the rules. Evaluations are always by the rules.
-        speed: share of the speed they ask for at which opponents sail in this stage; slow ones are outrun, and faster
-            ones have to be led astray first. Two numbers: each game draws its own between them.
         cooldown_s: time in which an opponent that has tagged cannot tag again in this stage, at least the rules'; with
             more, a team learns to draw a tag first and to use the time after it. Two numbers: each game draws its own
             between them. None: as in the rules.
@@ -54,7 +52,6 @@ class Stage:
     most: int = 0
     tag_probability: float | None = None
     cooldown_s: Span | None = None
-    speed: Span = 1.0
     rewards: Mapping[str, float] = field(default_factory=dict)
     shielded: bool = True
 
@@ -67,7 +64,6 @@ class Stage:
             number("tag_probability", self.tag_probability, 0.0, 1.0)
         if self.cooldown_s is not None:
             object.__setattr__(self, "cooldown_s", span("cooldown_s", self.cooldown_s, 0.0, 1e6))
-        object.__setattr__(self, "speed", span("speed", self.speed, 0.0, 1.0))
         if not isinstance(self.rewards, Mapping):
             raise ConfigError(f"rewards is {self.rewards!r}; give names and weights, such as {{collision: 0.1}}")
         for name, weight in self.rewards.items():

@@ -58,7 +58,6 @@ def pool_facts(pool: Pool) -> dict[str, Any]:
         "members": list(pool.members),
         "playing": [str(name) for name in pool.playing],
         "waits_s": pool.waits_s.tolist(),
-        "speeds": pool.speeds.tolist(),
         "scores": {name: list(scores) for name, scores in pool.scores.items()},
         "rng": pool._rng.bit_generator.state,
     }
@@ -67,7 +66,7 @@ def pool_facts(pool: Pool) -> dict[str, Any]:
 def put_pool(pool: Pool, facts: dict[str, Any]) -> None:
     """Put what `pool_facts` told into a pool with the same members."""
     pool.playing[:] = facts["playing"]
-    pool.waits_s[:], pool.speeds[:] = facts["waits_s"], facts["speeds"]
+    pool.waits_s[:] = facts["waits_s"]
     for name, scores in facts["scores"].items():
         pool.scores[name].clear()
         pool.scores[name].extend(scores)

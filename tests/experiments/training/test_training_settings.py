@@ -81,23 +81,24 @@ def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_r
     assert min(waited[1]) == pytest.approx(40.0, abs=0.5)
 
 
-def test_each_game_draws_its_own_handicaps_and_slow_opponents_sail_at_their_share():
+def test_each_game_draws_how_long_its_opponents_wait_and_anew_when_it_begins_anew():
     core = core_of(settings_of({}), 50, 0)
-    stage = Stage(("medium_attack",), cooldown_s=(10.0, 30.0), speed=(0.5, 0.9))
     core.reset(seed=0)
-    free, slowed = Pool(Stage(("medium_attack",)), League(), 0), Pool(stage, League(), 0)
-    for pool in (free, slowed):
-        pool.reset(core, 1, 0)
-    wanted = free.act(core, 1)
-    assert (slowed.act(core, 1)[..., 0] == wanted[..., 0] * slowed.speeds[:, None]).all()
-    assert (slowed.act(core, 1)[..., 1] == wanted[..., 1]).all()
-    for drawn, least, most in ((slowed.waits_s, 10.0, 30.0), (slowed.speeds, 0.5, 0.9)):
-        assert least <= drawn.min() < least + 0.2 * (most - least)
-        assert most - 0.2 * (most - least) < drawn.max() <= most
-    before = slowed.waits_s.copy()
+    pool = Pool(Stage(("hold",), cooldown_s=(10.0, 30.0)), League(), 0)
+    pool.reset(core, 1, 0)
+    before = pool.waits_s.copy()
+    assert 10.0 <= before.min() < 14.0
+    assert 26.0 < before.max() <= 30.0
     chosen = np.arange(50) < 10
-    slowed.restart(chosen, 1)
-    assert ((slowed.waits_s != before) == chosen).all()
+    pool.restart(chosen, 1)
+    assert ((pool.waits_s != before) == chosen).all()
+    core.tagging_cooldown_s[:] = 0.0
+    for _ in range(100):
+        pool.act(core, 1)
+        core.step(np.zeros((50, core.n_boats, 2)))
+    assert core.tagging_cooldown_s[:, 3:] == pytest.approx(
+        np.repeat(100.0 / pool.waits_s[:, None], 3, axis=1), abs=0.11
+    )
 
 
 @pytest.mark.parametrize("wrong", [[20, 10], [10], [10, 20, 30], ["a", "b"], [-1, 5]])
