@@ -99,6 +99,15 @@ def test_a_stage_may_have_rewards_of_its_own_and_no_shield_and_resumes_bit_for_b
     assert (min(shield_s) == 0.0, shield_s[-1] > 0.0) == (True, True)
 
 
+def test_a_resumed_training_knows_how_long_the_opponents_of_each_game_wait(tiny, tmp_path):
+    config = tiny(rules={"max_time_s": 60.0}, stages=[{"opponents": ["medium"], "cooldown_s": [10, 40]}])
+    begun = Training(read_config(config), tmp_path / "run")
+    with pytest.raises(KeyboardInterrupt):
+        begun.run(stop_at(72))
+    resumed = Training(read_config(config), tmp_path / "run", resume=True)
+    np.testing.assert_array_equal(resumed.batch.opponent.waits_s, begun.batch.opponent.waits_s)
+
+
 @pytest.mark.parametrize("roles", ["placed", "each"])
 def test_the_critic_may_learn_alone_at_first_and_a_resumed_training_knows_how_long(tiny, tmp_path, roles):
     config = tiny(ppo={"steps": 6, "batch": 18, "epochs": 2, "critic_first": 3}, net={"hidden": [16], "roles": roles})
