@@ -100,7 +100,7 @@ def test_a_stage_may_have_rewards_of_its_own_and_no_shield_and_resumes_bit_for_b
 
 
 def test_a_resumed_training_knows_how_long_the_opponents_of_each_game_wait(tiny, tmp_path):
-    config = tiny(rules={"max_time_s": 60.0}, stages=[{"opponents": ["medium"], "cooldown_s": [10, 40]}])
+    config = tiny(stages=[{"opponents": ["medium"], "cooldown_s": [10, 40]}])
     begun = Training(read_config(config), tmp_path / "run")
     with pytest.raises(KeyboardInterrupt):
         begun.run(stop_at(72))
