@@ -52,7 +52,6 @@ COSTS = {
     "horizon_s": Cost("s", "shorter: backups end before they are proved clear", _METHOD),
     "search_limit": Cost("clearances", "lower: large crowds are decided sooner, and less well", _STUDY),
     "dwell_s": Cost("s", "0: under a rammer such boats are told port and starboard in turn, 4 times a second", _STUDY),
-    "hysteresis_m": Cost("m", "0: backups flip", _METHOD),
     "speed_weight": Cost("", "higher: turns rather than slows down", _METHOD),
     "position_error_m": Cost("m", "widens the separation twice", "[conditions](conditions.md)"),
     "current_mps": Cost(

@@ -3,112 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from .arrays import NoNumbersError, numbers, truths, whole_numbers
-from .barriers.boats import reported_margin
-from .barriers.value_function import WAYS
 from .config import ShieldConfig
+from .deciders import Deciders
 from .exceptions import ConfigError, FleetError
-from .filter.flow import decide_compiled
-from .fleet import LARGEST, LARGEST_SPEED_MPS, foreseeable
+from .filter.program import solver_of
+from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .game_facts import facts_of_games, warn_of_distances
-from .jit import Array, BoolArray, IntArray, copy_row, kernel
+from .jit import Array, BoolArray
 from .kept_barriers import KeptBarriers
-from .memory import Memory, new_memory, put_memory, take_memory
-from .plan import new_plan
 from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
-from .scene import Scene, new_scene, path_samples
-from .setup import boats_of, tuning_of
+from .setup import boats_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.driving import driven_boats
-from .tracking.tracks import fill_memory, queue_commands, run_on_commands, steps_of_delay, turn_round
-from .work import new_work
-
-
-class Asked(NamedTuple):
-    """What is to be decided about, of B games of n boats.
-
-    Attributes:
-        state: (B, n, N_STATE) boat states.
-        wanted: (B, n, 2) wanted commands.
-        ours: (B, n) boats to decide for.
-        fear_s: (B, n) time for which each opponent may do its worst, s.
-        driven: (B, n, 4) what drives boats that something drives, see `Fleet.driven`.
-        known: (B, n) boats whose way is foreseen by that.
-    """
-
-    state: Array
-    wanted: Array
-    ours: BoolArray
-    fear_s: Array
-    driven: Array
-    known: BoolArray
-
-
-class Decided(NamedTuple):
-    """What is decided: see `BatchedShield.decide`."""
-
-    sent: Array
-    reason: IntArray
-    certificate_m: Array
-    cut_short: BoolArray
-
-
-@kernel
-def decide_games(
-    asked: Asked,
-    decided: Decided,
-    scene: Scene,
-    memory: Memory,
-    pending: Array,
-    error_m: Array,
-    late_m: float,
-) -> None:
-    """Decide for every game in turn, for the moment its commands take effect.
-
-    ``scene`` serves one game after another, each with its own part of ``memory``.
-    """
-    n = asked.state.shape[1]
-    boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    ahead, wanted, margin_m = np.empty_like(asked.state[0]), np.empty_like(asked.wanted[0]), np.empty(n)
-    for b in range(asked.state.shape[0]):
-        state, ours, sent = asked.state[b], asked.ours[b], decided.sent[b]
-        ahead[:] = state
-        turn_round(ahead, ours)
-        fill_memory(ahead, boats.params)
-        run_on_commands(ahead, ours, boats.params, pending[b], tuning.dt_s)
-        for i in range(n):
-            wanted[i] = asked.wanted[b, i]
-            margin_m[i] = error_m[i] if ours[i] else error_m[i] + late_m
-            if ahead[i, L.HEADING] != state[i, L.HEADING]:
-                wanted[i, 1] += state[i, L.HEADING] - ahead[i, L.HEADING]
-        copy_row(work.fear_s, asked.fear_s[b])
-        work.driven[:], work.known[:] = asked.driven[b], asked.known[b]
-        take_memory(memory, b, scene.memory)
-        decide_compiled(scene, ahead, wanted, margin_m, ours)
-        put_memory(scene.memory, b, memory)
-        decided.cut_short[b] = work.cut_short[0]
-        for i in range(n):
-            sent[i] = asked.wanted[b, i]
-            if plan.commands[i, 0] != wanted[i, 0] or plan.commands[i, 1] != wanted[i, 1]:
-                sent[i, 0] = plan.commands[i, 0]
-                sent[i, 1] = plan.commands[i, 1] + ahead[i, L.HEADING] - state[i, L.HEADING]
-            decided.reason[b, i] = plan.reason[i]
-            decided.certificate_m[b, i] = reported_margin(i, ahead, work) if ours[i] else np.inf
-        if pending.shape[1] > 0:
-            queue_commands(pending[b], ahead, plan.commands)
 
 
 class BatchedShield:
-    """`Shield` for B games of the same fleet, with the exact compiled projection as its QP solver.
+    """`Shield` for B games of the same fleet.
 
-    Decisions are those of `Shield` to rounding: the stages are the same functions. Tracks are taken as fresh and
-    exact up to ``position_error_m``. It decides for one thread at a time, as `Shield` does.
+    Decisions are those of `Shield`, bit for bit: it is a batch of one. Tracks are taken as fresh and exact up to
+    ``position_error_m``. It decides for one thread at a time, as `Shield` does.
 
     Args:
         config: settings; coordination must be "team".
@@ -117,6 +37,12 @@ class BatchedShield:
         team: team of the n boats.
         surroundings: static constraints, the same for all games.
         flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
+
+    Attributes:
+        sent: (B, n, 2) commands of the last decisions; this and the others are written anew by every call.
+        reason: (B, n) why each is what it is, values of `decision.Reason`.
+        certificate_m: (B, n) margins, m.
+        serves: the team it has decided for since `reset`, where games use it; None: none yet.
 
     Raises:
         ConfigError: a setting that a batch cannot honour, or that is none.
@@ -144,28 +70,18 @@ class BatchedShield:
             raise ConfigError(
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
             )
-        n = len(self.platforms)
         boats = boats_of(config, self.platforms, self.team)
-        self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-        self._memory = new_memory(games, n)
         self._barriers = KeptBarriers(config)
-        self._scene = new_scene(
-            boats=boats,
-            around=(surroundings.pack(config), self._barriers.arrays),
-            tuning=tuning_of(config),
-            memory=new_memory(n),
-            work=new_work(n, path_samples(boats)),
-            plan=new_plan(n, n * ((WAYS + 1) * n + 6) + 2),
-        )
-        self._margin = np.full(n, config.position_error_m)
-        self._late_m = config.track_error_mps * config.delay_s
-        self._pending = np.full((games, steps_of_delay(config), n, 2), np.nan)
-        self.reason = np.zeros((games, n), np.int64)
-        self.certificate_m = np.full((games, n), np.inf)
-        self.sent = np.zeros((games, n, 2))
-        self._undriven = np.full((games, n, 4), np.nan)
-        self.cut_short = np.zeros(games, np.bool_)
+        self._deciders = Deciders(config, games, boats, self._barriers.arrays, solver_of(config.solver))
+        self._static = surroundings.pack(config)
+        decided = self._deciders.decided
+        self.sent, self.reason, self.certificate_m = decided.sent, decided.reason, decided.certificate_m
         self.serves: int | None = None
+
+    @property
+    def cut_short(self) -> BoolArray:
+        """(B,) which of the last decisions were ended by `ShieldConfig.search_limit`."""
+        return np.asarray(self._deciders.decided.cut_short.any(axis=1))
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
@@ -175,9 +91,7 @@ class BatchedShield:
         """
         which = slice(None) if mask is None else _mask(mask, len(self.reason))
         self.serves = None if mask is None else self.serves
-        self._memory.kept[which] = False
-        self._memory.backing_up[which] = False
-        self._pending[which] = np.nan
+        self._deciders.forget(which)
 
     def decide(
         self,
@@ -210,19 +124,16 @@ class BatchedShield:
         state = _shaped("state", state, (*games, L.N_STATE), numbers)
         wanted = _shaped("wanted", wanted, (*games, 2), numbers)
         ours = _shaped("ours", ours, games, truths)
-        seen = np.zeros(games, np.bool_) if visiting is None else _shaped("visiting", visiting, games, truths)
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        fear_s = np.where(seen, self.config.visitor_feared_s, self.config.feared_s)
-        driven = self._undriven if driven is None else _shaped("driven", driven, (*games, 4), numbers)
-        known = np.empty(games, np.bool_)
-        foreseeable(driven.reshape(-1, 4), ours.reshape(-1), self._horizon_s, known.reshape(-1))
-        asked = Asked(state, wanted, ours, fear_s, driven, known)
-        decided = Decided(self.sent, self.reason, self.certificate_m, self.cut_short)
+        asked = self._deciders.asked
+        asked.state[:], asked.wanted[:], asked.ours[:] = state, wanted, ours
+        asked.visiting[:] = False if visiting is None else _shaped("visiting", visiting, games, truths)
+        asked.driven[:] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
         self._barriers.renew()
-        decide_games(asked, decided, self._scene, self._memory, self._pending, self._margin, self._late_m)
+        self._deciders.decide(self._static)
         self._barriers.tell()
         return self.sent
 

@@ -35,7 +35,7 @@ class ShieldConfig:
         certificate: name of the certificate, see `backup.families.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
-        solver: QP backend, a name known to qpsolvers.
+        solver: what solves the program: "active_set", the compiled solver, or a backend by its name in qpsolvers.
         adversary_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds its
             course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and the more
             commands are changed. Against a boat that is slow it counts from when that is under way, see
@@ -64,7 +64,6 @@ class ShieldConfig:
             1000, which lets six boats look at every manoeuvre; inf: no limit.
         dwell_s: least time for which boats of kind "rate", which turn at once, carry on with a backup from opponents
             that keep them short of `margin_cap_m`; 0: none. Other boats' autopilots smooth what they are told.
-        hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         speed_weight: cost of changing the commanded speed by top speed; centring a full rudder costs 1.
         position_error_m: bound on the error of every reported position, m; widens the separation twice, and once
             what is kept from the edge, obstacles and circles.
@@ -89,7 +88,7 @@ class ShieldConfig:
     move_s: float | None = None
     certificate: str = "auto"
     coordination: str = "team"
-    solver: str = "daqp"
+    solver: str = "active_set"
     adversary_s: float | None = None
     visitor_s: float | None = None
     profile: str = "players"
@@ -104,7 +103,6 @@ class ShieldConfig:
     horizon_s: float | None = None
     search_limit: float = 200_000.0
     dwell_s: float = 0.4
-    hysteresis_m: float = 0.3
     speed_weight: float = 0.1
     position_error_m: float = 0.0
     current_mps: float = 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -44,22 +43,6 @@ def sound(state: Array) -> bool:
         if abs(state[i, L.SPEED]) > LARGEST_SPEED_MPS:
             return False
     return True
-
-
-@kernel
-def foreseeable(driven: Array, controlled: BoolArray, horizon_s: float, known: BoolArray) -> bool:
-    """Mark the boats whose way is foreseen by their row of ``driven``, see `Fleet.driven`; returns whether one is.
-
-    That takes a speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at
-    all, from which everything keeps clear.
-    """
-    some = False
-    for i in range(driven.shape[0]):
-        speed_mps, x_m, y_m = driven[i, 0], driven[i, 1], driven[i, 2]
-        place = (math.isnan(x_m) and math.isnan(y_m)) or (abs(x_m) <= LARGEST and abs(y_m) <= LARGEST)
-        known[i] = not controlled[i] and place and 0.0 <= speed_mps <= LARGEST_SPEED_MPS and driven[i, 3] >= horizon_s
-        some = some or known[i]
-    return some
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ class Memory(NamedTuple):
 
 
 def new_memory(*shape: int) -> Memory:
-    """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (games, n)."""
+    """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (deciders, n)."""
     return share(
         Memory(
             kept=np.zeros(shape, np.bool_),
@@ -72,41 +72,46 @@ def new_memory(*shape: int) -> Memory:
     )
 
 
-@kernel
-def take_memory(games: Memory, game: int, own: Memory) -> None:
-    """Copy the memory of one of many games."""
-    own.kept[:] = games.kept[game]
-    own.side[:] = games.side[game]
-    own.target_deg[:] = games.target_deg[game]
-    own.speed_mps[:] = games.speed_mps[game]
-    own.margin_m[:] = games.margin_m[game]
-    own.threat_m[:] = games.threat_m[game]
-    own.joint_m[:] = games.joint_m[game]
-    own.static_m[:] = games.static_m[game]
-    own.backing_up[:] = games.backing_up[game]
-    own.dwell_s[:] = games.dwell_s[game]
-    own.pressed_s[:] = games.pressed_s[game]
-    own.pressed_deg[:] = games.pressed_deg[game]
-    own.free_s[:] = games.free_s[game]
-    own.blocked_by[:] = games.blocked_by[game]
-    own.gives_way[:] = games.gives_way[game]
+def part_of(memory: Memory, which: int) -> Memory:
+    """The memory of one of many deciders: views, not copies."""
+    return Memory(*(values[which] for values in memory))
 
 
 @kernel
-def put_memory(own: Memory, game: int, games: Memory) -> None:
-    """Copy the memory of one game back to its place among many."""
-    games.kept[game] = own.kept
-    games.side[game] = own.side
-    games.target_deg[game] = own.target_deg
-    games.speed_mps[game] = own.speed_mps
-    games.margin_m[game] = own.margin_m
-    games.threat_m[game] = own.threat_m
-    games.joint_m[game] = own.joint_m
-    games.static_m[game] = own.static_m
-    games.backing_up[game] = own.backing_up
-    games.dwell_s[game] = own.dwell_s
-    games.pressed_s[game] = own.pressed_s
-    games.pressed_deg[game] = own.pressed_deg
-    games.free_s[game] = own.free_s
-    games.blocked_by[game] = own.blocked_by
-    games.gives_way[game] = own.gives_way
+def take_memory(all_memory: Memory, which: int, own: Memory) -> None:
+    """Copy the memory of one of many deciders."""
+    own.kept[:] = all_memory.kept[which]
+    own.side[:] = all_memory.side[which]
+    own.target_deg[:] = all_memory.target_deg[which]
+    own.speed_mps[:] = all_memory.speed_mps[which]
+    own.margin_m[:] = all_memory.margin_m[which]
+    own.threat_m[:] = all_memory.threat_m[which]
+    own.joint_m[:] = all_memory.joint_m[which]
+    own.static_m[:] = all_memory.static_m[which]
+    own.backing_up[:] = all_memory.backing_up[which]
+    own.dwell_s[:] = all_memory.dwell_s[which]
+    own.pressed_s[:] = all_memory.pressed_s[which]
+    own.pressed_deg[:] = all_memory.pressed_deg[which]
+    own.free_s[:] = all_memory.free_s[which]
+    own.blocked_by[:] = all_memory.blocked_by[which]
+    own.gives_way[:] = all_memory.gives_way[which]
+
+
+@kernel
+def put_memory(own: Memory, which: int, all_memory: Memory) -> None:
+    """Copy the memory of one decider back to its place among many."""
+    all_memory.kept[which] = own.kept
+    all_memory.side[which] = own.side
+    all_memory.target_deg[which] = own.target_deg
+    all_memory.speed_mps[which] = own.speed_mps
+    all_memory.margin_m[which] = own.margin_m
+    all_memory.threat_m[which] = own.threat_m
+    all_memory.joint_m[which] = own.joint_m
+    all_memory.static_m[which] = own.static_m
+    all_memory.backing_up[which] = own.backing_up
+    all_memory.dwell_s[which] = own.dwell_s
+    all_memory.pressed_s[which] = own.pressed_s
+    all_memory.pressed_deg[which] = own.pressed_deg
+    all_memory.free_s[which] = own.free_s
+    all_memory.blocked_by[which] = own.blocked_by
+    all_memory.gives_way[which] = own.gives_way

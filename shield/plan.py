@@ -18,8 +18,10 @@ LARGEST_COMMAND = 1e6
 class Plan(NamedTuple):
     """Arrays of the quadratic program of one decision (n boats, at most ``rows`` rows).
 
-    ``cause`` is what a boat's wanted command is short of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each
-    backup the turn, deg, the speed, m/s, and the rank, see `easing`.
+    ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
+    ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
+    of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each backup the turn, deg, the speed, m/s, and the
+    rank, see `easing`.
     """
 
     commands: Array

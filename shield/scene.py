@@ -148,12 +148,16 @@ class Tuning(NamedTuple):
         radius_m: separation radius with buffer, m.
         buffer_m: the buffer in it, m.
         tail_s: how long straight runs are continued beyond the horizon, s.
-        hysteresis_m: margin by which another manoeuvre must be better to replace the one under way, m.
         margin_cap_m: margins above this are not looked at closely, m.
         speed_weight: cost of changing the commanded speed by top speed, full rudder to no rudder costing 1.
         mate_cap_m: margins from team-mates above this may shrink freely, m.
         static_decay: factor by which a margin from static constraints may shrink in one step.
         give_way_after_s: time a boat is kept from turning by another alongside before one of them gives way, s.
+        feared_s: time for which an opponent may do its worst, s; 0: nobody is feared.
+        visitor_s: the same of opponents on our side of a field, s.
+        position_error_m: bound on the error of every position, m.
+        delay_s: time from own commands to their effect, s.
+        track_error_mps: how fast what is known of a position goes bad, m/s.
         search_limit: cost at which a decision searches no further, see `backup.effort`.
     """
 
@@ -163,12 +167,16 @@ class Tuning(NamedTuple):
     radius_m: float
     buffer_m: float
     tail_s: float
-    hysteresis_m: float
     margin_cap_m: float
     speed_weight: float
     mate_cap_m: float
     static_decay: float
     give_way_after_s: float
+    feared_s: float
+    visitor_s: float
+    position_error_m: float
+    delay_s: float
+    track_error_mps: float
     search_limit: float
 
 

@@ -58,12 +58,16 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             radius_m=config.separation_m + config.buffer_m,
             buffer_m=config.buffer_m,
             tail_s=config.tail_s,
-            hysteresis_m=config.hysteresis_m,
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
             mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
             static_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
+            feared_s=config.feared_s if fears_somebody(config) else 0.0,
+            visitor_s=config.visitor_feared_s,
+            position_error_m=config.position_error_m,
+            delay_s=config.delay_s,
+            track_error_mps=config.track_error_mps,
             search_limit=config.search_limit,
         )
     )

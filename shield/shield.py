@@ -4,67 +4,44 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from .barriers.value_function import WAYS
 from .commands import Commands
 from .config import ShieldConfig
+from .deciders import Asked, Decided, Deciders
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
-from .filter.answer import Answer, less_turn, to_send
-from .filter.flow import PASSES, ROUNDS, SAFE, TO_SOLVE, UNSAFE, accept, begin, finish, linearise
 from .filter.limiting import tell_of_limits, within_limits
-from .filter.program import Program, solve
-from .fleet import Fleet, foreseeable
+from .filter.program import Solver, solver_of
+from .fleet import Fleet
 from .jit import Array, BoolArray
 from .kept_barriers import KeptBarriers
-from .memory import Memory, new_memory
+from .memory import part_of
 from .ordering import as_given, order_of, ordered
-from .plan import Plan, new_plan
 from .platforms import layout as L
-from .scene import Boats, Registered, Scene, Static, Tuning, new_scene, path_samples
+from .scene import Boats, Static
 from .setup import boats_of, missing_tables, tuning_of
 from .surroundings import OPEN_WATER, Surroundings
 from .tracking.autopilots import Autopilots, all_known, unknown_memory
-from .tracking.fears import note_fears
 from .tracking.remembering import Known, Stayed, carry_over, meets_new
-from .tracking.tracks import prepare, queue_commands, steps_of_delay
+from .tracking.tracks import check_ages
 from .warming import tight_spot
-from .work import Work, new_work
-
-MOST_ROWS = 3000
-"""Where a program would have more rows than this, the backups are sent instead."""
-
-
-@dataclass
-class _Seat:
-    """Working memory of one decider: the team, or one boat of it; and the scene it was last used in."""
-
-    memory: Memory
-    work: Work
-    plan: Plan
-    scene: Scene | None = None
-
-    def scene_of(self, boats: Boats, static: Static, registered: Registered, tuning: Tuning) -> Scene:
-        """The scene with these boats and static constraints; manoeuvres and settings are always the shield's."""
-        if self.scene is None or self.scene.boats is not boats or self.scene.static is not static:
-            self.scene = new_scene(boats, (static, registered), tuning, self.memory, self.work, self.plan)
-        return self.scene
 
 
 class Shield:
     """Filters commanded heading and speed so that boats keep their distance.
 
     Every step, `decide` sends a wanted command on unchanged when every boat still has a backup after it (and no two
-    team-mates have kept each other from turning for seconds, see `right_of_way`), and otherwise the least change that
-    keeps one,
+    team-mates have kept each other from turning for seconds, see `right_of_way`). Among team-mates it is otherwise the
+    least change that keeps one,
 
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
-    with u the turn and speed of this step, chosen through the autopilot. What it remembers between calls is the backup
+    with u the turn and speed of this step, chosen through the autopilot; against opponents the backup, and along edges
+    as little of it as will do. What it remembers between calls is the backup
     of each boat, its margins, the commands on their way and, where nobody tells it, its autopilot's memory, for as long
     as the boat (name, platform, team) is in the fleet; the same sequence of inputs from `reset` on gives the same bits.
     It takes one call per step of the settings, and boats that do what was sent. It decides for one thread at a time:
@@ -99,13 +76,11 @@ class Shield:
         self._last_around: tuple[Surroundings, Static] | None = None
         self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._kept_from: Static | None = None
-        self._seats: list[_Seat] = []
+        self._deciders: Deciders | None = None
         self._boats: Boats | None = None
-        self._horizon_s = 0.0
         self._missing: BoolArray | None = None
         self._known: Known | None = None
         self.serves: object | None = None
-        self._pending = np.zeros((0, 0, 2))
         self._autopilots: Autopilots | None = None
 
     @classmethod
@@ -148,7 +123,9 @@ class Shield:
         if fleet is not None:
             fleet.check()
             order = order_of(fleet.names)
-            twin._scene(fleet if order is None else ordered(fleet, Commands.relative_deg(fleet.state[:, :2]), order)[0])
+            twin._deciders_of(
+                fleet if order is None else ordered(fleet, Commands.relative_deg(fleet.state[:, :2]), order)[0]
+            )
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
@@ -183,40 +160,36 @@ class Shield:
 
     def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
         """`decide`, of boats in the order of their names."""
-        boats = self._scene(fleet)
-        self._foresee(fleet)
-        feared_s = self._fear(fleet)
+        boats, deciders = self._deciders_of(fleet)
+        check_ages(fleet, self.config)
         within, cut = within_limits(wanted, fleet, boats.params)
         seen, unknown = self._with_memory(fleet)
-        state, margin = prepare(seen, self.config, boats.params, self._pending)
-        turned = state[:, L.HEADING] - fleet.state[:, L.HEADING]  # until the command takes effect
-        asked = less_turn(within.as_relative_deg(fleet.state[:, L.HEADING]), turned)
-        static = self._around(self.surroundings if surroundings is None else surroundings)
+        static = self._around(self.surroundings if surroundings is None else surroundings, deciders)
+        works = deciders.pending[0, 0].copy() if deciders.pending.size > 0 else None
+        self._ask(seen, within, deciders.asked)
         self._barriers.renew()
-        if self.config.coordination == "team":
-            seat = self._seats[0]
-            self._run(seat, state, asked, margin, fleet.controlled, boats, static)
-            answer = Answer(seat.plan, seat.work, state)
-        else:
-            answer = self._each(state, asked, margin, fleet.controlled, boats, static)
-        sent, changed, bound = to_send(fleet, within, asked, turned, answer)
+        decided = self._decided(static, deciders)
         self._barriers.tell()
+        sent, changed, reason = within, decided.changed, decided.reason
+        if changed.any():
+            sent = within.replaced(changed, decided.sent, fleet.state[:, L.HEADING])
         if cut is not None:
-            changed = tell_of_limits(cut, changed, answer)
-        self._note_sent(seen, unknown, sent, boats)
+            changed = tell_of_limits(cut, changed, reason)
+        if unknown is not None:
+            self._follow(unknown, works, sent, fleet, boats)
         return Decisions(
             fleet=fleet,
             wanted=wanted,
             sent=sent,
             intervened=changed,
-            reason=answer.reason,
-            certificate_m=answer.margin,
-            slack_m=answer.slack,
-            bound=bound,
+            reason=reason,
+            certificate_m=decided.certificate_m,
+            slack_m=decided.slack_m,
+            bound=decided.bound,
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
-            cut_short=answer.cut_short,
-            feared_s=feared_s,
+            cut_short=decided.cut_short,
+            feared_s=decided.feared_s,
             barriers=self.config.barriers,
         )
 
@@ -235,53 +208,67 @@ class Shield:
 
         return wrap_policy(policy, self, read)
 
-    def _scene(self, fleet: Fleet) -> Boats:
-        """Boat constants; new working memory when the fleet is not the one of the last call."""
-        if self._boats is None or self._known is None or self._known != Known.of(fleet):
+    def _deciders_of(self, fleet: Fleet) -> tuple[Boats, Deciders]:
+        """Boat constants and deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
+        if self._boats is None or self._deciders is None or self._known is None or self._known != Known.of(fleet):
             kinds = self.config, fleet.platforms, tuple(int(t) for t in fleet.team)
             boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
-            self._seat(fleet, boats)
+            number = 1 if self.config.coordination == "team" else len(fleet)
+            new = Deciders(self.config, number, boats, self._barriers.arrays, self._solver())
+            self._deciders = self._with_old(fleet, new, boats)
             self._boats, self._known = boats, Known.of(fleet)
-            self._horizon_s = float(boats.samples.max(initial=0)) * boats.sample_s
-        return self._boats
+        return self._boats, self._deciders
 
-    def _foresee(self, fleet: Fleet) -> None:
-        """Note which boats' ways are foreseen: those pursue nobody."""
-        driven, known = fleet.driven, self._seats[0].work.known
-        if driven is None or not foreseeable(driven, fleet.controlled, self._horizon_s, known):
-            known[:] = False
-        for seat in self._seats:
-            seat.work.known[:] = known
-            if driven is not None:
-                seat.work.driven[:] = driven
+    def _solver(self) -> Solver | None:
+        """What answers programs; None: the compiled solver. A method, so that programs can be looked at."""
+        return solver_of(self.config.solver)
 
-    def _fear(self, fleet: Fleet) -> Array:
-        """Note how long each boat may do its worst; (n,) s as it is told, see `note_fears`."""
-        first = self._seats[0].work
-        told_s = note_fears(fleet, self.config, first)
-        for seat in self._seats[1:]:
-            seat.work.fear_s[:] = first.fear_s
-        return told_s
-
-    def _seat(self, fleet: Fleet, boats: Boats) -> None:
-        """Make room for the boats of a fleet; those that were there before keep what is remembered of them."""
-        n, old, sent = len(fleet), self._seats, self._pending
-        rows = min(n * ((WAYS + 1) * n + 6) + 2, MOST_ROWS)
-        team, samples = self.config.coordination == "team", path_samples(boats)
-        deciders = 1 if team else max(1, n)
-        self._seats = [_Seat(new_memory(n), new_work(n, samples), new_plan(n, rows)) for _ in range(deciders)]
-        self._pending = np.full((steps_of_delay(self.config), n, 2), np.nan)
-        believed, self._autopilots = self._autopilots, None
+    def _with_old(self, fleet: Fleet, new: Deciders, boats: Boats) -> Deciders:
+        """New deciders with what the old ones remember of boats that stayed."""
+        old, believed, self._autopilots = self._deciders, self._autopilots, None
         stayed = Stayed.between(self._known, fleet)
-        if len(stayed.now) == 0:
-            return
+        if old is None or len(stayed.now) == 0:
+            return new
         if believed is not None:
-            self._autopilots = Autopilots.of(n)
+            self._autopilots = Autopilots.of(len(fleet))
             self._autopilots.carry_over(believed, stayed)
-        self._pending[:, stayed.now] = sent[:, stayed.then]
         met = meets_new(fleet, stayed, boats, self._tuning)
-        for i, k in [(0, 0)] if team else zip(*stayed, strict=True):
-            carry_over(old[k].memory, self._seats[i].memory, stayed, met)
+        new.pending[:, :, stayed.now] = old.pending[:1, :, stayed.then]  # all deciders know what all boats were told
+        for i, k in [(0, 0)] if self.config.coordination == "team" else zip(*stayed, strict=True):
+            carry_over(part_of(old.memory, k), part_of(new.memory, i), stayed, met)
+        return new
+
+    def _ask(self, seen: Fleet, within: Commands, asked: Asked) -> None:
+        """Write what is to be decided about, for the team, or for each boat.
+
+        A boat that decides for itself knows its own wanted command and takes team-mates to hold their course.
+        """
+        wanted = within.as_relative_deg(seen.state[:, L.HEADING])
+        asked.state[:], asked.ours[:] = seen.state, seen.controlled
+        if self.config.coordination == "team":
+            asked.wanted[0] = wanted
+        else:
+            own = np.arange(len(seen))
+            asked.ours[~seen.controlled] = False  # these decide nothing
+            asked.wanted[:, :, 0], asked.wanted[:, :, 1] = seen.speed_mps, 0.0
+            asked.wanted[own, own] = wanted
+        asked.age_s[:] = 0.0 if seen.age_s is None else seen.age_s
+        asked.error_m[:] = 0.0 if seen.position_error_m is None else seen.position_error_m
+        asked.visiting[:] = False if seen.visiting is None else seen.visiting
+        asked.adversary_s[:] = np.nan if seen.adversary_s is None else seen.adversary_s
+        asked.driven[:] = np.nan if seen.driven is None else seen.driven
+
+    def _decided(self, static: Static, deciders: Deciders) -> Decided:
+        """What is decided, (n,): that of the team, or of each boat its own."""
+        deciders.decide(static)
+        if self.config.coordination == "team":
+            return Decided._make(values[0].copy() for values in deciders.decided)
+        own = np.arange(len(deciders.asked.state))
+        if deciders.pending.shape[1] > 0:  # what each boat was told all others see
+            deciders.pending[:, -1] = deciders.pending[own, -1, own]
+        decided = Decided._make(values[own, own] for values in deciders.decided)
+        first = np.flatnonzero(deciders.asked.ours.any(axis=1))[:1]
+        return decided if len(first) == 0 else decided._replace(feared_s=deciders.decided.feared_s[first[0]].copy())
 
     def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray | None]:
         """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it, if any."""
@@ -299,27 +286,23 @@ class Shield:
         self._autopilots.fill(fleet.state, unknown, self.config.dt_s, self.config.position_error_m)
         return fleet, unknown
 
-    def _note_sent(self, seen: Fleet, unknown: BoolArray | None, sent: Commands, boats: Boats) -> None:
-        """Queue what was sent, and run the autopilots nobody tells of through what works in this step."""
-        if len(self._pending) == 0 and unknown is None:
+    def _follow(self, unknown: BoolArray, works: Array | None, sent: Commands, fleet: Fleet, boats: Boats) -> None:
+        """Run the autopilots nobody tells of through what works in this step: of the delay, or what is sent."""
+        if self._autopilots is None:
             return
-        heading_deg = seen.state[:, L.HEADING]
-        works = sent.as_relative_deg(heading_deg)
-        if len(self._pending) > 0:
-            first = self._pending[0].copy()
-            queue_commands(self._pending, seen.state, works)
-            works = first
+        heading_deg = fleet.state[:, L.HEADING]
+        if works is None:
+            works = sent.as_relative_deg(heading_deg)
+        else:
             works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
-        if unknown is not None and self._autopilots is not None:
-            self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
+        self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
-    def _around(self, surroundings: Surroundings) -> Static:
+    def _around(self, surroundings: Surroundings, deciders: Deciders) -> Static:
         """Static constraints now; what was kept from others is no measure for these."""
         static = self._static(surroundings)
         if static is not self._kept_from:
             self._kept_from = static
-            for seat in self._seats:
-                seat.memory.static_m[:] = 0.0
+            deciders.memory.static_m[:] = 0.0
         return static
 
     def _static(self, surroundings: Surroundings) -> Static:
@@ -333,42 +316,3 @@ class Shield:
             self._packed[surroundings] = surroundings.pack(self.config)
         self._last_around = surroundings, self._packed[surroundings]
         return self._packed[surroundings]
-
-    def _run(
-        self, seat: _Seat, state: Array, wanted: Array, margin: Array, ours: BoolArray, boats: Boats, static: Static
-    ) -> None:
-        """The stages of `flow` with the QP backend in between."""
-        scene = seat.scene_of(boats, static, self._barriers.arrays, self._tuning)
-        todo = begin(scene, state, wanted, margin, ours)
-        if todo == PASSES:
-            return
-        found, count = UNSAFE, 0
-        for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-            count, rows = linearise(scene)
-            z = self._solve(count, rows, seat.plan) if rows >= 0 else None
-            if z is None:
-                break
-            found = accept(scene, z, count)
-            if found != UNSAFE:
-                break
-        finish(scene, found == SAFE, count)
-
-    def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
-        """Answer of the program, if it has one."""
-        n = 2 * count
-        return solve(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n]), self.config.solver)
-
-    def _each(
-        self, state: Array, wanted: Array, margin: Array, controlled: BoolArray, boats: Boats, static: Static
-    ) -> Answer:
-        """One program per boat: it knows its own wanted command and takes team-mates to hold theirs."""
-        answer = Answer.empty(len(state))
-        straight = np.zeros_like(wanted)
-        straight[:, 0] = state[:, L.SPEED]
-        for i in np.flatnonzero(controlled):
-            asked = straight.copy()
-            asked[i] = wanted[i]
-            seat = self._seats[i]
-            self._run(seat, state, asked, margin, controlled, boats, static)
-            answer.take(int(i), seat.plan, seat.work, state)
-        return answer

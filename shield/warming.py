@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from .commands import Commands
@@ -22,8 +20,6 @@ def tight_spot() -> tuple[Fleet, Commands, Surroundings]:
         speed_mps=[1.5, 1.5, 1.5],
         team=[0, 0, 1],
         platforms="heron",
-        age_s=np.zeros(len(PLACES_M)),  # tracks have ages on boats: running them on is compiled, too
     )
-    fleet = replace(fleet, driven=np.full((len(PLACES_M), 4), np.nan))  # games say what drives boats, if anything
     around = Surroundings(keep_out=((0.0, -4.0, 1.0),), stops=((-4.0, 0.0, 1.0),), circles=((-4.0, 6.0, 0.5),))
     return fleet, Commands.relative_deg(np.array([[2.0, 0.0]] * len(PLACES_M))), around

@@ -16,6 +16,8 @@ class Work(NamedTuple):
     """Scratch of one decision (n boats), overwritten every time; row n of plan-like arrays is for trials.
 
     Attributes:
+        wanted: (n, 2) wanted speed, m/s, and relative heading, deg, of the state that is decided about.
+        error_m: (n,) bound on the error of each position in it, m.
         next_state: (n, N_STATE) predicted state after the candidate commands.
         command: (n, 2) the candidate command it is predicted for, speed m/s and relative heading deg.
         driven: (n, 4) what drives a boat whose way is foreseen, see `fleet.Fleet`.
@@ -67,6 +69,8 @@ class Work(NamedTuple):
         cut_short: (1,) whether its search was ended by its limit.
     """
 
+    wanted: Array
+    error_m: Array
     next_state: Array
     command: Array
     driven: Array
@@ -121,6 +125,8 @@ def new_work(boats: int, samples: int) -> Work:
     """Scratch arrays for a scene of that many boats and path samples."""
     return share(
         Work(
+            wanted=np.zeros((boats, 2)),
+            error_m=np.zeros(boats),
             next_state=np.zeros((boats, L.N_STATE)),
             command=np.zeros((boats, 2)),
             driven=np.full((boats, 4), np.nan),

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.filter.program import Program
+from steerclear.shield.filter.program import Program, Solver, solve
 from steerclear.shield.jit import Array
-from steerclear.shield.plan import Plan
 
 from ..match import Match
 from ..spec import MatchSpec
+
+REFERENCE = "daqp"
+"""The backend that programs are collected with and others are compared with."""
 
 OPPONENTS = ("easy", "medium", "hidden", "rammer")
 
@@ -48,10 +50,13 @@ class ProgramKeepingShield(Shield):
         super().__init__(config)
         self.programs: list[Program] = []
 
-    def _solve(self, count: int, rows: int, plan: Plan) -> Array | None:
-        n = 2 * count
-        self.programs.append(Program(plan.C[:rows, :n].copy(), plan.d[:rows].copy(), plan.z0[:n].copy()))
-        return super()._solve(count, rows, plan)
+    def _solver(self) -> Solver:
+        return self._keep
+
+    def _keep(self, program: Program) -> Array | None:
+        """Keep a copy, whose arrays stay as they are, and answer it."""
+        self.programs.append(Program(program.C.copy(), program.d.copy(), program.z0.copy()))
+        return solve(program, REFERENCE)
 
 
 def questions_of_games(preset: str, game_s: float, seed: int, config: ShieldConfig) -> list[list[Question]]:

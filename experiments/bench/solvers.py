@@ -11,9 +11,9 @@ from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.jit import Array
 
+from .sampling import REFERENCE
 from .timing import quantiles_us, time_calls
 
-REFERENCE = "daqp"
 COMPILED = "compiled projection"
 Solve = Callable[[Program], Array | None]
 

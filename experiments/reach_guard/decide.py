@@ -30,6 +30,9 @@ ROUNDS, SWEEPS = 2, 2
 """Times the program is linearised and solved; times the boats choose backups, each knowing the others' choices."""
 AIM_M, SAME = 0.01, 1e-6
 """Rows aim this much beyond the target, for the curvature of V; smaller changes of inputs are none."""
+HYSTERESIS_M = 0.3
+"""Value, m, by which a backup to the other side must be better."""
+
 BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0, 1.0) for k in range(-4, 0)])
 """Rudder to starboard as a share of full, and speed as a share of top speed; the first of the best is taken."""
 
@@ -134,7 +137,7 @@ def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray)
                 x[i, WAYS] = state[i]
                 _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
                 value = margins(setup, mine, x).min()
-                value -= setup.hysteresis_m if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
+                value -= HYSTERESIS_M if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
                 if value > best:
                     best, chosen = value, k
             x[i, WAYS] = state[i]

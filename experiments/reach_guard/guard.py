@@ -22,7 +22,7 @@ from .decide import decide_games
 from .values import Setup
 
 NAME = "reach"
-SETTINGS = ("response_per_s", "margin_cap_m", "hysteresis_m", "speed_weight", "adversary_s", "profile", "buffer_m")
+SETTINGS = ("response_per_s", "margin_cap_m", "speed_weight", "adversary_s", "profile", "buffer_m")
 """Settings of `ShieldConfig` that may be given with the name; separation, position error and step count too."""
 
 
@@ -77,7 +77,6 @@ class ReachGuard(BatchGuard):
             dt_s=config.dt_s,
             fear_s=min(config.feared_s, WHOLE_S),
             speed_weight=config.speed_weight,
-            hysteresis_m=config.hysteresis_m,
             look=max((round(table.card.dt_s / config.dt_s) for table in tables), default=1),
         )
 

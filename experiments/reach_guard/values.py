@@ -36,7 +36,6 @@ class Setup(NamedTuple):
     dt_s: float
     fear_s: float
     speed_weight: float
-    hysteresis_m: float
     look: int
 
 

@@ -11,11 +11,10 @@ from ..memory import Memory
 from ..platforms import layout as L
 from ..scene import Scene
 from ..work import Work
-from .candidates import DONE_DEG, candidate, kept_turn, preference, remembered
+from .candidates import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
 from .effort import all_spent
 from .laying import lay_path, refused_by_tables, run_out, set_out
-from .paths import angle_to_go
-from .rank import PAIR_SAFE, STRAIGHT_SAFE, rank_path
+from .rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE, rank_path
 
 SWEEPS = 3
 
@@ -46,12 +45,13 @@ def _take(i: int, slot: int, rank: float, work: Work) -> None:
 
 
 @lean_kernel
-def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: Scene) -> None:
-    """Give boat i a manoeuvre: the first that is safe, or with ``exhaustive`` the best of all.
+def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
+    """Give boat i a manoeuvre: the first that is safe, or with ``best_of`` the best.
 
-    The one under way is left only for one that is better by the hysteresis, so that a side once taken is kept; with a
-    table the choice is made anew at every step, so that is asked of the other side only. What a table refuses one step
-    on it refuses for every manoeuvre: then the first that keeps clear of all else will do.
+    The best that screening found for the state one step on is good enough from here: where that, or the one in memory,
+    is safe no others are looked at. By tables manoeuvres differ from here only, so where an opponent is what the wanted
+    command is short of, all are. What a table refuses one step on it refuses for every manoeuvre: then the first that
+    keeps clear of all else will do.
 
     Once the decision has cost its limit the best so far will do, see `effort`.
     """
@@ -59,24 +59,25 @@ def choose_plan(i: int, wanted_mps: float, done: int, exhaustive: bool, scene: S
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = -1e9
-    compared = boats.table_steps[i] > 0 and done == 0  # one step on the tables say the same of all manoeuvres
-    for p in range(boats.n_plans[i] + 1):
-        if p == 0 and not remembered(i, done, heading, memory):
+    cause = scene.plan.cause[i]
+    compared = boats.table_steps[i] > 0 and done == 0 and cause >= 0 and not scene.ours[cause]
+    for p in range(boats.n_plans[i] + FAMILY):
+        if p == IN_MEMORY and not remembered(i, done, heading, memory):
             continue
+        if p == FOUND and (done == 1 or compared):
+            continue
+        if best >= PAIR_SAFE and (not best_of or (p == FAMILY and not compared)):
+            return
         side, togo, speed = candidate(i, p, wanted_mps, heading, scene)
         set_out(i, trial, side, togo, speed, done, scene)
         if compared and refused_by_tables(i, trial, best, scene):
             continue
         run_out(i, trial, done, scene)
         rank = rank_path(i, trial, best, scene)
-        kept_rank = rank + preference(i, p, side, togo, rank, scene)
-        if kept_rank > best + SAME_RANK:
-            best = kept_rank
+        if rank > best + SAME_RANK:
+            best = rank
             _take(i, trial, rank, work)
-        sealed = done == 1 and work.sealed[trial] and kept_rank == rank
-        if not exhaustive and (rank >= PAIR_SAFE or sealed):
-            return
-        if all_spent(tuning, work):
+        if (done == 1 and work.sealed[trial]) or all_spent(tuning, work):
             return
 
 
@@ -87,12 +88,12 @@ def refresh(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def settled(i: int, sweep: int, exhaustive: bool, memory: Memory, work: Work) -> bool:
+def settled(i: int, sweep: int, done: int, memory: Memory, work: Work) -> bool:
     """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
-    was_short = memory.kept[i] and memory.backing_up[i] and memory.margin_m[i] < 0.0
+    was_short = memory.kept[i] and memory.backing_up[i] and (memory.margin_m[i] < 0.0 or work.rank[i] >= STATIC_LOST)
     if work.rank[i] >= PAIR_SAFE or (sweep > 0 and work.rank[i] >= STRAIGHT_SAFE):
         return True
-    return not exhaustive and was_short
+    return done == 1 and was_short
 
 
 @lean_kernel
@@ -105,33 +106,14 @@ def hold(i: int, held: Array, work: Work) -> None:
 
 @lean_kernel
 def recheck(scene: Scene) -> bool:
-    """Whether all boats of ours keep clear when movers go on, from newly predicted states, as they were.
-
-    Each is offered the manoeuvre in ``plan.held`` and failing that the one in memory.
-    """
-    state, ours, memory, work = scene.state, scene.ours, scene.memory, scene.work
-    who, held = scene.plan.moving, scene.plan.held
-    n, trial = state.shape[0], state.shape[0]
-    for i in range(n):
-        if who[i]:
-            togo = 0.0
-            if not math.isnan(held[i, 1]):
-                togo = angle_to_go(work.next_state[i, L.HEADING], held[i, 1], held[i, 0])
-                togo = 0.0 if togo > DONE_DEG else togo
-            lay_path(i, i, held[i, 0], togo, held[i, 2], 1, scene)
-    for i in range(n):
-        if not who[i]:
-            continue
-        refresh(i, scene)
-        heading = work.next_state[i, L.HEADING]
-        if work.rank[i] >= PAIR_SAFE or not remembered(i, 1, heading, memory):
-            continue
-        lay_path(i, trial, memory.side[i], kept_turn(i, heading, memory), memory.speed_mps[i], 1, scene)
-        rank = rank_path(i, trial, work.rank[i], scene)
-        if rank > work.rank[i]:
-            _take(i, trial, rank, work)
+    """Whether all boats of ours keep clear when movers carry out ``plan.held`` from newly predicted states."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
+    for i in range(ours.shape[0]):
+        if plan.moving[i]:
+            togo = found_turn(i, work.next_state[i, L.HEADING], plan.held)
+            lay_path(i, i, plan.held[i, 0], togo, plan.held[i, 2], 1, scene)
     good = True
-    for i in range(n):
+    for i in range(ours.shape[0]):
         if ours[i]:
             refresh(i, scene)
             good = good and work.rank[i] >= PAIR_SAFE
@@ -145,18 +127,20 @@ def lay_first(scene: Scene, done: int, who: BoolArray) -> None:
     for i in range(state.shape[0]):
         if who[i]:
             heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-            first = 0 if remembered(i, done, heading, memory) else 1
+            first = IN_MEMORY if remembered(i, done, heading, memory) else FAMILY
             side, togo, speed = candidate(i, first, scene.plan.commands[i, 0], heading, scene)
             lay_path(i, i, side, togo, speed, done, scene)
 
 
 @lean_kernel
-def assign_plans(scene: Scene, done: int, exhaustive: bool, who: BoolArray) -> bool:
-    """Give the boats of ``who`` a manoeuvre, from their predicted (done = 1) or present states (0).
+def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
+    """Give the boats of ``who`` a manoeuvre from their predicted (done = 1) or present states (0).
 
-    Boats of ours outside ``who`` keep the paths they have. A boat that was short of its margin on its backup is only
-    offered that backup, unless ``exhaustive``: what all manoeuvres could not do a step ago is not searched twice. Nor
-    is a boat whose trouble are pursuers, which the others' manoeuvres do not change.
+    From predicted ones that is the first that is safe, from present ones, which are carried out, the best.
+    Boats of ours outside ``who`` keep the paths they have. One step on, a boat that was on its backup is only
+    offered that if it was short of its margin, since what all manoeuvres could not do a step ago is not searched twice,
+    or if it now is short of static constraints alone. Nor is a boat whose trouble are pursuers, which the others'
+    manoeuvres do not change.
 
     Returns:
         Whether all boats of ours keep clear of all boats and of static constraints.
@@ -172,14 +156,15 @@ def assign_plans(scene: Scene, done: int, exhaustive: bool, who: BoolArray) -> b
         for i in range(n):
             if not who[i]:
                 continue
-            if not (exhaustive and sweep == 0):
+            best_of = done == 0 and sweep == 0
+            if not best_of:
                 refresh(i, scene)
-                if settled(i, sweep, exhaustive, memory, work) or all_spent(tuning, work):
+                if settled(i, sweep, done, memory, work) or all_spent(tuning, work):
                     continue
-            if work.searched[i] == changes and not (exhaustive and sweep == 1):  # it would find the same again
+            if work.searched[i] == changes and not (done == 0 and sweep == 1):  # it would find the same again
                 continue
             side, togo, speed = work.plan[i, 0], work.plan[i, 1], work.plan[i, 2]
-            choose_plan(i, scene.plan.commands[i, 0], done, exhaustive and sweep == 0, scene)
+            choose_plan(i, scene.plan.commands[i, 0], done, best_of, scene)
             if work.plan[i, 0] != side or work.plan[i, 1] != togo or work.plan[i, 2] != speed:
                 changes += 1
             work.searched[i] = changes

@@ -1,15 +1,17 @@
-"""The manoeuvres a boat is offered: the one in memory, and those of the family."""
+"""The manoeuvres a boat is offered: the one in memory, the one found in this decision, and those of the family."""
 
 from __future__ import annotations
 
 import math
 
-from ..jit import lean_kernel
+from ..jit import Array, lean_kernel
 from ..memory import Memory
 from ..platforms import layout as L
-from ..scene import Scene, Tuning
+from ..scene import Scene
 from .paths import angle_to_go
-from .rank import STATIC_LOST
+
+IN_MEMORY, FOUND, FAMILY = range(3)
+"""Numbers of the manoeuvres: that under way, that in ``plan.held``, and from `FAMILY` on those of `Boats.plans`."""
 
 COMMANDED = -1.0
 """Speed entry of a manoeuvre that keeps the commanded speed."""
@@ -41,29 +43,22 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
 
 
 @lean_kernel
+def found_turn(i: int, heading_deg: float, held: Array) -> float:
+    """Turn still to make, deg, of the manoeuvre noted in ``held``, see `assign.hold`; past its target it is done."""
+    if math.isnan(held[i, 1]):
+        return 0.0
+    togo = angle_to_go(heading_deg, held[i, 1], held[i, 0])
+    return 0.0 if togo > DONE_DEG else togo
+
+
+@lean_kernel
 def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
-    """Manoeuvre number p of boat i: 0 is the one in memory, the rest the family; (side, turn deg, speed m/s)."""
-    boats, memory = scene.boats, scene.memory
-    if p == 0:
+    """Manoeuvre number p of boat i: `IN_MEMORY`, `FOUND`, or one of the family; (side, turn deg, speed m/s)."""
+    boats, memory, held = scene.boats, scene.memory, scene.plan.held
+    if p == IN_MEMORY:
         return memory.side[i], kept_turn(i, heading_deg, memory), memory.speed_mps[i]
-    row = boats.plans[i, p - 1]
+    if p == FOUND:
+        return held[i, 0], found_turn(i, heading_deg, held), held[i, 2]
+    row = boats.plans[i, p - FAMILY]
     speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
     return row[0], row[1], speed
-
-
-@lean_kernel
-def hysteresis(rank: float, tuning: Tuning) -> float:
-    """Rank by which another manoeuvre must beat the one under way, in the units of its level."""
-    return tuning.hysteresis_m if rank < STATIC_LOST else 1e-3 * tuning.hysteresis_m
-
-
-@lean_kernel
-def preference(i: int, p: int, side: float, togo_deg: float, rank: float, scene: Scene) -> float:
-    """What manoeuvre number p of a boat on its backup gains or loses in rank by the hysteresis."""
-    boats, tuning, memory = scene.boats, scene.tuning, scene.memory
-    if not memory.backing_up[i]:
-        return 0.0
-    if boats.table_steps[i] == 0:
-        return hysteresis(rank, tuning) if p == 0 else 0.0
-    turning = togo_deg > 0.0 and not math.isnan(memory.target_deg[i])
-    return -hysteresis(rank, tuning) if turning and side * memory.side[i] < 0.0 else 0.0

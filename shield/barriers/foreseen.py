@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from ..fleet import LARGEST, LARGEST_SPEED_MPS
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
@@ -29,6 +30,25 @@ def error_to(row: Array, x: float, y: float) -> float:
         return 0.0
     bearing = np.float64(math.degrees(math.atan2(x - row[L.X], y - row[L.Y])))
     return wrap_degrees(bearing - row[L.HEADING])
+
+
+@lean_kernel
+def note_foreseen(driven: Array, scene: Scene) -> None:
+    """Note which boats' ways are foreseen by what drives them, (n, 4), see `Fleet.driven`.
+
+    That takes a speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at
+    all, from which everything keeps clear. And it must last as long as the longest backup manoeuvre.
+    """
+    ours, boats, work = scene.ours, scene.boats, scene.work
+    last = 0
+    for i in range(ours.shape[0]):
+        copy_row(work.driven[i], driven[i])
+        last = max(last, boats.samples[i])
+    for i in range(ours.shape[0]):
+        x_m, y_m = driven[i, DRIVEN_X], driven[i, DRIVEN_Y]
+        place = (math.isnan(x_m) and math.isnan(y_m)) or (abs(x_m) <= LARGEST and abs(y_m) <= LARGEST)
+        lasts = driven[i, DRIVEN_S] >= last * boats.sample_s
+        work.known[i] = not ours[i] and place and lasts and 0.0 <= driven[i, DRIVEN_MPS] <= LARGEST_SPEED_MPS
 
 
 @lean_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..backup.effort import PATH_COST, PURSUER_COST
-from ..jit import Array, lean_kernel
+from ..jit import lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import next_thrust
 from ..scene import Scene
@@ -17,18 +17,7 @@ REGAIN_M = 0.01
 
 
 @lean_kernel
-def could_meet(i: int, j: int, scene: Scene) -> bool:
-    """Whether any two manoeuvres could bring team-mates i and j near each other, see `find_neighbours`."""
-    state, boats, tuning = scene.state, scene.boats, scene.tuning
-    top = max(boats.fastest_mps[i], state[i, L.SPEED]) + max(boats.fastest_mps[j], state[j, L.SPEED])
-    horizon_s = (max(boats.samples[i], boats.samples[j]) + 1) * boats.sample_s + tuning.tail_s
-    dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
-    reach = tuning.radius_m + top * horizon_s
-    return dx * dx + dy * dy <= reach * reach
-
-
-@lean_kernel
-def find_neighbours(scene: Scene, margin_m: Array) -> None:
+def find_neighbours(scene: Scene) -> None:
     """Courses of all boats, and for each pair whether it can matter and which radius holds.
 
     A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + tail). No boat ever
@@ -63,7 +52,7 @@ def find_neighbours(scene: Scene, margin_m: Array) -> None:
                 reach_i = work.reach_samples[i] + boats.chase_samples[i, j]
                 samples = max(samples, max(reach_i, work.reach_samples[j] + boats.chase_samples[j, i]))
             horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
-            radius = tuning.radius_m + margin_m[i] + margin_m[j]
+            radius = tuning.radius_m + work.error_m[i] + work.error_m[j]
             dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
             square = dx * dx + dy * dy
             reach = radius + top * horizon_s

@@ -21,7 +21,7 @@ from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
 from ..scene import Boats, Scene
 from ..tables.grid import CAP
-from ..tables.lookup import Gradient, own_speed_cell, table_gradient, table_value
+from ..tables.lookup import own_speed_cell, table_value
 from ..work import Work
 from .clearance import FAR
 from .feared import feared_for
@@ -224,20 +224,3 @@ def worst_at_once(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
     copy_row(known, place)
     known[MARGIN_THERE] = margin
     return margin
-
-
-@lean_kernel
-def table_slope(i: int, j: int, way: int, boats: Boats, work: Work) -> Gradient:
-    """Value and derivatives for boat i one step on, opponent j moved on in one of its ways."""
-    own, other = work.place[i], work.ways[j, way]
-    return table_gradient(
-        boats.tables,
-        boats.table[i, j],
-        feared_for(i, j, own[PLACE_SPEED], boats, work),
-        other[PLACE_X] - own[PLACE_X],
-        other[PLACE_Y] - own[PLACE_Y],
-        own[PLACE_HEADING],
-        other[PLACE_HEADING],
-        own[PLACE_SPEED],
-        other[PLACE_SPEED],
-    )

@@ -1,4 +1,4 @@
-"""Exact projection onto a small polyhedron: the QP of the batched shield, compiled.
+"""Exact projection onto a small polyhedron: the shield's QP, compiled.
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 

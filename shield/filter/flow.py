@@ -1,7 +1,7 @@
 """One decision, in compiled stages: screen, build rows, check an answer, back up, commit.
 
-The single decision (`shield.Shield`) calls the stages from Python with a QP backend between them; `decide_compiled`
-chains the same stages with the compiled projection for thousands of games. Nothing else differs between the two.
+`decide_scene` chains them, with the compiled projection between. With a QP backend `deciders.Deciders` calls the same
+stages.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ import math
 
 import numpy as np
 
+from ..backup.assign import hold
 from ..backup.effort import all_spent
-from ..backup.rank import PAIR_SAFE, STATIC_LOST
+from ..backup.rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE
 from ..barriers.clearance import MARGIN
 from ..barriers.static import STATIC
-from ..jit import Array, BoolArray, copy_row, lean_kernel
+from ..jit import Array, copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
 from ..plan import BACKUP, BEST_EFFORT, QP, unchanged
 from ..platforms import layout as L
@@ -22,19 +23,16 @@ from ..platforms.usv import wrap_degrees
 from ..scene import Scene
 from .linearised import build, check, pick_movers, solve_compiled, take_answer
 from .screening import screen
-from .switching import back_up, mark_answer, opposed
-
-ROUNDS = 2
-"""Times the program is linearised and solved anew before the backups take over."""
+from .switching import among_mates, back_up, mark_answer
 
 PASSES, TO_SOLVE, TO_BACK_UP = range(3)
 """What is left to do once the wanted commands are screened: nothing, the program, or the backups at once."""
 
-NO_ANSWER, UNSAFE, SAFE = range(3)
-"""What an answer of the program comes to: none that can be sent, one that fails the exact check, one that passes."""
-
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
+
+ROUNDS = 2
+"""Times the program is linearised and solved anew before the backups take over."""
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
@@ -91,10 +89,13 @@ def commit(scene: Scene) -> None:
 
 @lean_kernel
 def _note_causes(scene: Scene) -> None:
-    """Note what each boat's wanted command is short of."""
+    """Note what each boat's wanted command is short of: of an opponent also where a team-mate is nearer."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
         plan.cause[i] = work.bound[i] if ours[i] and work.rank[i] < PAIR_SAFE else -1
+        threatened = STRAIGHT_SAFE <= work.rank[i] < STATIC_LOST and work.fails[i] and not work.short[i]
+        if ours[i] and threatened and work.threat_by[i] >= 0:
+            plan.cause[i] = work.threat_by[i]
 
 
 @lean_kernel
@@ -119,23 +120,23 @@ def finish(scene: Scene, safe: bool, count: int) -> None:
 
 
 @lean_kernel
-def _take_in(state: Array, ours: BoolArray, scene: Scene) -> None:
-    """Note what is to be decided about."""
-    for i in range(ours.shape[0]):
-        copy_row(scene.state[i], state[i])
-        scene.ours[i] = ours[i]
+def after_screening(scene: Scene) -> int:
+    """Note what wanted commands are short of and the manoeuvres found for them; returns `TO_SOLVE` or `TO_BACK_UP`."""
+    _note_causes(scene)
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i]:
+            hold(i, scene.plan.held, scene.work)
+    return TO_SOLVE if among_mates(scene.ours, scene.plan) else TO_BACK_UP
 
 
 @lean_kernel
-def begin(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> int:
+def begin(scene: Scene) -> int:
     """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_BACK_UP`."""
-    _take_in(state, ours, scene)
-    if screen(scene, wanted, margin_m):
+    if screen(scene):
         scene.plan.cause[:] = -1
         finish(scene, True, 0)
         return PASSES
-    _note_causes(scene)
-    return TO_BACK_UP if opposed(ours, scene.plan) else TO_SOLVE
+    return after_screening(scene)
 
 
 @lean_kernel
@@ -151,25 +152,22 @@ def linearise(scene: Scene) -> tuple[int, int]:
 
 
 @lean_kernel
-def accept(scene: Scene, z: Array, count: int) -> int:
-    """Take an answer of the program and check it; returns `NO_ANSWER`, `UNSAFE` or `SAFE`."""
-    if not take_answer(z, count, scene):
-        return NO_ANSWER
-    return SAFE if check(count, scene) else UNSAFE
+def accept(scene: Scene, z: Array, count: int) -> bool:
+    """Take an answer of the program; whether it passes the exact check."""
+    return take_answer(z, count, scene) and check(count, scene)
 
 
 @lean_kernel
-def decide_compiled(scene: Scene, state: Array, wanted: Array, margin_m: Array, ours: BoolArray) -> None:
-    """The whole decision for one game; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
-    todo = begin(scene, state, wanted, margin_m, ours)
+def decide_scene(scene: Scene) -> None:
+    """The whole decision; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
+    todo, safe, count = begin(scene), False, 0
     if todo == PASSES:
         return
-    found, count = UNSAFE, 0
     for _ in range(ROUNDS if todo == TO_SOLVE else 0):
         count, rows = linearise(scene)
         if rows < 0 or not solve_compiled(count, rows, scene.plan):
             break
-        found = accept(scene, scene.plan.z, count)
-        if found != UNSAFE:
+        safe = accept(scene, scene.plan.z, count)
+        if safe:
             break
-    finish(scene, found == SAFE, count)
+    finish(scene, safe, count)

@@ -12,10 +12,9 @@ import numpy as np
 from ..commands import Commands
 from ..fleet import Fleet
 from ..hints import hint_at_speed
-from ..jit import Array, BoolArray
+from ..jit import Array, BoolArray, IntArray
 from ..plan import LARGEST_COMMAND, LIMITED, PASSED
 from ..platforms import layout as L
-from .answer import Answer
 
 ROUNDING_MPS = 1e-6
 """A speed beyond the limit by less is that limit, rounded: it passes as it is."""
@@ -39,7 +38,7 @@ def within_limits(wanted: Commands, fleet: Fleet, params: Array) -> tuple[Comman
     return wanted.within(cut, highest), cut
 
 
-def tell_of_limits(cut: BoolArray, changed: BoolArray, answer: Answer) -> BoolArray:
+def tell_of_limits(cut: BoolArray, changed: BoolArray, reason: IntArray) -> BoolArray:
     """Name the reason of commands that were cut and nothing else; returns (n,) which are not what was wanted."""
-    answer.reason[cut & (answer.reason == PASSED)] = LIMITED
+    reason[cut & (reason == PASSED)] = LIMITED
     return changed | cut

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..backup.assign import hold, recheck
+from ..backup.assign import recheck
 from ..backup.effort import ROW_COST
 from ..backup.rank import PAIR_SAFE
 from ..jit import Array, copy_row, lean_kernel
@@ -51,9 +51,7 @@ def build(count: int, scene: Scene) -> int:
     """Linearise about the candidate commands; returns the number of rows, -1 when there are too many."""
     work, plan = scene.work, scene.plan
     for m in range(count):
-        i = plan.movers[m]
-        hold(i, plan.held, work)
-        work.spent[0] += work.cost[i]
+        work.spent[0] += work.cost[plan.movers[m]]
     inputs_of(count, scene)
     rows = build_rows(count, scene)
     work.spent[0] += ROW_COST * rows * count

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import logging
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ from ..exceptions import SolverError
 from ..jit import Array
 
 logger = logging.getLogger(__name__)
+
+COMPILED = "active_set"
+"""The solver of our own, see `active_set`; the others are names of qpsolvers."""
 
 ROW_TOLERANCE = 1e-4
 """Largest accepted violation of a unit-length row; the exact check of the command follows anyway."""
@@ -48,16 +52,25 @@ class Program:
     z0: Array
 
 
+Solver = Callable[[Program], Array | None]
+"""What answers a program, or says None."""
+
+
+def solver_of(name: str) -> Solver | None:
+    """The backend of qpsolvers of that name; None for the compiled solver."""
+    return None if name == COMPILED else partial(solve, solver=name)
+
+
 def check_solver(name: str) -> None:
-    """Check that a QP backend is installed.
+    """Check that a QP solver is there: the compiled one is, a backend of qpsolvers must be installed.
 
     Raises:
         SolverError: it is not; the message lists those that are.
     """
-    if name not in qpsolvers.available_solvers:
+    if name != COMPILED and name not in qpsolvers.available_solvers:
         raise SolverError(
             f"QP solver {name!r} is unknown to qpsolvers or not installed; choose one of "
-            f"{', '.join(sorted(qpsolvers.available_solvers))}, or install its package (pip install)"
+            f"{', '.join([COMPILED, *sorted(qpsolvers.available_solvers)])}, or install its package (pip install)"
         )
 
 

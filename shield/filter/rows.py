@@ -20,9 +20,7 @@ import math
 
 from ..barriers.boats import clear_of_boat, must_keep
 from ..barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
-from ..barriers.opponents import clear_of_pursuer, pursues
 from ..barriers.static import clear_of_near_obstacles, clear_of_static
-from ..barriers.value_function import WAYS, table_answers, table_slope
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -125,34 +123,14 @@ def inputs_of(count: int, scene: Scene) -> None:
 @lean_kernel
 def _pair_row(r: int, m: int, j: int, count: int, scene: Scene) -> bool:
     """Row of mover m against boat j; False when neither input has any effect on it."""
-    ours, boats, tuning, work, plan = scene.ours, scene.boats, scene.tuning, scene.work, scene.plan
+    ours, work, plan = scene.ours, scene.work, scene.plan
     i = plan.movers[m]
     clear_of_boat(i, j, work.path[i], scene, -FAR, FAR)
-    pursuer = pursues(i, j, ours, boats, work)
-    if pursuer and not work.breach[i, j] and not table_answers(i, j, i, boats, work):
-        copy_row(work.spare2, work.out)
-        clear_of_pursuer(i, j, i, scene, -FAR, tuning.margin_cap_m)
-        if work.out[MARGIN] > work.spare2[MARGIN]:
-            copy_row(work.out, work.spare2)
-    target = work.threat_target_m[i, j] if pursuer else must_keep(i, j, ours, work)
     plan.C[r, :] = 0.0
     _add_effect(r, i, m, 1.0, work, plan)
     if plan.place[j] >= 0:
         _add_effect(r, j, plan.place[j], -1.0, work, plan)
-    return _close_row(r, count, target + AIM_M - work.out[MARGIN], tuning, plan)
-
-
-@lean_kernel
-def _table_row(r: int, m: int, j: int, way: int, count: int, scene: Scene) -> bool:
-    """Row of mover m against opponent j moved on in one of its ways, from the slope of the value table."""
-    boats, tuning, work, plan = scene.boats, scene.tuning, scene.work, scene.plan
-    i = plan.movers[m]
-    slope = table_slope(i, j, way, boats, work)
-    plan.C[r, :] = 0.0
-    plan.C[r, 2 * m] = slope.own_heading * plan.gain[i, 0]
-    plan.C[r, 2 * m + 1] = slope.own_speed * plan.gain[i, 1]
-    lack = work.threat_target_m[i, j] + AIM_M + work.radius[i, j] + boats.table_margin_m - slope.value_m
-    return _close_row(r, count, lack, tuning, plan)
+    return _close_row(r, count, must_keep(i, j, ours, work) + AIM_M - work.out[MARGIN], scene.tuning, plan)
 
 
 @lean_kernel
@@ -204,17 +182,13 @@ def _box_rows(r: int, count: int, tuning: Tuning, plan: Plan) -> int:
 @lean_kernel
 def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
     """Rows of mover m about other boats; returns the row after the last, or -1 when there are too many."""
-    ours, boats, work, plan = scene.ours, scene.boats, scene.work, scene.plan
+    ours, work, plan = scene.ours, scene.work, scene.plan
     i = plan.movers[m]
     for j in range(ours.shape[0]):
         if j == i or not work.near[i, j] or (plan.place[j] >= 0 and j < i):
             continue
-        if r + WAYS + 1 + 6 * count > plan.C.shape[0]:
+        if r + 1 + 6 * count > plan.C.shape[0]:
             return -1
-        if not ours[j] and table_answers(i, j, i, boats, work):
-            for way in range(WAYS):
-                if _table_row(r, m, j, way, count, scene):
-                    r = _label(r, i, j, plan)
         if _pair_row(r, m, j, count, scene):
             r = _label(r, i, j, plan)
     return r

@@ -63,15 +63,15 @@ def set_targets(scene: Scene) -> None:
 
 
 @lean_kernel
-def screen(scene: Scene, wanted: Array, margin_m: Array) -> bool:
+def screen(scene: Scene) -> bool:
     """Check the wanted commands as they are; True when every boat still has its backup after them.
 
     An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
     the check.
     """
     state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
-    n = state.shape[0]
-    find_neighbours(scene, margin_m)
+    n, wanted = state.shape[0], work.wanted
+    find_neighbours(scene)
     set_targets(scene)
     for i in range(n):
         copy_row(plan.commands[i], wanted[i])
@@ -88,4 +88,4 @@ def screen(scene: Scene, wanted: Array, margin_m: Array) -> bool:
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):
         copy_row(plan.kept_commands[i], plan.commands[i])
-    return assign_plans(scene, 1, False, ours)
+    return assign_plans(scene, 1, ours)

@@ -15,13 +15,12 @@ import math
 import numpy as np
 
 from ..backup.assign import assign_plans
-from ..backup.candidates import candidate, remembered
+from ..backup.candidates import IN_MEMORY, candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
 from ..backup.rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE, rank_path, worst_rank
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
-from ..barriers.neighbours import could_meet
 from ..barriers.static import STATIC, clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
 from ..jit import BoolArray, lean_kernel
@@ -34,16 +33,19 @@ from .linearised import check, list_movers
 
 
 @lean_kernel
-def opposed(ours: BoolArray, plan: Plan) -> bool:
-    """Whether an opponent is what some boat's wanted command is short of.
+def among_mates(ours: BoolArray, plan: Plan) -> bool:
+    """Whether team-mates are among what wanted commands are short of, and no opponents.
 
-    Least changes are for those who stand still or decide with us. An opponent that is only just kept off is so again in
-    the next step, and a boat that gives way as little as it may in each gives way for longer.
+    Least changes are for those who decide with us. An opponent that is only just kept off is so again in the next
+    step, and a boat that gives way as little as it may in each gives way for longer. Of static constraints linear rows
+    say too little, see `easing`.
     """
-    found = False
+    mates, opponents = False, False
     for i in range(ours.shape[0]):
-        found = found or (plan.cause[i] >= 0 and not ours[plan.cause[i]])
-    return found
+        if plan.cause[i] >= 0:
+            mates = mates or ours[plan.cause[i]]
+            opponents = opponents or not ours[plan.cause[i]]
+    return mates and not opponents
 
 
 @lean_kernel
@@ -119,7 +121,7 @@ def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
         heading = state[i, L.HEADING]
         if not remembered(i, 0, heading, memory):
             continue
-        side, togo, speed = candidate(i, 0, 0.0, heading, scene)
+        side, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
         lay_path(i, trial, side, togo, speed, 0, scene)
         if _could_keep(i, trial, scene) > work.rank[i]:
             return True
@@ -129,10 +131,10 @@ def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
 @lean_kernel
 def _join(scene: Scene) -> int:
     """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
-    ours, plan = scene.ours, scene.plan
+    ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
         for m in range(ours.shape[0]):
-            if ours[i] and plan.place[m] >= 0 and could_meet(i, m, scene):
+            if ours[i] and plan.place[m] >= 0 and work.near[i, m]:
                 plan.moving[i] = True
     return list_movers(plan)
 
@@ -165,7 +167,7 @@ def _assign_backups(count: int, scene: Scene) -> bool:
         work.static_target_m[i] = 0.0
         table_steps = max(table_steps, boats.table_steps[i])
     run_opponents(table_steps, scene)
-    return assign_plans(scene, 0, True, plan.moving)
+    return assign_plans(scene, 0, plan.moving)
 
 
 @lean_kernel
@@ -178,9 +180,8 @@ def _find_backups(count: int, scene: Scene) -> int:
     """
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     for _ in range(ours.shape[0]):
-        good = _assign_backups(count, scene)
         movers = count
-        if not good:
+        if not _assign_backups(count, scene):
             movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
         if movers == count or all_spent(tuning, work):
             break

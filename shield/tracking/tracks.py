@@ -1,4 +1,4 @@
-"""Tracks made ready for a decision: memory filled in, age and delay run on, error margins."""
+"""Tracks made ready for a decision: memory filled in, age and delay run on."""
 
 from __future__ import annotations
 
@@ -103,44 +103,16 @@ def steps_of_delay(config: ShieldConfig) -> int:
     return whole_steps(config.delay_s, config.dt_s)
 
 
-def prepare(fleet: Fleet, config: ShieldConfig, params: Array, pending: Array) -> tuple[Array, Array]:
-    """State at the moment the command takes effect, and each boat's error margin.
-
-    Tracks are run on straight by their age and by the delay; own boats are run through the delay by the model under
-    the commands on their way. The error margin of a boat is its bound plus ``track_error_mps`` times age plus delay.
-
-    Args:
-        fleet: what was seen, checked.
-        config: settings.
-        params: (n, N_PARAM) platform rows.
-        pending: (steps of delay, n, 2) commands on their way, see `run_on_commands`.
-
-    Returns:
-        State (n, N_STATE), a copy, and margins (n,), m.
+def check_ages(fleet: Fleet, config: ShieldConfig) -> None:
+    """Check the ages of tracks.
 
     Raises:
-        FleetError: a track is older than ``max_track_age_s``.
+        FleetError: one is not usable, or older than ``max_track_age_s``.
     """
-    state = fleet.state.copy()
-    turn_round(state, fleet.controlled)
-    fill_memory(state, params)
-    n = len(state)
-    margin = np.full(n, config.position_error_m)
-    if fleet.position_error_m is not None:
-        margin = np.maximum(margin, fleet.position_error_m)
-    if fleet.age_s is not None:
-        _check_age(fleet, config)
-        run_on(state, fleet.age_s)
-        margin = margin + config.track_error_mps * fleet.age_s
-    if len(pending) > 0:
-        run_on_commands(state, fleet.controlled, params, pending, config.dt_s)
-        margin = margin + np.where(fleet.controlled, 0.0, config.track_error_mps * config.delay_s)
-    return state, margin
-
-
-def _check_age(fleet: Fleet, config: ShieldConfig) -> None:
     age = fleet.age_s
-    if age is None or not (np.isfinite(age).all() and (age >= 0).all()):
+    if age is None:
+        return
+    if not (np.isfinite(age).all() and (age >= 0).all()):
         raise FleetError("age_s holds a value that is negative or not finite; give seconds since each track's fix")
     worst = int(np.argmax(age)) if len(age) > 0 else -1
     if worst >= 0 and age[worst] > config.max_track_age_s:

@@ -314,7 +314,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --own some/folder", "no submission at"),
         ("ablate --platform hern", "heron"),
         ("ablate --certificate turn", "turning_circle"),
-        ("ablate --solver nosuch", "choose one of daqp"),
+        ("ablate --solver nosuch", "choose one of active_set, daqp"),
         ("ablate --separation -1", "separation_m is -1.0"),
         ("ablate --separation nan", "give a number"),
         ("ablate --max-time 0", "max_time_s is 0.0"),

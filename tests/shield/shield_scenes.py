@@ -1,8 +1,11 @@
 """Fleets, commands and the Hypothesis strategies for them that the shield's tests share."""
 
+import sys
+
 import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
+from numba.core.registry import CPUDispatcher
 from steerclear.shield import Commands, Fleet
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -84,3 +87,14 @@ def distances(position):
 def bits(array):
     """The bytes of an array: equal only when every bit is, signs of zeros included."""
     return np.ascontiguousarray(array, dtype=np.float64).tobytes()
+
+
+def signatures():
+    """Number of machine codes of every function there is."""
+    found = {}
+    for name, module in list(sys.modules.items()):
+        if name.startswith("steerclear."):
+            for entry in vars(module).values():
+                if isinstance(entry, CPUDispatcher):
+                    found[f"{entry.__module__}.{entry.__name__}"] = len(entry.signatures)
+    return found

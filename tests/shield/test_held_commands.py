@@ -67,7 +67,7 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
     env.command_filter = lambda core, commands: places.append(core.state[0, :, :2].copy()) or commands
     while env.agents:
         actions = blue.act(observations, infos)
-        work, ours = blue.shield._seats[0].work, blue.decisions.fleet.controlled
+        work, ours = blue.shield._deciders._desk.scene.work, blue.decisions.fleet.controlled
         foreseen, known, path = work.next_state.copy(), work.known.copy(), work.path.copy()
         changed += int(blue.decisions.intervened.any())
         places.clear()
@@ -96,7 +96,7 @@ def test_a_disabled_boat_is_foreseen_to_coast_and_no_shield_decides_for_it():
     speed, x, y, time_s = wrapped.decisions.fleet.driven[1]
     assert (speed, np.isnan(x), np.isnan(y)) == (0.0, True, True)
     assert time_s == pytest.approx(40.0)
-    assert wrapped.shield._seats[0].work.known.tolist() == [False, True, False, False, False, False]
+    assert wrapped.shield._deciders._desk.scene.work.known.tolist() == [False, True, False, False, False, False]
 
 
 def test_a_boat_that_is_nearly_free_is_feared_as_any_other():
@@ -109,7 +109,7 @@ def test_a_boat_that_is_nearly_free_is_feared_as_any_other():
     shield = Shield.for_game(env)
     reader = reader_of(env)
     shield.decide(reader.fleet(0, False), __import__("steerclear").shield.Commands.game_deg(np.zeros((6, 2))))
-    assert shield._seats[0].work.known.tolist() == [False, False, False, True, False, False]
+    assert shield._deciders._desk.scene.work.known.tolist() == [False, False, False, True, False, False]
 
 
 def test_shields_for_moves_and_for_decisions_are_told_apart():

@@ -1,12 +1,10 @@
 """However arrays are laid out, decisions are the same bits, and nothing is compiled anew for them."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numba.core.registry import CPUDispatcher
-from shield_scenes import bits
+from shield_scenes import bits, signatures
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import FleetError
@@ -15,17 +13,6 @@ from test_arrays import read_only
 
 FIELD = Surroundings((-40.0, -40.0, 40.0, 40.0), circles=[(20.0, 0.0, 3.0)])
 WANTED = np.array([[2.0, 0.0], [2.0, 3.0]])
-
-
-def signatures():
-    """Number of machine codes of every function there is."""
-    found = {}
-    for name, module in list(sys.modules.items()):
-        if name.startswith("steerclear."):
-            for entry in vars(module).values():
-                if isinstance(entry, CPUDispatcher):
-                    found[f"{entry.__module__}.{entry.__name__}"] = len(entry.signatures)
-    return found
 
 
 def exactly(array, kind):
@@ -80,7 +67,7 @@ def answer(laid, fleet_of):
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_no_layout_changes_a_decision_or_is_compiled_for(name, fleet_of):
     expected, before = answer(np.asarray, fleet_of), signatures()
-    assert sum(before.values()) > 10, "the count is of what has been compiled"
+    assert sum(before.values()) > 5, "the count is of what has been compiled"
     assert answer(LAYOUTS[name], fleet_of) == expected
     assert signatures() == before
 

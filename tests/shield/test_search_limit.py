@@ -56,7 +56,7 @@ def test_no_decision_costs_much_more_than_its_limit():
     for limit in (LEAST, np.inf):
         shield = Shield(search_limit=limit)
         shield.decide(*crowd(1))
-        spent[limit] = shield._seats[0].work.spent[0]
+        spent[limit] = shield._deciders._desk.scene.work.spent[0]
     once = 12 * (PATH_COST + 19.0 + 8 * PURSUER_COST)
     assert spent[LEAST] < LEAST + 8 * once
     assert spent[np.inf] > 3.0 * spent[LEAST]

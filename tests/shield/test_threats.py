@@ -20,9 +20,9 @@ def remembered(rows, team, platform):
     fleet.state[:, L.THRUST] = 100.0
     shield = Shield(profile="rammers")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
-    seat = shield._seats[0]
-    set_targets(seat.scene)
-    return decisions, seat.memory, seat.work
+    scene = shield._deciders._desk.scene
+    set_targets(scene)
+    return decisions, scene.memory, scene.work
 
 
 @pytest.mark.parametrize(("platform", "top", "ahead_m"), [("surveyor", 3.0, 33.0), ("heron", 2.0, 11.0)])

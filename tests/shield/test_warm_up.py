@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from steerclear.shield import Commands, Fleet, Reason, Shield, shield, warming
+from shield_scenes import signatures
+from steerclear.shield import Commands, Fleet, Reason, Shield, deciders, shield, warming
 from steerclear.shield.exceptions import PlatformError
-from steerclear.shield.fleet import foreseeable
 
 
 def head_on(platform="heron", speed_mps=2.0):
@@ -21,17 +21,25 @@ def head_on(platform="heron", speed_mps=2.0):
     return fleet, Commands.relative_deg(np.array([[speed_mps, 0.0]] * 2))
 
 
-def test_what_is_run_needs_every_stage(monkeypatch):
-    seen = []
-    for name in ("begin", "linearise", "solve", "accept", "finish"):
-        stage = getattr(shield, name)
-        monkeypatch.setattr(
-            shield, name, lambda *values, name=name, stage=stage: (seen.append(name), stage(*values))[1]
-        )
+STAGES = "begin", "linearise", "accept", "finish"
+
+
+@pytest.fixture
+def stages_run(monkeypatch):
+    """Names of the stages that are run where a backend of qpsolvers stands between them."""
+    seen = set()
+    for name in STAGES:
+        stage = getattr(deciders, name)
+        monkeypatch.setattr(deciders, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+    return seen
+
+
+def test_what_is_run_needs_every_stage(stages_run):
     fleet, wanted, around = warming.tight_spot()
-    decisions = Shield().decide(fleet, wanted, around)
-    assert set(seen) == {"begin", "linearise", "solve", "accept", "finish"}
+    decisions = Shield(solver="daqp").decide(fleet, wanted, around)
+    assert stages_run == set(STAGES)
     assert set(decisions.reason[:2]) == {Reason.QP}
+    assert set(Shield().decide(fleet, wanted, around).reason[:2]) == {Reason.QP}
 
 
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
@@ -65,19 +73,17 @@ def test_a_fleet_of_unknown_boats_is_refused():
 
 
 @pytest.mark.parametrize("settings", [{}, {"position_error_m": 0.3, "delay_s": 0.2}, {"separation_m": 4.0}])
-def test_every_stage_is_compiled_whatever_the_settings(monkeypatch, settings):
+def test_every_stage_is_compiled_whatever_the_settings(stages_run, settings):
     """Wide margins leave no room for the program where the boats are; its check would be compiled under way."""
-    seen = []
-    for name in ("begin", "linearise", "solve", "accept", "finish"):
-        stage = getattr(shield, name)
-        monkeypatch.setattr(
-            shield, name, lambda *values, name=name, stage=stage: (seen.append(name), stage(*values))[1]
-        )
-    Shield(**settings).warm_up()
-    assert set(seen) == {"begin", "linearise", "solve", "accept", "finish"}
+    Shield(solver="daqp", **settings).warm_up()
+    assert stages_run == set(STAGES)
 
 
-def test_so_is_what_only_games_ask_for():
+def test_nothing_is_compiled_after_it():
     Shield().warm_up()
-    assert foreseeable.signatures
-    assert warming.tight_spot()[0].driven is not None
+    before = signatures()
+    fleet, wanted, around = warming.tight_spot()
+    guard = Shield()
+    for _ in range(3):
+        guard.decide(fleet, wanted, around)
+    assert signatures() == before

@@ -209,6 +209,7 @@ def _settings(told: dict[str, Any]) -> dict[str, Any]:
     share, hunt_s = settings.pop("opponent_share", 1.0), settings.pop("hunt_s", None)
     if share not in (0.0, 1.0) or hunt_s is not None:
         raise ConfigError(f"opponent_share {share} and hunt_s {hunt_s} are no settings of this version any more")
+    settings.pop("hysteresis_m", None)  # a margin that no encounter showed; such logs are decided otherwise anyhow
     if "adversary_s" not in settings:
         settings["profile"] = "rammers" if share == 1.0 else "hold-course"
     return settings

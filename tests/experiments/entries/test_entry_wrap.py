@@ -16,7 +16,6 @@ from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.entries.onboard import program
 from steerclear.experiments.entries.onboard.crew import Crew, _tuples
 from steerclear.experiments.entries.onboard.state import Facts
 from steerclear.experiments.entries.wrapping.facts import facts_for
@@ -25,7 +24,6 @@ from steerclear.experiments.entries.wrapping.package import code
 from steerclear.experiments.entries.wrapping.sources import sources
 from steerclear.experiments.keys import KEYS, undocumented
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield import shield as shield_module
 from typer.testing import CliRunner
 
 STATES = Path(__file__).parents[2] / "data" / "plain_states.npz"
@@ -79,9 +77,8 @@ def answers_alone(folder, what, tmp_path):
     return np.load(out), done.stderr
 
 
-def test_it_decides_as_the_compiled_shield_does_where_only_numpy_is(wrapped, tmp_path, monkeypatch):
+def test_it_decides_as_the_compiled_shield_does_where_only_numpy_is(wrapped, tmp_path):
     sent, _ = answers_alone(wrapped[2], "shield", tmp_path)
-    monkeypatch.setattr(shield_module, "solve", program.solve)  # as batches of games solve their programs
     settings = ShieldConfig.of(**wrapped[1]["shield"])
     recorded = dict(np.load(STATES))
     expected = alone.decide(Shield(settings), Fleet, Commands, Surroundings, recorded)

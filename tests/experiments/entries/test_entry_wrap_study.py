@@ -10,11 +10,9 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.entries.onboard import program
 from steerclear.experiments.entries.wrapping.facts import facts_for
 from steerclear.experiments.entries.wrapping.wrap import shielded_files
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield import shield as shield_module
 from steerclear.shield.platforms import layout as L
 
 GAMES = [("easy", seed) for seed in range(9)] + [("medium", seed) for seed in range(9)]
@@ -55,7 +53,6 @@ def noted_in(opponent, seed, settings):
 
 @pytest.mark.study
 def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(shield_module, "solve", program.solve)
     facts = facts_for("mctf2026", {"separation_m": 4.0})
     package, files = shielded_files(facts)
     for name, content in files.items():

@@ -57,13 +57,15 @@ def stages_of(config, state, platforms, team, surroundings=None):
 
 def screened(at, wanted):
     """Screen the wanted commands; True when they are safe."""
-    return screening.screen(at.scene, wanted, np.zeros(len(wanted)))
+    at.work.wanted[:], at.work.error_m[:] = wanted, 0.0
+    return screening.screen(at.scene)
 
 
 def screened_with_all_pairs(at, wanted):
     """`screening.screen` again, with no pair left out."""
     n = len(wanted)
-    find_neighbours(at.scene, np.zeros(n))
+    at.work.wanted[:], at.work.error_m[:] = wanted, 0.0
+    find_neighbours(at.scene)
     left_out = ~at.work.near & ~np.eye(n, dtype=bool)
     at.work.radius[left_out] = at.tuning.radius_m
     at.work.near[left_out] = True
@@ -77,7 +79,7 @@ def screened_with_all_pairs(at, wanted):
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
     at.plan.kept_commands[:] = at.plan.commands
-    safe = assign_plans(at.scene, 1, False, at.ours)
+    safe = assign_plans(at.scene, 1, at.ours)
     return safe, int(left_out.sum()) // 2
 
 
@@ -93,16 +95,16 @@ def built(at):
 
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
-    count, found = 0, flow.SAFE if safe else flow.UNSAFE
-    for _ in range(flow.ROUNDS):
-        if found != flow.UNSAFE:
-            break
+    count, todo = 0, flow.PASSES if safe else flow.after_screening(at.scene)
+    for _ in range(flow.ROUNDS if todo == flow.TO_SOLVE else 0):
         count, rows = built(at)
         z = _answer(at, count, rows, solver)
         if z is None:
             break
-        found = flow.accept(at.scene, z, count)
-    flow.finish(at.scene, found == flow.SAFE, count)
+        safe = flow.accept(at.scene, z, count)
+        if safe:
+            break
+    flow.finish(at.scene, safe, count)
     return at.plan.commands.copy(), at.plan.reason.copy()
 
 

@@ -42,10 +42,12 @@ def test_arrays_stay_their_callers():
     shield, wanted = Shield(), relative((2.0, 0.0), (2.0, 0.0))
     fleets = [head_on(gap_m) for gap_m in (30.0, 5.3)]
     assert [shield.decide(fleet, wanted)[0].reason.name for fleet in fleets] == ["PASSED", "BACKUP"]
-    seat = shield._seats[0]
-    arrays = [array for part in (seat.memory, seat.work, seat.plan, shield._boats) for array in part]
+    deciders = shield._deciders
+    scene = deciders._desk.scene
+    parts = scene.memory, scene.work, scene.plan, scene.boats, deciders.asked, deciders.decided, deciders.memory
+    arrays = [array for part in parts for array in part]
     arrays += [array for fleet in fleets for array in (fleet.state, fleet.team, fleet.controlled)]
-    arrays += [wanted.values, shield._pending]
+    arrays += [wanted.values, deciders.pending]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
     before = [sys.getrefcount(array) for array in arrays]
     for k in range(100):

@@ -48,7 +48,7 @@ def test_a_pursuer_holds_its_course_after_its_time():
         for time_s in TIMES_S[1:]:
             config = ShieldConfig(adversary_s=time_s, certificate="turning_circle")
             at = stages_of(config, state, ["heron"] * 2, [0, 1])
-            find_neighbours(at.scene, np.zeros(2))
+            find_neighbours(at.scene)
             at.work.fear_s[:] = time_s
             lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
             clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)

@@ -105,7 +105,7 @@ def table_m(bearing_deg, far_m, **settings):
     own[L.THRUST] = other[L.THRUST] = 100.0
     rows = np.array([own, other])
     at = stages_of(ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, **settings}), rows, ["heron"] * 2, [0, 1])
-    find_neighbours(at.scene, np.zeros(2))
+    find_neighbours(at.scene)
     lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
     clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
     return float(at.work.out[MARGIN])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from stages import screened, stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.assign import choose_plan
+from steerclear.shield.backup.assign import choose_plan, hold
 from steerclear.shield.backup.rank import rank_path
 from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.opponents import first_then_rest
@@ -85,11 +85,13 @@ def test_a_manoeuvre_is_worth_the_same_as_far_as_it_counts(crew):
 def test_the_same_manoeuvre_is_chosen(crew, done):
     changed = 0
     for at, top in scenes(*CREWS[crew], count=20):
-        for exhaustive in (False, True):
+        hold(0, at.plan.held, at.work)
+        at.plan.cause[0] = 1  # an opponent: tables are compared
+        for best_of in (False, True):
             found = set()
             for j, manner in orders():
                 first(at, j, manner)
-                choose_plan(0, top, done, exhaustive, at.scene)
+                choose_plan(0, top, done, best_of, at.scene)
                 found.add((*at.work.plan[0], at.work.rank[0], at.work.clear[0, MARGIN], at.work.bound[0]))
                 changed += at.work.first_pursuer[0] != j
             assert len(found) == 1

@@ -41,7 +41,7 @@ def looked_around(*rows):
     at = stages_of(
         ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * len(rows), [0] + [1] * (len(rows) - 1)
     )
-    find_neighbours(at.scene, np.zeros(len(rows)))
+    find_neighbours(at.scene)
     return at
 
 

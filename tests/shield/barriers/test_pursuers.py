@@ -58,7 +58,7 @@ def modelled(name, own, pursuer, side, turn_deg):
         (name, name),
         (0, 1),
     )
-    find_neighbours(at.scene, np.zeros(2))
+    find_neighbours(at.scene)
     top = get_platform(name).max_speed_mps
     lay_path(0, 0, side, turn_deg, top, 0, at.scene)
     clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)

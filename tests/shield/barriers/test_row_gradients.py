@@ -9,7 +9,6 @@ from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.barriers.boats import clear_of_boat
 from steerclear.shield.barriers.clearance import FAR, MARGIN
 from steerclear.shield.barriers.static import clear_of_near_obstacles, clear_of_static
-from steerclear.shield.barriers.value_function import WAYS, set_place, table_margin
 from steerclear.shield.filter import rows, screening
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -113,44 +112,6 @@ def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
     told, measured = np.array(both).transpose(1, 0, 2).reshape(2, -1)
     assert np.mean(np.sign(told) == np.sign(measured)) > 0.8
     assert np.median(np.abs(told - measured) / np.abs(measured)) < error
-
-
-def table_row_gradients(task, way):
-    """As `Linearised.gradients`, of the row about an opponent that is looked up and moves on in one way, or None."""
-    at, n = task.at, 2 * task.count
-
-    def margin(z):
-        task.move(z)
-        set_place(0, 0, 0.0, 0.0, 0.0, 1, at.scene)
-        return table_margin(0, 1, at.work.place[0], at.work.ways[1, way : way + 1], -FAR, at.boats, at.work)
-
-    now = margin(task.z)
-    if now >= FAR or not rows._table_row(0, 0, 1, way, task.count, at.scene):
-        return None
-    C, d = at.plan.C[0, :n].copy(), at.plan.d[0]
-    scale = (at.work.threat_target_m[0, 1] + rows.AIM_M - now) / (d - C @ task.z)
-    steps = STEP * np.eye(n)
-    return scale * C, np.array([(margin(task.z + step) - margin(task.z - step)) / (2.0 * STEP) for step in steps])
-
-
-def test_turn_and_speed_do_to_the_margin_by_table_what_its_row_says():
-    random, found = np.random.default_rng(5), []
-    config = ShieldConfig(separation_m=2.0, table_margin_m=0.2)
-    for _ in range(400):
-        state = meeting(random, "surveyor", random.uniform(8.0, 30.0))
-        state[:, L.THRUST] = 100.0
-        at = stages_of(config, state, ["surveyor"] * 2, [0, 1])
-        if screened(at, np.column_stack([random.uniform(1.0, 2.9, 2), random.uniform(-2.0, 2.0, 2)])):
-            continue
-        task = Linearised(at, *built(at))
-        found += [pair for way in range(WAYS) if (pair := table_row_gradients(task, way)) is not None]
-    pairs = np.array(found)
-    told, measured = pairs[np.isfinite(pairs).all(axis=(1, 2))].transpose(1, 2, 0)
-    assert told.shape[1] > 40
-    turns, speeds = np.abs(told - measured)
-    assert np.median(np.abs(measured[0])) > 0.02
-    assert np.mean(turns < 0.002 + 0.05 * np.abs(measured[0])) > 0.9
-    assert np.mean(speeds < 0.002) > 0.9  # at full thrust a step's speed command has next to no effect on the speed
 
 
 def edge(y):

@@ -35,7 +35,7 @@ def scene(own, other, random):
         state[row] = fresh_state(x, y, random.uniform(-180.0, 180.0), random.uniform(0.0, 1.0) * top)
         state[row, [L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = random.uniform(0.0, 100.0), 0.0, 0.0
     at = stages_of(ShieldConfig(profile="rammers", certificate="turning_circle"), state, (own, other), (0, 1))
-    find_neighbours(at.scene, np.zeros(2))
+    find_neighbours(at.scene)
     side, turn = random.choice([-1.0, 1.0]), random.choice([0.0, 45.0, 120.0, 180.0])
     lay_path(0, 0, side, turn, get_platform(own).max_speed_mps, 0, at.scene)
     return at
@@ -115,7 +115,7 @@ def test_who_may_come_near_is_run_through():
     """Close by: the answer is that of the runs, below the cap."""
     at = scene("heron", "surveyor", np.random.default_rng(1))
     at.state[1, [L.X, L.Y]] = at.state[0, [L.X, L.Y]] + [0.0, 4.0]
-    find_neighbours(at.scene, np.zeros(2))
+    find_neighbours(at.scene)
     clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M)
     assert at.work.out[MARGIN] < CAP_M
     assert not is_away(at, int(at.boats.pursuit_samples[0]))

@@ -44,7 +44,7 @@ def stages(*rows, other="surveyor", **settings):
         ["surveyor"] + [other] * (len(rows) - 1),
         [0] + [1] * (len(rows) - 1),
     )
-    find_neighbours(at.scene, np.zeros(len(rows)))
+    find_neighbours(at.scene)
     return at
 
 
@@ -120,7 +120,7 @@ def nimble(thrust, speed_mps, *others):
     row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
     rows = np.array([row, *others])
     at = stages_of(ShieldConfig(profile="rammers"), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
-    find_neighbours(at.scene, np.zeros(len(rows)))
+    find_neighbours(at.scene)
     return at
 
 

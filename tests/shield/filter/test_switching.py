@@ -21,7 +21,7 @@ def test_a_boat_that_passed_goes_back_to_its_backup_when_another_needs_the_room(
     around = Surroundings(keep_out=[(0.0, 34.0, 30.0), (0.0, -34.0, 30.0)])
     shield = BatchedShield(ShieldConfig(), 1, ("heron",) * n, (0,) * n, around)
     for name, values in scene["memory"].items():
-        getattr(shield._memory, name)[0] = values
+        getattr(shield._deciders.memory, name)[0] = values
     for wanted in scene["wanted"]:
         commands = shield.decide(state, np.array(wanted)[None], np.ones((1, n), bool))
         step_all(packed(["heron"] * n), state, commands, shield.config.dt_s)

@@ -70,6 +70,7 @@ def test_settings_of_older_logs_are_called_as_they_are_now():
     assert ShieldConfig.of(**_settings(old)).feared_s == math.inf
     assert ShieldConfig.of(**_settings(old | {"opponent_share": 0.0})).feared_s == 0.0
     assert ShieldConfig.of(**_settings({"adversary_s": None, "profile": "players"})).feared_s == 12.0
+    assert ShieldConfig.of(**_settings({"hysteresis_m": 0.3, "adversary_s": 12.0})).feared_s == 12.0
     for change in ({"opponent_share": 0.5}, {"hunt_s": 12.0}):
         with pytest.raises(ConfigError, match="no settings of this version"):
             _settings(old | change)

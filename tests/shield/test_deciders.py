@@ -1,0 +1,92 @@
+"""One decision after another: a single one is a batch of one, and each boat that decides for itself has its own."""
+
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shield_loops import fill, packed, step_all
+from shield_scenes import bits, fleet_of, relative
+from steerclear.shield import Reason, Shield, ShieldConfig
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.commands import Commands
+from steerclear.shield.decision import Decisions
+
+TEAM = (0, 0, 0, 1, 1)
+
+
+def crowd(seed):
+    """Three herons of ours among two opponents, in 15 m."""
+    random = np.random.default_rng(seed)
+    rows = np.column_stack(
+        [random.uniform(0.0, 15.0, (5, 2)), random.uniform(-180.0, 180.0, 5), random.uniform(0.5, 2.0, 5)]
+    )
+    fleet = fleet_of(rows, TEAM)
+    fill(fleet.state, packed(fleet.platforms))
+    return fleet
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+def test_a_single_decision_is_a_batch_of_one_bit_for_bit(delay_s):
+    config = ShieldConfig(delay_s=delay_s)
+    single, batch = Shield(config), BatchedShield(config, 2, ("heron",) * 5, TEAM)
+    fleets, changed = [crowd(1), crowd(2)], 0
+    states = np.stack([fleet.state for fleet in fleets])
+    singles = [single, copy.deepcopy(single)]
+    ours = np.array([fleet.controlled for fleet in fleets])
+    for step in range(60):
+        wanted = np.random.default_rng(step).uniform([0.0, -90.0], [2.0, 90.0], (2, 5, 2))
+        sent = batch.decide(states, wanted, ours).copy()
+        for game, guard in enumerate(singles):
+            answer = guard.decide(replace(fleets[game], state=states[game].copy()), Commands.game_deg(wanted[game]))
+            assert bits(answer.sent.values) == bits(sent[game])
+            assert bits(answer.certificate_m) == bits(batch.certificate_m[game])
+            assert (answer.reason == batch.reason[game]).all()
+            changed += int(answer.intervened.sum())
+        if step == 30:  # copies go on as what they are copies of
+            batch, singles = copy.deepcopy(batch), pickle.loads(pickle.dumps(singles))
+        step_all(packed(("heron",) * 5), states, sent, 0.1)
+    assert changed > 20
+
+
+def told(coordination, **more) -> Decisions:
+    fleet = replace(crowd(3), **more)
+    return Shield(coordination=coordination).decide(fleet, relative(*[(2.0, 10.0)] * 5))
+
+
+def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
+    team, each = told("team"), told("per_boat")
+    np.testing.assert_array_equal(team.feared_s, each.feared_s)
+    assert np.isnan(team.feared_s[:3]).all()
+    assert (team.feared_s[3:] > 0.0).all()
+    shield = Shield(coordination="per_boat")
+    shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5))
+    assert shield._deciders.asked.ours.any(axis=1).tolist() == [True, True, True, False, False]
+    assert (each.reason[3:] == Reason.NOT_COVERED).all()
+
+
+@pytest.mark.parametrize("teams", [(0, 1, -1), (-1, 1, 1)])
+def test_whoever_is_of_no_team_of_ours_is_feared_whatever_its_number(teams):
+    fleet = fleet_of([(0, 0, 0, 2.0), (20.0, 0, 0, 2.0), (10.0, 40.0, 180.0, 2.0)], teams)
+    fleet = replace(fleet, controlled=np.array([True, True, False]))
+    assert Shield().decide(fleet, relative(*[(2.0, 0.0)] * 3)).feared_s[2] > 0.0
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_who_is_not_covered_any_more_is_bound_by_nobody(coordination):
+    shield, fleet = Shield(coordination=coordination), crowd(3)
+    wanted = relative(*[(2.0, 10.0)] * 5)
+    assert (shield.decide(fleet, wanted).bound[:3] >= 0).any()
+    alone = replace(fleet, controlled=np.array([False, True, False, False, False]))
+    assert (shield.decide(alone, wanted).bound[[0, 2, 3, 4]] == -1).all()
+
+
+def test_a_newcomers_decider_knows_what_the_others_were_told():
+    shield = Shield(coordination="per_boat", delay_s=0.3)
+    fleet = fleet_of([(0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0], names=("b", "c"))
+    for _ in range(3):
+        shield.decide(fleet, relative((2.0, 5.0), (2.0, -5.0)))
+    more = fleet_of([(-30.0, 0, 0, 2.0), (0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0, 0], names=("a", "b", "c"))
+    shield.decide(more, relative((2.0, 0.0), (2.0, 5.0), (2.0, -5.0)))
+    assert np.isfinite(shield._deciders.pending[:, :, 1:]).all()
