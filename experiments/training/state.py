@@ -32,8 +32,9 @@ def live_arrays(batch: Any) -> dict[str, np.ndarray]:
     for name, term in batch.reward.terms.items():
         found |= dict(arrays_in(term, f"reward/{name}"))
     if batch.shield is not None:
-        found |= dict(arrays_in(batch.shield._memory, "shield/memory"))
-        found["shield/pending"] = batch.shield._pending
+        deciders = batch.shield._deciders
+        found |= dict(arrays_in(deciders.memory, "shield/memory"))
+        found["shield/pending"] = deciders.pending
     for name, member in batch.opponent.members.items():
         if not isinstance(member, EachGame):
             found |= dict(arrays_in(member, f"opponent/{name}"))
