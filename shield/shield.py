@@ -294,7 +294,8 @@ class Shield:
         if works is None:
             works = sent.as_relative_deg(heading_deg)
         else:
-            works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
+            with np.errstate(invalid="ignore"):  # what boats not ours were told may be anything
+                works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
         self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
 
     def _around(self, surroundings: Surroundings, deciders: Deciders) -> Static:

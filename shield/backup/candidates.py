@@ -24,12 +24,18 @@ FURTHEST_DEG = 200.0
 
 
 @lean_kernel
-def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
-    """Turn still to make of the manoeuvre in memory, deg; past its target it is done."""
-    if math.isnan(memory.target_deg[i]):
+def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
+    """Turn still to make of a manoeuvre to one side that ends on a heading (NaN: none), deg; past that it is done."""
+    if math.isnan(target_deg):
         return 0.0
-    togo = angle_to_go(heading_deg, memory.target_deg[i], memory.side[i])
+    togo = angle_to_go(heading_deg, target_deg, side)
     return 0.0 if togo > DONE_DEG else togo
+
+
+@lean_kernel
+def kept_turn(i: int, heading_deg: float, memory: Memory) -> float:
+    """Turn still to make of the manoeuvre in memory, deg."""
+    return turn_left(heading_deg, memory.target_deg[i], memory.side[i])
 
 
 @lean_kernel
@@ -44,11 +50,8 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
 
 @lean_kernel
 def found_turn(i: int, heading_deg: float, held: Array) -> float:
-    """Turn still to make, deg, of the manoeuvre noted in ``held``, see `assign.hold`; past its target it is done."""
-    if math.isnan(held[i, 1]):
-        return 0.0
-    togo = angle_to_go(heading_deg, held[i, 1], held[i, 0])
-    return 0.0 if togo > DONE_DEG else togo
+    """Turn still to make of the manoeuvre noted in ``held``, see `assign.hold`, deg."""
+    return turn_left(heading_deg, held[i, 1], held[i, 0])
 
 
 @lean_kernel

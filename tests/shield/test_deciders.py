@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import bits, fleet_of, relative
-from steerclear.shield import Reason, Shield, ShieldConfig
+from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.commands import Commands
 from steerclear.shield.decision import Decisions
@@ -90,3 +90,23 @@ def test_a_newcomers_decider_knows_what_the_others_were_told():
     more = fleet_of([(-30.0, 0, 0, 2.0), (0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0, 0], names=("a", "b", "c"))
     shield.decide(more, relative((2.0, 0.0), (2.0, 5.0), (2.0, -5.0)))
     assert np.isfinite(shield._deciders.pending[:, :, 1:]).all()
+
+
+@pytest.mark.parametrize("solver", ["active_set", "daqp"])
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+@pytest.mark.parametrize("delay_s", [0.0, 0.2])
+@pytest.mark.filterwarnings("error")
+def test_whatever_is_wanted_and_wherever_boats_are_what_is_sent_is_a_command(delay_s, coordination, solver):
+    """Nobody, one boat, boats on one point; wanted is no number, or none that a boat could do."""
+    around = Surroundings(field=(-20.0, -20.0, 20.0, 20.0), keep_out=((0.0, 5.0, 2.0),))
+    for team in ([], [0], [0, 0], [0, 1], [0, 0, 1]):
+        shield = Shield(surroundings=around, coordination=coordination, solver=solver, delay_s=delay_s)
+        fleet = fleet_of([(0.0, 0.0, 0.0, 1.0)] * len(team), team)
+        for value in (1.0, np.nan, np.inf, -np.inf, 1e9, -1e9):
+            decisions = shield.decide(fleet, relative(*[(value, value)] * len(team)))
+            sent, own = decisions.sent.values[fleet.controlled], fleet.controlled
+            assert (np.abs(sent) <= 1e6).all()
+            assert (decisions.reason[own] != Reason.NOT_COVERED).all()
+            assert np.isfinite(decisions.slack_m).all()
+            if not np.isfinite(value):
+                assert (decisions.reason[own] != Reason.PASSED).all()

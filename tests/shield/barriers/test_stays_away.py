@@ -58,6 +58,15 @@ def margins_of_all_runs(at):
         yield at.work.spare[MARGIN]
 
 
+def meetings(own, other, seed):
+    """Those of 300 scenes in which the two can matter to each other."""
+    random = np.random.default_rng(seed)
+    for _ in range(300):
+        at = scene(own, other, random)
+        if at.work.near[0, 1]:
+            yield at
+
+
 def is_away(at, lasts):
     way = max(at.boats.params[1, L.MAX_SPEED], at.state[1, L.SPEED]) * at.boats.sample_s
     closing_m, radius_m = closing(0, 1, at.scene), at.work.radius[0, 1]
@@ -66,11 +75,8 @@ def is_away(at, lasts):
 
 @pytest.mark.parametrize(("own", "other"), [("heron", "heron"), ("heron", "surveyor"), ("surveyor", "heron")])
 def test_no_run_comes_near_who_stays_away(own, other):
-    random, away, pruned = np.random.default_rng(8), 0, 0
-    for _ in range(300):
-        at = scene(own, other, random)
-        if not at.work.near[0, 1]:
-            continue
+    away, pruned = 0, 0
+    for at in meetings(own, other, seed=8):
         capped = all(margin == CAP_M for margin in margins_of_all_runs(at))
         away += capped
         if is_away(at, followed(at)[1]):
@@ -82,11 +88,8 @@ def test_no_run_comes_near_who_stays_away(own, other):
 @pytest.mark.parametrize(("own", "other"), [("heron", "heron"), ("heron", "surveyor"), ("surveyor", "heron")])
 def test_the_clearance_from_a_pursuer_is_the_least_of_all_runs(own, other):
     """Also where no run is made: over the whole pursuit, not a part of it."""
-    random, short, late = np.random.default_rng(9), 0, 0
-    for _ in range(300):
-        at = scene(own, other, random)
-        if not at.work.near[0, 1]:
-            continue
+    short, late = 0, 0
+    for at in meetings(own, other, seed=9):
         clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M)
         told, least = at.work.out[MARGIN], min(margins_of_all_runs(at))
         assert told == least
