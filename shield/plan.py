@@ -21,7 +21,7 @@ class Plan(NamedTuple):
     ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
     ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
     of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each backup the turn, deg, the speed, m/s, and the
-    rank, see `easing`.
+    worth, m, see `easing`.
     """
 
     commands: Array

@@ -29,7 +29,8 @@ class Work(NamedTuple):
         clear: (n + 1, N_CLEARANCE) worst clearance from boats.
         static: (n + 1, N_CLEARANCE) worst clearance from static constraints.
         out, spare, spare2: (N_CLEARANCE,).
-        rank: (n,) rank of the plan held.
+        kept: (n,) what the plan held keeps, see `backup.rank.Rank`.
+        worth_m: (n,) the other entry of its rank, m.
         threat_m: (n + 1,) margin against pursuing opponents alone, m.
         threats_m: (n + 1, n) the same against each, m; as far as they were looked at. Of one that is looked up without
             the run before.
@@ -83,7 +84,8 @@ class Work(NamedTuple):
     out: Array
     spare: Array
     spare2: Array
-    rank: Array
+    kept: IntArray
+    worth_m: Array
     threat_m: Array
     threats_m: Array
     threat_by: IntArray
@@ -139,7 +141,8 @@ def new_work(boats: int, samples: int) -> Work:
             out=np.zeros(N_CLEARANCE),
             spare=np.zeros(N_CLEARANCE),
             spare2=np.zeros(N_CLEARANCE),
-            rank=np.zeros(boats),
+            kept=np.zeros(boats, np.int64),
+            worth_m=np.zeros(boats),
             threat_m=np.zeros(boats + 1),
             threats_m=np.zeros((boats + 1, boats)),
             threat_by=np.full(boats + 1, -1, np.int64),

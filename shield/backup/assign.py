@@ -14,17 +14,13 @@ from ..work import Work
 from .candidates import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
 from .effort import all_spent
 from .laying import lay_path, refused_by_tables, run_out, set_out
-from .rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE, rank_path
+from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_path
 
 SWEEPS = 3
 
-SAME_RANK = 1e-9
-"""Manoeuvres whose ranks differ by no more, m, are alike: rounding, which differs from place to place, decides
-nothing. Of such ones the first is taken, to starboard before to port, as the rules of the road ask."""
-
 
 @lean_kernel
-def _take(i: int, slot: int, rank: float, work: Work) -> None:
+def _take(i: int, slot: int, rank: Rank, work: Work) -> None:
     """Make the trial in ``slot`` boat i's plan."""
     for k in range(work.path.shape[1]):
         copy_row(work.path[i, k], work.path[slot, k])
@@ -41,15 +37,16 @@ def _take(i: int, slot: int, rank: float, work: Work) -> None:
     work.pursuers_known[i] = work.pursuers_known[slot]
     work.sealed[i] = work.sealed[slot]
     work.bound[i] = work.bound[slot]
-    work.rank[i] = rank
+    work.kept[i], work.worth_m[i] = rank
 
 
 @lean_kernel
 def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``best_of`` the best.
 
-    The best that screening found for the state one step on is good enough from here: where that, or the one in memory,
-    is safe no others are looked at. By tables manoeuvres differ from here only, so where an opponent is what the wanted
+    Of manoeuvres that are alike the first is taken, to starboard before to port, as the rules of the road ask. The best
+    that screening found for the state one step on is good enough from here: where that, or the one in memory, is safe
+    no others are looked at. By tables manoeuvres differ from here only, so where an opponent is what the wanted
     command is short of, all are. What a table refuses one step on it refuses for every manoeuvre: then the first that
     keeps clear of all else will do.
 
@@ -58,7 +55,7 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
     state, boats, tuning, memory, work = scene.state, scene.boats, scene.tuning, scene.memory, scene.work
     trial = state.shape[0]
     heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-    best = -1e9
+    best = WORST
     cause = scene.plan.cause[i]
     compared = boats.table_steps[i] > 0 and done == 0 and cause >= 0 and not scene.ours[cause]
     for p in range(boats.n_plans[i] + FAMILY):
@@ -66,7 +63,7 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
             continue
         if p == FOUND and (done == 1 or compared):
             continue
-        if best >= PAIR_SAFE and (not best_of or (p == FAMILY and not compared)):
+        if best.kept == ALL and (not best_of or (p == FAMILY and not compared)):
             return
         side, togo, speed = candidate(i, p, wanted_mps, heading, scene)
         set_out(i, trial, side, togo, speed, done, scene)
@@ -74,7 +71,7 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
             continue
         run_out(i, trial, done, scene)
         rank = rank_path(i, trial, best, scene)
-        if rank > best + SAME_RANK:
+        if better(rank, best):
             best = rank
             _take(i, trial, rank, work)
         if (done == 1 and work.sealed[trial]) or all_spent(tuning, work):
@@ -84,14 +81,15 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
 @lean_kernel
 def refresh(i: int, scene: Scene) -> None:
     """Rate boat i's plan again against the others' present plans."""
-    scene.work.rank[i] = rank_path(i, i, -1e9, scene)
+    work = scene.work
+    work.kept[i], work.worth_m[i] = rank_path(i, i, WORST, scene)
 
 
 @lean_kernel
 def settled(i: int, sweep: int, done: int, memory: Memory, work: Work) -> bool:
     """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
-    was_short = memory.kept[i] and memory.backing_up[i] and (memory.margin_m[i] < 0.0 or work.rank[i] >= STATIC_LOST)
-    if work.rank[i] >= PAIR_SAFE or (sweep > 0 and work.rank[i] >= STRAIGHT_SAFE):
+    was_short = memory.kept[i] and memory.backing_up[i] and (memory.margin_m[i] < 0.0 or work.kept[i] >= OPPONENTS)
+    if work.kept[i] == ALL or (sweep > 0 and work.kept[i] >= OBSTACLES):
         return True
     return done == 1 and was_short
 
@@ -112,12 +110,10 @@ def recheck(scene: Scene) -> bool:
         if plan.moving[i]:
             togo = found_turn(i, work.next_state[i, L.HEADING], plan.held)
             lay_path(i, i, plan.held[i, 0], togo, plan.held[i, 2], 1, scene)
-    good = True
     for i in range(ours.shape[0]):
         if ours[i]:
             refresh(i, scene)
-            good = good and work.rank[i] >= PAIR_SAFE
-    return good
+    return all_keep(ALL, ours, work)
 
 
 @lean_kernel
@@ -172,10 +168,7 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
         if not changed:
             stale = False
             break
-    good = True
     for i in range(n):
-        if ours[i]:
-            if stale or not who[i]:
-                refresh(i, scene)
-            good = good and work.rank[i] >= PAIR_SAFE
-    return good
+        if ours[i] and (stale or not who[i]):
+            refresh(i, scene)
+    return all_keep(ALL, ours, work)

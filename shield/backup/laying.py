@@ -12,7 +12,7 @@ from ..platforms.step import step_boat
 from ..scene import Boats, Scene
 from ..work import Work
 from .paths import Manoeuvre, Span, trace_path
-from .rank import STRAIGHT_BASE, STRAIGHT_SAFE
+from .rank import OBSTACLES, Rank, better, level_to_beat
 
 NO_PURSUERS, PURSUERS_TILL_READY, PURSUERS = range(3)
 """How far pursuers are run through: not at all, until tables answer (thrust is back, and of several for a while), or to
@@ -49,25 +49,25 @@ def set_out(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, d
 
 
 @lean_kernel
-def refused_by_tables(i: int, slot: int, best: float, scene: Scene) -> bool:
+def refused_by_tables(i: int, slot: int, best: Rank, scene: Scene) -> bool:
     """Whether by the tables alone the rank of the manoeuvre in ``slot`` cannot exceed ``best``: no path is needed.
 
     It cannot when a margin is short of its target and the least of them is no better than the best manoeuvre's. Who
     refused the last one is asked first, and nobody after the answer is clear.
     """
     ours, boats, work = scene.ours, scene.boats, scene.work
-    if best < STRAIGHT_SAFE:
+    if best.kept < OBSTACLES:
         return False
     first, least, fails = work.first_refuser[i], FAR, False
     for number in range(ours.shape[0]):
         j = first_then_rest(first, number)
         if j == i or ours[j] or not work.near[i, j] or not table_answers(i, j, slot, boats, work):
             continue
-        enough_m = min(work.threat_target_m[i, j], best - STRAIGHT_BASE) - CLEARLY_M
+        enough_m = min(work.threat_target_m[i, j], level_to_beat(best)) - CLEARLY_M
         margin = margin_at_once(i, j, slot, enough_m, boats, work)
         least = min(least, margin)
         fails = fails or margin < work.threat_target_m[i, j]
-        if fails and STRAIGHT_BASE + least <= best:
+        if fails and not better(Rank(OBSTACLES, least), best):
             work.first_refuser[i] = j
             return True
     return False

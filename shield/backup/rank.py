@@ -1,48 +1,62 @@
-"""What a backup manoeuvre is worth: one number, in the order of what matters."""
+"""What a backup manoeuvre is worth: what it keeps, in the order of what matters, and then by how much."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from ..barriers.boats import worst_clearance
 from ..barriers.clearance import FAR, MARGIN
 from ..barriers.opponents import worst_pursuer
-from ..barriers.static import clear_of_near_obstacles, clear_of_static, share_before_touch
+from ..barriers.static import clear_of_near_obstacles, clear_of_static
 from ..jit import BoolArray, lean_kernel
 from ..scene import Scene
 from ..work import Work
 
-PAIR_SAFE = 1e3
-"""Rank from which a manoeuvre keeps clear of everybody, whatever they are granted, and of static constraints."""
+NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
+"""What is kept, each with all before it: clear of team-mates and of opponents that hold their course; of obstacles near
+in time; what must be kept from all boats, whatever they are granted; what must be kept from static constraints."""
 
 SPARE_WORTH = 1e-3
-"""Rank of a metre to spare from boats; a manoeuvre short of static constraints is worth less than any that is not."""
+"""Worth of a metre to spare from boats beside one that static constraints are short of."""
 
-STATIC_LOST = 500.0
-"""Rank from which it keeps clear of all boats and of obstacles near in time, but not of all static constraints."""
+SAME_M = 1e-6
+"""Margins that differ by no more, m, are alike: rounding, which differs from place to place, decides nothing."""
 
-STRAIGHT_SAFE = 100.0
-"""Rank from which it keeps clear of team-mates, of opponents that hold their course and of obstacles near in time, but
-not of pursuers."""
 
-STRAIGHT_BASE = 300.0
-"""Rank of such a manoeuvre with no margin to the pursuers; the (negative) margin is added."""
+class Rank(NamedTuple):
+    """What a manoeuvre is worth; more is better, entry by entry.
 
-OBSTACLE_BASE = 50.0
-"""Rank of a pursued boat's manoeuvre that touches an obstacle at the end of a half turn's time; sooner, its share of it
-counts. Of another boat's that hardly touches one; deeper, less."""
+    Attributes:
+        kept: the last thing it keeps, `NOTHING` to `ALL`.
+        worth_m: the margin of the next, m, which is short of what must be kept; of `ALL` what is to spare from boats.
+    """
 
-LATER_WORTH = 0.1
-"""Rank of the share of a half turn's time before a touch, for a boat that nobody pursues: 2 cm of depth."""
+    kept: int
+    worth_m: float
 
-DEEP_M = 10.0
-"""Depth in an obstacle, m, at whose half rank begins to fall off more slowly; it never ends, behind walls."""
+
+WORST = Rank(NOTHING, -1e9)
+"""No more than any manoeuvre is worth."""
 
 
 @lean_kernel
-def _level_to_beat(best: float) -> float:
+def better(rank: Rank, best: Rank) -> bool:
+    """Whether a rank is above another by more than rounding."""
+    return rank.kept > best.kept or (rank.kept == best.kept and rank.worth_m > best.worth_m + SAME_M)
+
+
+@lean_kernel
+def rank_of(i: int, work: Work) -> Rank:
+    """Rank of the manoeuvre boat i has."""
+    return Rank(work.kept[i], work.worth_m[i])
+
+
+@lean_kernel
+def level_to_beat(best: Rank) -> float:
     """Margin against pursuers, m, at which a manoeuvre short of what it must keep is no better than the best."""
-    if best >= STATIC_LOST:
+    if best.kept > OBSTACLES:
         return FAR
-    return best - STRAIGHT_BASE if best >= STRAIGHT_SAFE else -FAR
+    return best.worth_m if best.kept == OBSTACLES else -FAR
 
 
 @lean_kernel
@@ -54,73 +68,49 @@ def _ask_no_pursuers(slot: int, work: Work) -> None:
 
 
 @lean_kernel
-def _rank_touching(i: int, slot: int, share: float, best: float, scene: Scene) -> float:
-    """Rank of a path that touches an obstacle after that share of a half turn's time.
-
-    A boat that is pursued had better be stopped late: who is stopped is caught. Among manoeuvres that touch at the same
-    time, as all do of a boat that is too near already and cannot but come nearer, the one that goes least deep is worth
-    more; of a boat that nobody pursues, always, and the later touch decides between those that are as deep. Through a
-    wall the depth is how far behind it the manoeuvre goes, which is least for the one that meets it most gently.
-    """
-    work = scene.work
-    touched = clear_of_near_obstacles(i, slot, scene, work.spare2)
-    depth_m = -work.spare2[MARGIN]
-    shallow = 1.0 - depth_m / DEEP_M if depth_m < 0.5 * DEEP_M else 0.25 * DEEP_M / depth_m
-    rank = OBSTACLE_BASE * shallow + LATER_WORTH * share
-    if work.pursued[i]:
-        rank = OBSTACLE_BASE * share + shallow
-    if rank <= best:
-        return rank
-    worst_pursuer(i, slot, scene, -FAR)
-    work.bound[slot] = touched
-    return rank
-
-
-@lean_kernel
-def rank_path(i: int, slot: int, best: float, scene: Scene) -> float:
+def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     """Rank of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
-    What is certain comes before what is feared: keeping clear of team-mates and of opponents that hold their course
-    first, of obstacles near in time second, of pursuing opponents third; then of all static constraints, and last room
-    to spare. Of a manoeuvre that fails at the first the rank is the margin itself, m. The clearance told is from all
-    boats, whatever the rank hangs on.
+    What is certain comes before what is feared: team-mates and opponents that hold their course first, obstacles near
+    in time second (who is stopped is caught), pursuing opponents third; then all static constraints, and last room to
+    spare. The clearance told is from all boats, whatever the rank hangs on.
     """
     tuning, work = scene.tuning, scene.work
     work.spent[0] += work.cost[i]
     clear = work.clear[slot]
-    floor = best if best < STRAIGHT_SAFE else 0.0
-    worst_clearance(i, slot, scene, min(floor, 0.0))
+    worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else 0.0)
     work.static[slot, MARGIN] = FAR
     if clear[MARGIN] < 0.0:
         _ask_no_pursuers(slot, work)
-        return clear[MARGIN]
-    share = share_before_touch(i, slot, scene)
-    if share < 1.0:
+        return Rank(NOTHING, clear[MARGIN])
+    touched = clear_of_near_obstacles(i, slot, scene, work.spare2)
+    if work.spare2[MARGIN] < 0.0:
+        rank = Rank(BOATS, work.spare2[MARGIN])
         _ask_no_pursuers(slot, work)
-        return _rank_touching(i, slot, share, best, scene)
-    sure = clear[MARGIN]
-    short = work.short[slot]
-    if short and STRAIGHT_BASE + sure <= best:
+        if better(rank, best):
+            worst_pursuer(i, slot, scene, -FAR)
+        work.bound[slot] = touched
+        return rank
+    sure_m, short = clear[MARGIN], work.short[slot]
+    if short and not better(Rank(OBSTACLES, sure_m), best):
         _ask_no_pursuers(slot, work)
-        return STRAIGHT_BASE + sure
-    worst_pursuer(i, slot, scene, _level_to_beat(best))
+        return Rank(OBSTACLES, sure_m)
+    worst_pursuer(i, slot, scene, level_to_beat(best))
     if short or work.fails[slot]:
-        least = min(sure, work.threat_m[slot]) if short else work.threat_m[slot]
-        return max(STRAIGHT_SAFE, STRAIGHT_BASE + least)
+        return Rank(OBSTACLES, min(sure_m, work.threat_m[slot]) if short else work.threat_m[slot])
     nearest = clear_of_static(i, slot, scene, work.static[slot])
     to_spare_m = work.static[slot, MARGIN] - work.static_target_m[i]
-    spare = SPARE_WORTH * min(clear[MARGIN], tuning.margin_cap_m)
+    spare_m = min(clear[MARGIN], tuning.margin_cap_m)
     if to_spare_m >= 0.0:
-        return PAIR_SAFE + spare
+        return Rank(ALL, spare_m)
     work.bound[slot] = nearest
-    return max(STATIC_LOST, PAIR_SAFE + to_spare_m - SPARE_WORTH * tuning.margin_cap_m) + spare
+    return Rank(OPPONENTS, to_spare_m + SPARE_WORTH * spare_m)
 
 
 @lean_kernel
-def worst_rank(ours: BoolArray, work: Work) -> float:
-    """Least rank of any boat of ours."""
-    least = 2.0 * PAIR_SAFE
+def all_keep(least: int, ours: BoolArray, work: Work) -> bool:
+    """Whether every boat of ours keeps at least that much."""
+    keep = True
     for i in range(ours.shape[0]):
-        if ours[i]:
-            least = min(least, work.rank[i])
-    return least
+        keep = keep and (not ours[i] or work.kept[i] >= least)
+    return keep

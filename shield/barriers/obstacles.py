@@ -127,31 +127,3 @@ def clear_of_obstacles(
             lower(out, margin, k, nx, ny)
             x, y = path[k, 0], path[k, 1]
             k += max(1, int(min(margin - out[MARGIN], near_m) / fall_m))
-
-
-@lean_kernel
-def first_touch(
-    here: Array,
-    path: Array,
-    samples: int,
-    way_m: float,
-    drift_m: float,
-    grace: float,
-    static: Static,
-) -> int:
-    """First sample of a path that is too near to an obstacle, ``samples + 1`` for none; arguments as above."""
-    first = samples + 1
-    for o in range(static.circles.shape[0] + static.segments.shape[0]):
-        apart_m = _to_obstacle(here[0], here[1], o, static)[0]
-        excused, known = min(0.0, apart_m), apart_m + static.segment_m >= static.side_m
-        fall_m = way_m + drift_m - excused * (1.0 - grace)
-        x, y = here[0], here[1]
-        k = 0
-        while k < first:
-            margin = _to_obstacle(path[k, 0], path[k, 1], o, static)[0]
-            margin -= excused * grace**k + k * drift_m
-            if margin < 0.0 or (known and _through(x, y, path[k, 0], path[k, 1], o, static)):
-                first = k
-            x, y = path[k, 0], path[k, 1]
-            k += max(1, int(margin / fall_m))
-    return first

@@ -91,19 +91,3 @@ def clear_of_registered(i: int, slot: int, samples: int, drift_m: float, scene: 
         k = int(out[SAMPLE])
         _write_slope(least, path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s, registered, out)
     return least
-
-
-@lean_kernel
-def first_registered_touch(i: int, slot: int, first: int, scene: Scene) -> int:
-    """First sample of boat i's path in ``slot`` at which a registered barrier fails, or ``first``."""
-    boats, tuning, registered, path = scene.boats, scene.tuning, scene.registered, scene.work.path[slot]
-    keeps = grace(boats, scene.static)
-    for b in range(registered.address.shape[0]):
-        excused = _excused(b, i, scene)
-        k = 0
-        while k < first:
-            margin = _margin(b, path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s, registered)
-            if margin - excused * keeps**k < 0.0:
-                first = k
-            k += 1
-    return first

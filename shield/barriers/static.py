@@ -12,8 +12,8 @@ from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Scene
 from .clearance import MARGIN
-from .obstacles import clear_of_obstacles, first_touch, grace
-from .registered import clear_of_registered, first_registered_touch
+from .obstacles import clear_of_obstacles, grace
+from .registered import clear_of_registered
 from .rules import clear_of_rules
 
 STATIC = -2
@@ -56,13 +56,3 @@ def clear_of_near_obstacles(i: int, slot: int, scene: Scene, out: Array) -> int:
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.static_samples[i]
     clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, static), static, out)
     return about(clear_of_registered(i, slot, last, 0.0, scene, out))
-
-
-@lean_kernel
-def share_before_touch(i: int, slot: int, scene: Scene) -> float:
-    """Share of the time of a half turn until boat i touches an obstacle or a registered barrier fails; 1: never."""
-    state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
-    last = boats.static_samples[i]
-    way_m = way_per_sample(i, state, boats)
-    first = first_touch(state[i], work.path[slot], last, way_m, 0.0, grace(boats, static), static)
-    return first_registered_touch(i, slot, first, scene) / (last + 1.0)

@@ -7,7 +7,7 @@ the program, which are linear, then find no answer, and a boat that wants throug
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..backup.rank import PAIR_SAFE, worst_rank
+from ..backup.rank import ALL, SAME_M, all_keep
 from ..jit import lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -17,11 +17,8 @@ from ..scene import Scene
 from .linearised import check
 from .screening import set_targets
 
-TRIALS = 6
-"""Looks for the least share of a backup, the first at none of it: to a 32nd of the way."""
-
-NO_WORSE = 1e-9
-"""Difference of rank that is rounding: a micrometre of distance."""
+TRIALS = 3
+"""Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
 
 
 @lean_kernel
@@ -51,9 +48,9 @@ def _go_back(share: float, i: int, scene: Scene) -> None:
 def _no_worse(scene: Scene) -> bool:
     """Whether no boat of ours has less than with all backups."""
     ours, work, plan = scene.ours, scene.work, scene.plan
-    worse = False
+    worse = not all_keep(ALL, ours, work)
     for i in range(ours.shape[0]):
-        worse = worse or (ours[i] and work.rank[i] < plan.eased[i, 2] - NO_WORSE)
+        worse = worse or (ours[i] and work.worth_m[i] < plan.eased[i, 2] - SAME_M)
     return not worse
 
 
@@ -92,10 +89,10 @@ def ease(count: int, scene: Scene) -> None:
     set_targets(scene)
     work.static_target_m[:] = 0.0
     check(count, scene)
-    if worst_rank(ours, work) < PAIR_SAFE:
+    if not all_keep(ALL, ours, work):
         return
     for i in range(ours.shape[0]):
-        plan.eased[i, 2] = work.rank[i]
+        plan.eased[i, 2] = work.worth_m[i]
     for m in range(count):
         if all_spent(tuning, work):
             return

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..backup.assign import hold
 from ..backup.effort import all_spent
-from ..backup.rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE
+from ..backup.rank import ALL, OBSTACLES, OPPONENTS
 from ..barriers.clearance import MARGIN
 from ..barriers.static import STATIC
 from ..jit import Array, copy_row, lean_kernel
@@ -77,7 +77,7 @@ def commit(scene: Scene) -> None:
             )
         memory.speed_mps[i] = work.plan[i, 2]
         memory.margin_m[i] = work.clear[i, MARGIN]
-        memory.static_m[i] = work.static[i, MARGIN] if work.rank[i] >= STATIC_LOST else 0.0
+        memory.static_m[i] = work.static[i, MARGIN] if work.kept[i] >= OPPONENTS else 0.0
         memory.joint_m[i] = work.joint_m[i] if work.outnumbered[i] else 0.0
         if boats.table_steps[i] > 0:
             copy_row(memory.threat_m[i], work.threats_m[i])
@@ -92,8 +92,8 @@ def _note_causes(scene: Scene) -> None:
     """Note what each boat's wanted command is short of: of an opponent also where a team-mate is nearer."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        plan.cause[i] = work.bound[i] if ours[i] and work.rank[i] < PAIR_SAFE else -1
-        threatened = STRAIGHT_SAFE <= work.rank[i] < STATIC_LOST and work.fails[i] and not work.short[i]
+        plan.cause[i] = work.bound[i] if ours[i] and work.kept[i] < ALL else -1
+        threatened = work.kept[i] == OBSTACLES and work.fails[i] and not work.short[i]
         if ours[i] and threatened and work.threat_by[i] >= 0:
             plan.cause[i] = work.threat_by[i]
 
@@ -103,7 +103,7 @@ def _name_static(scene: Scene) -> None:
     """Say of a command that was changed for static constraints, and keeps them now, that these bind and no boat."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        if ours[i] and plan.cause[i] <= STATIC and work.rank[i] >= PAIR_SAFE and not unchanged(i, plan):
+        if ours[i] and plan.cause[i] <= STATIC and work.kept[i] == ALL and not unchanged(i, plan):
             work.bound[i] = plan.cause[i]
 
 

@@ -6,7 +6,7 @@ import math
 
 from ..backup.assign import recheck
 from ..backup.effort import ROW_COST
-from ..backup.rank import PAIR_SAFE
+from ..backup.rank import ALL
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -26,7 +26,7 @@ def pick_movers(scene: Scene) -> int:
     ours, work, plan = scene.ours, scene.work, scene.plan
     n = ours.shape[0]
     for i in range(n):
-        if ours[i] and work.rank[i] < PAIR_SAFE:
+        if ours[i] and work.kept[i] < ALL:
             plan.moving[i] = True
             j = work.bound[i]
             if j >= 0 and ours[j]:

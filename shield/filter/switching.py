@@ -18,7 +18,7 @@ from ..backup.assign import assign_plans
 from ..backup.candidates import IN_MEMORY, candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
-from ..backup.rank import PAIR_SAFE, STATIC_LOST, STRAIGHT_SAFE, rank_path, worst_rank
+from ..backup.rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_of, rank_path
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import STATIC, clear_of_near_obstacles
@@ -71,7 +71,7 @@ def _given_up(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and static constraints, m."""
     state, work = scene.state, scene.work
     least = min(reported_margin(i, state, work), work.static[i, MARGIN])
-    if work.rank[i] < STATIC_LOST and work.bound[i] <= STATIC:  # of an obstacle near in time nothing is noted
+    if work.kept[i] < OPPONENTS and work.bound[i] <= STATIC:  # of an obstacle near in time nothing is noted
         clear_of_near_obstacles(i, i, scene, work.spare2)
         least = min(least, work.spare2[MARGIN])
     return max(0.0, -least)
@@ -91,13 +91,13 @@ def set_off(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _could_keep(i: int, slot: int, scene: Scene) -> float:
+def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
     """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for j in range(ours.shape[0]):
         if ours[j] and not plan.moving[j]:
             work.near[i, j] = False
-    rank = rank_path(i, slot, -1e9, scene)
+    rank = rank_path(i, slot, WORST, scene)
     for j in range(ours.shape[0]):
         if ours[j] and not plan.moving[j]:
             work.near[i, j] = work.near[j, i]
@@ -114,16 +114,16 @@ def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
     trial = state.shape[0]
     for m in range(count):
         i = plan.movers[m]
-        if work.rank[i] >= PAIR_SAFE:
+        if work.kept[i] == ALL:
             continue
-        if _could_keep(i, i, scene) > work.rank[i]:
+        if better(_could_keep(i, i, scene), rank_of(i, work)):
             return True
         heading = state[i, L.HEADING]
         if not remembered(i, 0, heading, memory):
             continue
         side, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
         lay_path(i, trial, side, togo, speed, 0, scene)
-        if _could_keep(i, trial, scene) > work.rank[i]:
+        if better(_could_keep(i, trial, scene), rank_of(i, work)):
             return True
     return False
 
@@ -144,7 +144,7 @@ def _join_short(scene: Scene) -> int:
     """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
-        if ours[i] and work.rank[i] < STRAIGHT_SAFE:
+        if ours[i] and work.kept[i] < OBSTACLES:
             plan.moving[i] = True
     return list_movers(plan)
 
@@ -203,9 +203,9 @@ def back_up(count: int, scene: Scene) -> None:
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     count = _find_backups(count, scene)
     for i in range(ours.shape[0]):
-        keeps = work.rank[i] >= STATIC_LOST
+        keeps = work.kept[i] >= OPPONENTS
         if ours[i] and (plan.moving[i] or not keeps):
             plan.reason[i] = BACKUP if keeps else BEST_EFFORT
             plan.slack_m[i] = _given_up(i, scene)
-    if _alone(ours, plan) and worst_rank(ours, work) >= PAIR_SAFE and not all_spent(tuning, work):
+    if _alone(ours, plan) and all_keep(ALL, ours, work) and not all_spent(tuning, work):
         ease(count, scene)

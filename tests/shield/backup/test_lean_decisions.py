@@ -7,7 +7,7 @@ from numba import njit
 from shield_scenes import bits, head_on, relative
 from stages import screened, stages_of
 from steerclear.shield import Shield, ShieldConfig, Surroundings
-from steerclear.shield.backup.rank import rank_path
+from steerclear.shield.backup.rank import OBSTACLES, OPPONENTS, WORST, Rank, rank_path
 from steerclear.shield.platforms import layout as L
 
 
@@ -30,7 +30,7 @@ def test_counting_references_changes_no_bit():
     ranks = []
     for seed in range(40):
         at, same = scene(seed), scene(seed)
-        for best in (-1e9, 200.0, 700.0):
+        for best in (WORST, Rank(OBSTACLES, -100.0), Rank(OPPONENTS, 0.0)):
             ranks.append(rank_path(0, 0, best, at.scene))
             assert bits(ranks[-1]) == bits(counted(0, 0, best, same.scene))
             assert bits(at.work.clear) == bits(same.work.clear)

@@ -5,7 +5,7 @@ import pytest
 from stages import screened, stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.laying import refused_by_tables, set_out
-from steerclear.shield.backup.rank import PAIR_SAFE, STRAIGHT_BASE, STRAIGHT_SAFE
+from steerclear.shield.backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, SAME_M, WORST, Rank
 from steerclear.shield.barriers.clearance import FAR
 from steerclear.shield.barriers.value_function import margin_at_once, table_answers
 from steerclear.shield.platforms import layout as L
@@ -39,7 +39,7 @@ def most_rank(at):
             margin = margin_at_once(0, j, TRIAL, -FAR, at.boats, at.work)
             fails = fails or margin < at.work.threat_target_m[0, j]
             margins.append(margin)
-    return max(STRAIGHT_SAFE, STRAIGHT_BASE + min(margins)) if fails else 2.0 * PAIR_SAFE
+    return Rank(OBSTACLES, min(margins)) if fails else Rank(ALL, FAR)
 
 
 @pytest.mark.parametrize("done", [0, 1])
@@ -50,9 +50,10 @@ def test_the_answer_is_that_of_all_look_ups(done):
             set_out(0, TRIAL, side, togo, 3.0, done, at.scene)
             most = most_rank(at)
             at.work.first_refuser[0] = random.integers(0, 4)
-            near = () if most > PAIR_SAFE else (most - 1e-4, most, most + 1e-4)
-            for best in (-1e9, 50.0, STRAIGHT_SAFE, *near, STRAIGHT_BASE, 700.0, PAIR_SAFE):
+            near = [Rank(OBSTACLES, most.worth_m + more) for more in (-1e-4, 0.0, 1e-4)]
+            others = WORST, Rank(BOATS, -1.0), Rank(OBSTACLES, -200.0), Rank(OPPONENTS, -1.0), Rank(ALL, 0.0)
+            for best in (*near, *others):
                 refused = refused_by_tables(0, TRIAL, best, at.scene)
-                assert refused == (most <= best)
+                assert refused == (most.kept == OBSTACLES and most <= Rank(best.kept, best.worth_m + SAME_M))
                 answers.append(refused)
     assert 0.1 < np.mean(answers) < 0.9

@@ -5,7 +5,7 @@ import pytest
 from stages import screened, stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.assign import choose_plan, hold
-from steerclear.shield.backup.rank import rank_path
+from steerclear.shield.backup.rank import OBSTACLES, OPPONENTS, WORST, Rank, rank_path
 from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.opponents import first_then_rest
 from steerclear.shield.platforms import get_platform
@@ -68,14 +68,14 @@ def test_a_manoeuvre_is_worth_the_same_as_far_as_it_counts(crew):
     """Cut short, it is worth no more than the best so far; else the same to the bit, and by the same neighbour."""
     cut = 0
     for at, _ in scenes(*CREWS[crew], count=20):
-        for best in (-1e9, 100.0, 299.0, 301.0, 700.0):
+        for best in (WORST, Rank(OBSTACLES, -200.0), Rank(OBSTACLES, -1.0), Rank(OBSTACLES, 1.0), Rank(OPPONENTS, 0.0)):
             found = set()
             for j, manner in orders():
                 first(at, j, manner)
-                rank = rank_path(0, 0, best, at.scene)
+                rank = Rank(*rank_path(0, 0, best, at.scene))
                 short = rank <= best
                 cut += short
-                found.add((best,) if short else (rank, at.work.clear[0, MARGIN], at.work.bound[0]))
+                found.add((*best,) if short else (*rank, at.work.clear[0, MARGIN], at.work.bound[0]))
             assert len(found) == 1
     assert cut > 100
 
@@ -92,7 +92,9 @@ def test_the_same_manoeuvre_is_chosen(crew, done):
             for j, manner in orders():
                 first(at, j, manner)
                 choose_plan(0, top, done, best_of, at.scene)
-                found.add((*at.work.plan[0], at.work.rank[0], at.work.clear[0, MARGIN], at.work.bound[0]))
+                found.add(
+                    (*at.work.plan[0], at.work.kept[0], at.work.worth_m[0], at.work.clear[0, MARGIN], at.work.bound[0])
+                )
                 changed += at.work.first_pursuer[0] != j
             assert len(found) == 1
     if "followed" in crew or done == 0:  # one step on a table says the same of all manoeuvres: none is cut short
