@@ -9,7 +9,9 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 
 from ..folder_lock import lock_folder
+from ..pool import check_jobs
 from ..training.config_file import read_config
+from . import options as o
 from .console import Interrupted, command, out, progress
 from .train import Config, check_extra
 
@@ -23,12 +25,13 @@ def train_study(
     folder: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder; what is there is taken.")],
     seeds: Seeds = 3,
     games: Games = 50,
+    jobs: o.Jobs = None,
 ) -> None:
     """Train and play {no shield, deployment, training, training + intervention} x {collision term or not} x seeds.
 
     ``steerclear docs DIR`` makes its page. Exit status: 0 done, 2 bad input, 130 interrupted (the same goes on).
     """
-    settings = read_config(config)
+    settings, processes = read_config(config), check_jobs(jobs)
     check_extra()
     from ..training.study import RESULTS, cells, run_study
 
@@ -39,7 +42,7 @@ def train_study(
         raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
     try:
         with progress("trainings and games", len(list(cells(seeds)))) as notice:
-            run_study(settings, folder, seeds, games, lambda done, words: notice(done))
+            run_study(settings, folder, seeds, games, lambda done, words: notice(done), processes)
     except KeyboardInterrupt:
         raise Interrupted(
             f"interrupted: what is done is kept in {folder}; the same command goes on from there"

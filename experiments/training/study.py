@@ -15,6 +15,7 @@ from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
 from ..json_file import read_json
+from ..pool import run_all
 from ..provenance import machine, versions
 from ..store import write_json
 from .algorithms import training_of
@@ -59,8 +60,31 @@ def settings_of_cell(base: TrainingSettings, cell: Cell) -> TrainingSettings:
     return replace(base, shield=shield, rewards=rewards, seed=base.seed + cell.seed)
 
 
+@dataclass(frozen=True)
+class Training:
+    """One training of a study, and the cells that play its network: what a worker is handed."""
+
+    base: TrainingSettings
+    folder: Path
+    games: int
+    cells: tuple[Cell, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return self.cells[0].training
+
+
+def trainings_of(base: TrainingSettings, folder: Path, seeds: int, games: int) -> list[Training]:
+    """The trainings of a study, each once."""
+    sharing: dict[str, list[Cell]] = {}
+    for cell in cells(seeds):
+        sharing.setdefault(cell.training, []).append(cell)
+    return [Training(base, folder, games, tuple(each)) for each in sharing.values()]
+
+
 def run_study(
-    base: TrainingSettings, folder: Path, seeds: int, games: int, notice: Callable[[int, str], None]
+    base: TrainingSettings, folder: Path, seeds: int, games: int, notice: Callable[[int, str], None], jobs: int = 1
 ) -> dict[str, Any]:
     """Train and play every cell; what a folder holds already is taken from there.
 
@@ -69,19 +93,34 @@ def run_study(
         folder: where trainings and results go.
         seeds: per cell.
         games: played per cell and held-out opponent, not seen in training.
-        notice: told cells done, and the one under way.
+        notice: told cells done, and the training that ended last.
+        jobs: trainings at once, a process each.
 
     Raises:
-        ConfigError: QMIX or cloning; a study is of PPO.
+        ConfigError: QMIX or cloning, as a study is of PPO; or a training failed: the others are finished before.
     """
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
-    rows: list[dict[str, Any]] = []
-    for done, cell in enumerate(cells(seeds)):
-        notice(done, cell.training)
-        rows += _cell_rows(base, cell, folder, games)
+    rows: dict[Cell, list[dict[str, Any]]] = {}
+    failed = []
+    notice(0, "")
+    for outcome in run_all(_rows_of, trainings_of(base, folder, seeds, games), jobs):
+        if outcome.answer is None:
+            failed.append(f"{outcome.job.name}: {outcome.error}")
+            continue
+        rows.update(outcome.answer)
+        notice(len(rows), outcome.job.name)
         write_json(folder / RESULTS, _results(base, seeds, games, rows))
+    if failed:
+        raise ConfigError(
+            f"{failed[0]}; {len(rows)} cells are done and kept: mend that and give the same command again"
+        )
     return _results(base, seeds, games, rows)
+
+
+def _rows_of(training: Training) -> dict[Cell, list[dict[str, Any]]]:
+    """Train, or take what is there; play the network in each of its cells."""
+    return {cell: _cell_rows(training.base, cell, training.folder, training.games) for cell in training.cells}
 
 
 def _cell_rows(base: TrainingSettings, cell: Cell, folder: Path, games: int) -> list[dict[str, Any]]:
@@ -123,6 +162,9 @@ def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
     return float(np.average([row[name] for row in rows], weights=[row["games"] for row in rows]))
 
 
-def _results(base: TrainingSettings, seeds: int, games: int, rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _results(
+    base: TrainingSettings, seeds: int, games: int, rows: Mapping[Cell, list[dict[str, Any]]]
+) -> dict[str, Any]:
+    in_order = [row for cell in cells(seeds) for row in rows.get(cell, ())]
     about = {"seeds": seeds, "games": games, "training": asdict(base)}
-    return {"command": COMMAND, "settings": about, "rows": rows, "versions": versions(), "machine": machine()}
+    return {"command": COMMAND, "settings": about, "rows": in_order, "versions": versions(), "machine": machine()}

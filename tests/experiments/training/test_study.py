@@ -1,6 +1,10 @@
+import json
+
+import pytest
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.training.settings import settings_of
 from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
+from steerclear.shield.exceptions import ConfigError
 
 
 def test_a_deployed_shield_shares_the_training_without_one():
@@ -46,3 +50,31 @@ def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     assert "net captures +0.33" in page
     assert "| nothing to shield, deployment | +0.33 | -4.00 |" in page
     assert "| training | on | - | +0.00 | +1.00 | +2.00 | 3.00 |" in page
+
+
+def test_trainings_at_once_give_what_they_give_one_after_another(tiny_content, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    from steerclear.experiments.training.study import run_study
+
+    base = settings_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+    told = []
+    rows = [
+        run_study(base, tmp_path / str(jobs), 1, 1, lambda done, words: told.append(done), jobs)["rows"]
+        for jobs in (1, 2)
+    ]
+    assert rows[0] == rows[1]
+    assert [row["shield"] for row in rows[0]] == [cell.shield for cell in cells(1)]
+    assert told[-1] == 8
+
+
+def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    from steerclear.experiments.training.study import RESULTS, run_study
+
+    base = settings_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+    spoiled = tmp_path / "training-collision_on-seed_0"
+    spoiled.mkdir()
+    (spoiled / "final.npz").write_bytes(b"no weights")
+    with pytest.raises(ConfigError, match=r"training-collision_on-seed_0: .*7 cells are done"):
+        run_study(base, tmp_path, 1, 1, lambda done, words: None)
+    assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7
