@@ -10,7 +10,6 @@ from typing import Any
 from steerclear.shield.config import ShieldConfig
 
 from .markdown import MADE, line, table
-from .plot_labels import label_points
 from .tables import interval_text
 from .tally import RADII_M, breach_column
 
@@ -118,15 +117,21 @@ def _row(fear_s: _Fear, content: Mapping[str, Any], summary: Mapping[str, Any], 
     ]
 
 
+_MARKERS = "osD^vPX*<>"
+"""One for each time that opponents are feared for, the least first."""
+
+
 def _plot(groups: _Groups, path: Path) -> None:
     """Hits with opponents and net of captures against commands changed: a column a game, a line an opponent."""
     from matplotlib.figure import Figure  # without pyplot: no window system is touched
+    from matplotlib.lines import Line2D
 
     games = list(dict.fromkeys((preset, radius_m) for preset, radius_m, _ in groups))
     pairings = list(dict.fromkeys(pairing for _, _, pairing in groups))
-    canvas = Figure(figsize=(2.9 * len(games) + 0.6, 5.2), layout="constrained", dpi=150)
+    fears = sorted({fear_s for runs in groups.values() for fear_s, _, _ in runs})
+    marker = {fear_s: _MARKERS[k % len(_MARKERS)] for k, fear_s in enumerate(fears)}
+    canvas = Figure(figsize=(2.9 * len(games) + 0.6, 5.4), layout="constrained", dpi=150)
     axes = canvas.subplots(2, len(games), squeeze=False, sharex="col", sharey="row")
-    labels: dict[Any, list[tuple[tuple[float, float], str]]] = {}
     for (preset, radius_m, pairing), runs in groups.items():
         column, colour = games.index((preset, radius_m)), f"C{pairings.index(pairing)}"
         changed = [summary["metrics"]["changed_share"]["on"]["value"] for _, _, summary in runs]
@@ -135,9 +140,9 @@ def _plot(groups: _Groups, path: Path) -> None:
             (axes[1, column], "net_captures", "difference"),
         ):
             values = [summary["metrics"][name][state]["value"] for _, _, summary in runs]
-            axis.plot(changed, values, "o-", ms=3, lw=1, color=colour, label=pairing)
-            placed = labels.setdefault(axis, [])
-            placed += [((x, y), _told_fear(fear_s)) for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True)]
+            axis.plot(changed, values, "-", lw=0.8, color=colour)
+            for x, y, (fear_s, _, _) in zip(changed, values, runs, strict=True):
+                axis.plot(x, y, marker[fear_s], ms=4.5, color=colour, mec="white", mew=0.5)
     for (preset, radius_m), column in zip(games, axes.T, strict=True):
         column[0].set_title(f"{preset}, {radius_m:g} m", fontsize=9)
         column[1].set_xlabel("commands changed, %")
@@ -145,10 +150,12 @@ def _plot(groups: _Groups, path: Path) -> None:
     axes[1, 0].set_ylabel("net of captures, on - off")
     for axis in axes.flat:
         axis.axhline(0.0, color="#999999", lw=0.6)
-        axis.margins(x=0.12)
+        axis.margins(x=0.08)
         axis.spines[["top", "right"]].set_visible(False)
-    axes[0, 0].legend(fontsize=7, frameon=False)
-    canvas.draw_without_rendering()  # settles where the axes lie
-    for axis, placed in labels.items():
-        label_points(axis, [point for point, _ in placed], [text for _, text in placed], 6.0)
+    handles = [Line2D([], [], color=f"C{k}", label=pairing) for k, pairing in enumerate(pairings)]
+    handles += [
+        Line2D([], [], ls="", marker=marker[fear_s], color="#555555", label=f"{_told_fear(fear_s)} s")
+        for fear_s in fears
+    ]
+    canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=7, frameon=False)
     canvas.savefig(path)
