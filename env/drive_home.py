@@ -84,25 +84,31 @@ def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array)
 
 
 @lean_kernel
+def decide_boat(rules: Rules, games: Games, actions: Array, commands: Array, b: int, i: int) -> None:
+    """What one boat will obey; fills its row of ``commands``, and ``games.driven``."""
+    state = games.state[b, i]
+    games.driven[b, i] = True
+    on_obstacle = rules.obstacles.bounds.shape[0] > 0 and touches_obstacle(
+        rules.obstacles, state[L.X], state[L.Y], rules.agent_radius[i]
+    )
+    if on_obstacle or games.is_disabled[b, i]:
+        commands[b, i, 0] = 0.0
+        commands[b, i, 1] = 0.0
+    elif games.is_tagged[b, i] or games.oob[b, i]:
+        _drive(rules, games, b, i, commands[b, i])
+    else:
+        games.driven[b, i] = False
+        # the reference hands policies' commands to the autopilot in single precision
+        commands[b, i, 0] = np.float32(actions[b, i, 0])
+        commands[b, i, 1] = np.float32(actions[b, i, 1])
+
+
+@lean_kernel
 def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, first: int, last: int) -> int:
     """`decide_commands` of the games first..last-1."""
-    has_obstacles = rules.obstacles.bounds.shape[0] > 0
     for b in range(first, last):
         for i in range(rules.n_boats):
-            state = games.state[b, i]
-            games.driven[b, i] = True
-            if (
-                has_obstacles and touches_obstacle(rules.obstacles, state[L.X], state[L.Y], rules.agent_radius[i])
-            ) or games.is_disabled[b, i]:
-                commands[b, i, 0] = 0.0
-                commands[b, i, 1] = 0.0
-            elif games.is_tagged[b, i] or games.oob[b, i]:
-                _drive(rules, games, b, i, commands[b, i])
-            else:
-                games.driven[b, i] = False
-                # the reference hands policies' commands to the autopilot in single precision
-                commands[b, i, 0] = np.float32(actions[b, i, 0])
-                commands[b, i, 1] = np.float32(actions[b, i, 1])
+            decide_boat(rules, games, actions, commands, b, i)
             if not (math.isfinite(actions[b, i, 0]) and math.isfinite(actions[b, i, 1])):
                 return b * rules.n_boats + i
     return -1

@@ -92,36 +92,41 @@ def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, comma
 
 
 @lean_kernel
+def move_boat(rules: Rules, games: Games, commands: Array, b: int, i: int) -> None:
+    """One boat's turn in a step, under its row of ``commands`` (B, n, 2): speed m/s, relative heading deg."""
+    state = games.state[b, i]
+    team = rules.team[i]
+    x, y = state[L.X], state[L.Y]
+    games.on_side[b, i] = is_on_side(rules.scrimmage, rules.side_sign[team], x, y)
+    if rules.obstacles.bounds.shape[0] > 0 and touches_obstacle(rules.obstacles, x, y, rules.agent_radius[i]):
+        bounce_off(rules, games, b, i)
+        return
+    before = games.previous_position[b, i]
+    before[0], before[1] = x, y
+    # a policy's command comes in single precision; one that the game or a filter computed does not
+    error = commands[b, i, 1]
+    is_float32 = not games.driven[b, i] and np.float64(np.float32(error)) == error
+    games.error_is_float32[b, i] = obey(
+        rules.params[i], state, is_float32, games.error_is_float32[b, i], commands[b, i], rules.dt_s
+    )
+    if rules.flag_keepout > 0.0 and not games.flag_taken[b, team]:
+        radius = rules.flag_keepout + rules.agent_radius[i]
+        if is_within(state, rules.flag_home[team], radius):
+            keep_out(state, before, rules.flag_home[team], radius)
+    if games.has_flag[b, i]:
+        games.flag_position[b, 1 - team, 0] = state[L.X]
+        games.flag_position[b, 1 - team, 1] = state[L.Y]
+
+
+@lean_kernel
 def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: int) -> None:
     """Every boat's turn in a step, in boat order, in the games first..last-1.
 
     ``commands`` is (B, n, 2): speed m/s, relative heading deg.
     """
-    has_obstacles = rules.obstacles.bounds.shape[0] > 0
     for b in range(first, last):
         for i in range(rules.n_boats):
-            state = games.state[b, i]
-            team = rules.team[i]
-            x, y = state[L.X], state[L.Y]
-            games.on_side[b, i] = is_on_side(rules.scrimmage, rules.side_sign[team], x, y)
-            if has_obstacles and touches_obstacle(rules.obstacles, x, y, rules.agent_radius[i]):
-                bounce_off(rules, games, b, i)
-                continue
-            before = games.previous_position[b, i]
-            before[0], before[1] = x, y
-            # a policy's command comes in single precision; one that the game or a filter computed does not
-            error = commands[b, i, 1]
-            is_float32 = not games.driven[b, i] and np.float64(np.float32(error)) == error
-            games.error_is_float32[b, i] = obey(
-                rules.params[i], state, is_float32, games.error_is_float32[b, i], commands[b, i], rules.dt_s
-            )
-            if rules.flag_keepout > 0.0 and not games.flag_taken[b, team]:
-                radius = rules.flag_keepout + rules.agent_radius[i]
-                if is_within(state, rules.flag_home[team], radius):
-                    keep_out(state, before, rules.flag_home[team], radius)
-            if games.has_flag[b, i]:
-                games.flag_position[b, 1 - team, 0] = state[L.X]
-                games.flag_position[b, 1 - team, 1] = state[L.Y]
+            move_boat(rules, games, commands, b, i)
 
 
 @lean_kernel

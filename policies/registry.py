@@ -185,11 +185,11 @@ def check(name_or_path: str | Path) -> None:
 
 
 def make_batch(name: str, **options: Any) -> BatchPolicy:
-    """A scripted or learned policy for a whole batch of games.
+    """A policy for a whole batch of games.
 
     Args:
-        name: a scripted policy's name, a learned entrant's, ``weights:PATH.npz``, or ``sb3:PATH.zip`` (whose loading
-            runs code of whoever made it).
+        name: a scripted policy's name, that of an entrant that plays batches (the learned ones do),
+            ``weights:PATH.npz``, or ``sb3:PATH.zip`` (whose loading runs code of whoever made it).
         **options: the policy's own options.
 
     Raises:
@@ -197,14 +197,27 @@ def make_batch(name: str, **options: Any) -> BatchPolicy:
     """
     if name in ENTRIES:
         return ScriptedBatch(name, _plan(name, options))
+    found = _batch_builder(name)
+    if found is not None:
+        return _call(found[0], name, options, *found[1])
+    if name in entrants() or name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
+        raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)} and learned teams")
+    raise unknown_policy(name)
+
+
+def plays_batches(name: str) -> bool:
+    """Whether `make_batch` takes a name; whether its file is there is not looked at."""
+    return name in ENTRIES or _batch_builder(name) is not None
+
+
+def _batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | None:
+    """What builds the batch policy of an entrant or a file, and its first arguments; None: single games only."""
     from .entrants.learned import batch_builder
 
-    found = batch_builder(name)
-    if found is not None:
-        return _call(found.build, name, options, *found.first)
-    if name in entrants() or name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
-        raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)}")
-    raise unknown_policy(name)
+    learned, entrant = batch_builder(name), entrants().get(name)
+    if learned is not None:
+        return learned.build, learned.first
+    return None if entrant is None or entrant.batch is None else (entrant.batch, ())
 
 
 def looks_like_path(text: str) -> bool:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from steerclear import policies
-from steerclear.policies.entrants.learned import LearnedBatch, batch_builder
+from steerclear.policies.entrants.learned import LearnedBatch
 from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.registry import ENTRIES
+from steerclear.policies.registry import plays_batches
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 
@@ -22,7 +22,7 @@ LAST = 50
 
 
 def opponent_of(name: str, every: int = 1) -> Any:
-    """The batch policy of a name: scripted and learned ones at once, others one game after another.
+    """The batch policy of a name: those that play batches do, others play one game after another.
 
     Args:
         name: of the policy.
@@ -31,7 +31,7 @@ def opponent_of(name: str, every: int = 1) -> Any:
     Raises:
         PolicyError: there is none.
     """
-    if name in ENTRIES or batch_builder(name) is not None:
+    if plays_batches(name):
         return policies.make_batch(name)
     policies.check(name)
     return EachGame(name, every)
@@ -107,7 +107,7 @@ class Pool:
         for name, member in self.members.items():
             mine = self.playing == name
             if mine.any():
-                if isinstance(member, EachGame):
+                if hasattr(member, "plays"):
                     member.plays(mine)
                 self._out[mine] = member.act(core, team)[mine]
         return self._out

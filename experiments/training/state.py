@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
-from .each_game import EachGame
 from .pool import Pool
 
 _PLAIN = (bool, int, float, str)
@@ -36,7 +35,7 @@ def live_arrays(batch: Any) -> dict[str, np.ndarray]:
         found |= dict(arrays_in(deciders.memory, "shield/memory"))
         found["shield/pending"] = deciders.pending
     for name, member in batch.opponent.members.items():
-        if not isinstance(member, EachGame):
+        if not hasattr(member, "plays"):  # those that do play game after game, and begin anew
             found |= dict(arrays_in(member, f"opponent/{name}"))
     return found
 

@@ -23,12 +23,14 @@ class Entrant:
         description: what it does, in a line.
         team: its name in the paper's tables; empty for newcomers.
         build: from options to a `TeamPolicy`.
+        batch: from the same options to a `BatchPolicy`; None where it plays single games only.
     """
 
     name: str
     description: str
     team: str
     build: Callable[..., Any]
+    batch: Callable[..., Any] | None = None
 
     def files(self) -> str:
         """Digest of the file that holds it; empty for ours, which the digest of the code covers."""
@@ -41,13 +43,16 @@ class Entrant:
 _ENTRANTS: dict[str, Entrant] = {}
 
 
-def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Build]:
+def entrant(
+    name: str, description: str, team: str = "", batch: Callable[..., Any] | None = None
+) -> Callable[[Build], Build]:
     """Enter a team: put above a class, or a function that builds a `TeamPolicy`.
 
     Args:
         name: a new name, of letters, digits, ``_`` and ``-``.
         description: what it does, in a line.
         team: its name in the paper's tables.
+        batch: from the same options to a `BatchPolicy`, where it plays many games at once.
 
     Raises:
         PolicyError: a name that is taken or that could be read as a path, or a class that cannot play.
@@ -64,7 +69,7 @@ def entrant(name: str, description: str, team: str = "") -> Callable[[Build], Bu
         if inspect.isabstract(build):
             missing = ", ".join(sorted(getattr(build, "__abstractmethods__", ())))
             raise PolicyError(f"entrant {name!r} cannot play; give its class: {missing}")
-        _ENTRANTS[name] = Entrant(name, description, team, build)
+        _ENTRANTS[name] = Entrant(name, description, team, build, batch)
         return build
 
     return enter

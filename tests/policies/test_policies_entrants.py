@@ -14,7 +14,7 @@ from steerclear.policies.entrants import catalogue, listing, plane
 from steerclear.policies.entrants.chao import pddl
 from steerclear.policies.entrants.chao.grid import GridProblem
 from steerclear.policies.entrants.chao.search import bolt, search, way_home
-from steerclear.policies.entrants.lucas.model import home_of
+from steerclear.policies.entrants.lucas.home import home_of
 from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.posts import row

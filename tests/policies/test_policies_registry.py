@@ -70,7 +70,7 @@ def test_an_unknown_option_is_explained():
 
 
 def test_a_batch_takes_no_single_game_policies(tmp_path):
-    for name in ("keyboard", "lucas", str(tmp_path)):
+    for name in ("keyboard", "meo", str(tmp_path)):
         with pytest.raises(PolicyError, match="single games only"):
             policies.make_batch(name)
 
