@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 
 from ..plane import distance
@@ -14,10 +13,8 @@ BAIT, DRAG, RUN = 0, 1, 2
 AT_POST_M = 5.0
 NEAR_M = 17.0
 """The second boat sets out when the guard is so near to the bait, m."""
-DRAGGED_M = 10.0
-"""The third sets out when the second is so far beyond the line, m, and the guard this far from the third, m:"""
-GAP_M, GAP_MPS, SOON_S = 12.0, 1.5, 5.0
-"""the more the sooner it may tag again, by so much a second from so long after its last tag."""
+DRAGGED_M, GAP_M = 10.0, 12.0
+"""The third sets out when the second is so far beyond the line, m, and the guard farther than this from the third, m."""
 BAITED_S, LONGEST_S, STALE_S, AGAIN_S = 25.0, 60.0, 30.0, 15.0
 """Longest time for a bait, for a raid, that a blocked chart is kept, and how much of that a success takes off, s."""
 
@@ -42,15 +39,13 @@ class Raid:
 
     def __init__(self, sight: Sight) -> None:
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
-        self._since_s, self._kept_s, self._tagged_s, self._held = sight.time, sight.time, -math.inf, False
+        self._since_s, self._kept_s, self._held = sight.time, sight.time, False
 
     def advance(self, sight: Sight) -> Chart:
         """Look at the game, go on to the next phase or give up; where the raid leads."""
         chart = Chart(sight, self.upper)
         taggers = [foe for foe in sight.foes if may_tag(foe, sight)]
         guard = guard_of(taggers, sight)
-        if guard is not None and guard.recharged:
-            self._tagged_s = sight.time
         is_open = chart.is_open([foe.at for foe in taggers if foe is not guard])
         if self.phase == Phase.GATHER:
             self._gathered(sight, chart, guard, is_open)
@@ -93,10 +88,8 @@ class Raid:
         above = chart.height(guard.at) > 0.5 * sight.size[1] + 1.0
         if self.phase == Phase.BAIT and out and above and distance(guard.at, bait.at) < NEAR_M:
             self.phase = Phase.DRAG
-        since_s = 2.0 * SOON_S if guard.recharged else sight.time - self._tagged_s
-        gap_m = GAP_M + GAP_MPS * max(0.0, since_s - SOON_S)
         drawn = drag.x > sight.line + DRAGGED_M and chart.height(guard.at) < 0.5 * sight.size[1] + 6.0
-        if self.phase == Phase.DRAG and drawn and distance(guard.at, run.at) > gap_m:
+        if self.phase == Phase.DRAG and drawn and distance(guard.at, run.at) > GAP_M:
             self.phase = Phase.RUN
 
     def _end(self, kept_s: float) -> None:
