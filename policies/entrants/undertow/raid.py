@@ -14,7 +14,7 @@ AT_POST_M = 5.0
 NEAR_M = 17.0
 """The second boat sets out when the guard is so near to the bait, m."""
 DRAGGED_M, GAP_M = 10.0, 12.0
-"""The third sets out when the second is so far beyond the line, m, and the guard farther than this from the third, m."""
+"""The third sets out when the second is so far beyond the line and the guard farther than this from the third, m."""
 BAITED_S, LONGEST_S, STALE_S, AGAIN_S = 25.0, 60.0, 30.0, 15.0
 """Longest time for a bait, for a raid, that a blocked chart is kept, and how much of that a success takes off, s."""
 
