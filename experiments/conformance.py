@@ -26,6 +26,8 @@ from steerclear.shield.wrappers import reader_of
 STEPS = 20
 FALL = 1.05
 """Most a margin may fall by in a metre: 1, as a distance, and a little for curves."""
+FASTEST_MPS = 8.0
+"""A margin that falls faster may be below 0 between two samples of a path, by as much as in half of their time, m/s."""
 SLOPE_OFF = 0.05
 """Most a slope may be off the differences of its margin, m per m, at nine of ten places: elsewhere there are edges."""
 
@@ -143,8 +145,8 @@ def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0
         ConfigError: there is no such barrier, or its values are none.
     """
     barrier, random = get_barrier(name), np.random.default_rng(1)
-    values, h, off = barrier.now(), 0.05, list[bool]()
-    _hold(len(values) == len(barrier.now()), f"values of barrier {name!r} are not as many each time; give as many")
+    values, h, off = _values(barrier), 0.05, list[bool]()
+    _hold(len(values) == len(_values(barrier)), f"values of barrier {name!r} are not as many each time; give as many")
     for x, y, ahead in random.uniform((*area_m[:2], 0.0), (*area_m[2:], 60.0), (300, 3)).tolist():
         where = f"at ({x:.1f}, {y:.1f}) m, {ahead:.1f} s ahead"
         row = [_margin(barrier, x + dx, y + dy, ahead, values, where) for dx, dy in _places_round(h)]
@@ -152,16 +154,39 @@ def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0
         if not all(map(math.isfinite, row)):
             continue
         slopes = (row[1] - row[2]) / (2.0 * h), (row[3] - row[4]) / (2.0 * h)
-        fall = math.hypot(*slopes)
+        fall, late = math.hypot(*slopes), _margin(barrier, x, y, ahead + h, values, where)
+        fast = (row[0] - late) / h
+        _hold(
+            not fast > FASTEST_MPS,
+            f"barrier {name!r} falls by {fast:.3g} m in a second {where}, and paths are asked every 0.1 to 0.4 s; "
+            f"no more than {FASTEST_MPS:g} m in a second is sure to be seen: give what moves so fast a wider domain",
+        )
         _hold(fall <= FALL, f"barrier {name!r} falls by {fall:.3g} m in a metre {where}; divide its margin by that")
         if barrier.slope is not None:
-            given = barrier.slope(x, y, ahead, values)
-            off.append(not math.dist(given, slopes) <= SLOPE_OFF)
+            off.append(not math.dist(_slope(barrier, x, y, ahead, values, where), slopes) <= SLOPE_OFF)
     _hold(10 * sum(off) <= len(off), f"the slope of barrier {name!r} is not its margin's; mend it, or leave it out")
 
 
 def _places_round(h: float) -> tuple[tuple[float, float], ...]:
     return (0.0, 0.0), (h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)
+
+
+def _values(barrier: Barrier) -> Array:
+    try:
+        return barrier.now()
+    except Exception as error:  # foreign code may raise anything
+        raise NotConforming(f"values of barrier {barrier.name!r} raise {type(error).__name__}: {error}") from error
+
+
+def _slope(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> tuple[float, float]:
+    assert barrier.slope is not None
+    try:
+        along_x, along_y = (float(part) for part in barrier.slope(x, y, ahead_s, values))
+    except Exception as error:  # foreign code may raise anything
+        raise NotConforming(
+            f"the slope of barrier {barrier.name!r} is no pair of numbers {where}: {type(error).__name__}: {error}"
+        ) from error
+    return along_x, along_y
 
 
 def _margin(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> float:

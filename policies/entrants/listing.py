@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steerclear.shield.entry_points import load_others
 
-from . import alamer, chao, lucas, meo, ohto, options  # noqa: F401 (each enters its team)
+from . import alamer, chao, lucas, meo, ohto, options, undertow  # noqa: F401 (each enters its team)
 from .catalogue import Entrant, entered
 from .learned import entered as _learned  # noqa: F401 (each team with weights)
 

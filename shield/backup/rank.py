@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..barriers.boats import worst_clearance
-from ..barriers.clearance import FAR, MARGIN
+from ..barriers.clearance import FAR, MARGIN, SAMPLE
 from ..barriers.opponents import worst_pursuer
 from ..barriers.static import clear_of_near_obstacles, clear_of_static
 from ..jit import BoolArray, lean_kernel
@@ -19,8 +19,11 @@ in time; what must be kept from all boats, whatever they are granted; what must 
 SPARE_WORTH = 1e-3
 """Worth of a metre to spare from boats beside one that static constraints are short of."""
 
+LATER_WORTH_M = 1e-3
+"""Worth, m, of a sample more before a path is deepest in an obstacle, or where a barrier gives no margin at all."""
+
 SAME_M = 1e-6
-"""Margins that differ by no more, m, are alike: rounding, which differs from place to place, decides nothing."""
+"""Worths that differ by no more, m, are alike: rounding, which differs from place to place, decides between none."""
 
 
 class Rank(NamedTuple):
@@ -28,7 +31,9 @@ class Rank(NamedTuple):
 
     Attributes:
         kept: the last thing it keeps, `NOTHING` to `ALL`.
-        worth_m: the margin of the next, m, which is short of what must be kept; of `ALL` what is to spare from boats.
+        worth_m: decides between those that keep as much, m: of `NOTHING` and `OBSTACLES` the least margin from boats,
+            of `BOATS` that from obstacles, of `OPPONENTS` that from static constraints less what must be kept, and of
+            `ALL` what is to spare from boats.
     """
 
     kept: int
@@ -80,16 +85,17 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     clear = work.clear[slot]
     worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else 0.0)
     work.static[slot, MARGIN] = FAR
-    if clear[MARGIN] < 0.0:
+    if not clear[MARGIN] >= 0.0:
         _ask_no_pursuers(slot, work)
         return Rank(NOTHING, clear[MARGIN])
-    touched = clear_of_near_obstacles(i, slot, scene, work.spare2)
-    if work.spare2[MARGIN] < 0.0:
-        rank = Rank(BOATS, work.spare2[MARGIN])
-        _ask_no_pursuers(slot, work)
+    touched = clear_of_near_obstacles(i, slot, scene, 0.0, work.spare2)
+    if not work.spare2[MARGIN] >= 0.0:
+        rank = Rank(BOATS, work.spare2[MARGIN] + LATER_WORTH_M * work.spare2[SAMPLE])
         if better(rank, best):
             worst_pursuer(i, slot, scene, -FAR)
-        work.bound[slot] = touched
+        else:
+            _ask_no_pursuers(slot, work)
+        work.sealed[slot], work.bound[slot] = False, touched
         return rank
     sure_m, short = clear[MARGIN], work.short[slot]
     if short and not better(Rank(OBSTACLES, sure_m), best):

@@ -89,6 +89,7 @@ def clear_of_obstacles(
     drift_m: float,
     grace: float,
     static: Static,
+    most_m: float,
     out: Array,
 ) -> None:
     """Least clearance, m, of a path from circles and wall segments.
@@ -105,10 +106,11 @@ def clear_of_obstacles(
         drift_m: most a current carries it meanwhile, m.
         grace: factor per sample on what is excused.
         static: the circles and walls, as they are to be kept.
+        most_m: clearances beyond it are told as it, m.
         out: clearance row.
     """
     hull_m, circles = static.segment_m, static.circles.shape[0]
-    out[MARGIN] = FAR
+    out[MARGIN] = most_m
     for o in range(circles + static.segments.shape[0]):
         apart_m = _to_obstacle(here[0], here[1], o, static)[0]
         excused, known = min(0.0, apart_m), apart_m + hull_m >= static.side_m

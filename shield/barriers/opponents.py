@@ -172,7 +172,7 @@ def _forget_threats(slot: int, work: Work) -> None:
 def _note_threat(j: int, slot: int, target_m: float, work: Work) -> None:
     """Note the margin from boat j in ``work.out``: whether it is short of its target, and whether it is the least."""
     margin = work.out[MARGIN]
-    work.fails[slot] = work.fails[slot] or margin < target_m
+    work.fails[slot] = work.fails[slot] or not margin >= target_m
     if margin < work.threat_m[slot]:
         work.threat_m[slot], work.threat_by[slot] = margin, j
 

@@ -45,6 +45,20 @@ def _compiled(barrier: Barrier) -> tuple[int, Any] | None:
     """Address and owner of the compiled function; None where the compiler does not take it."""
     if INTERPRETED:
         return None
+    try:
+        made = cfunc(_SIGNATURE)(_parts_of(barrier))
+    except (NumbaError, TypeError, ValueError, NotImplementedError) as error:
+        LOG.warning(
+            "barrier %r runs as plain Python, some microseconds a call: the compiler does not take it (%s)",
+            barrier.name,
+            type(error).__name__,
+        )
+        return None
+    return int(made.address or 0), made
+
+
+def _parts_of(barrier: Barrier) -> Any:
+    """The function to compile: margin, or slope along x or y, of a barrier."""
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "boundscheck": True}
     margin, h = njit(**options)(barrier.margin), DIFFERENCE_M
 
@@ -67,16 +81,7 @@ def _compiled(barrier: Barrier) -> tuple[int, Any] | None:
             found = math.nan
         return found
 
-    try:
-        made = cfunc(_SIGNATURE)(part_of)
-    except (NumbaError, TypeError, ValueError, NotImplementedError) as error:
-        LOG.warning(
-            "barrier %r runs as plain Python, some microseconds a call: the compiler does not take it (%s)",
-            barrier.name,
-            type(error).__name__,
-        )
-        return None
-    return int(made.address or 0), made
+    return part_of
 
 
 def _interpreted(barrier: Barrier) -> tuple[int, Any]:

@@ -1,8 +1,8 @@
 """Clearance on a path from registered barriers: they count as obstacles do, which stop a boat.
 
 h(x, t) is asked at every sample of the path. A boat that is short of it now has to come no nearer, as from obstacles.
-What is no number, or steeper than any distance, counts as `LOST_M`: nobody knows what is there. How often that was so
-is noted, and said.
+What is no number counts as `LOST_M`: nobody knows what is there. Where nothing is known of the boat's own place, paths
+say nothing of the barrier, and the boat is to stop, see `unknown_at`. How often that was so is noted, and said.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from .pointer import call
 LOST_M = -100.0
 """Margin, m, where a barrier gives none that can be used."""
 
-BEYOND_M = 50.0
-"""Margins beyond this are not looked at closely, m: no step of a boat brings them down to what it keeps."""
+DEEPEST_M = -99.0
+"""Margins below this count as it, m."""
 
 STEEPEST = 10.0
-"""Slopes beyond this, m per m, are no distance's: what is said of a sample then says nothing of the way to the next."""
+"""Slopes beyond this, m per m, are no distance's."""
 
 
 @lean_kernel
@@ -42,24 +42,33 @@ def _margin(b: int, x: float, y: float, ahead_s: float, registered: Registered) 
     if math.isnan(h):
         registered.faults[b] += 1
         return LOST_M
-    return max(LOST_M, min(FAR, h - registered.off_m))
+    return max(DEEPEST_M, min(FAR, h - registered.off_m))
 
 
 @lean_kernel
-def _excused(b: int, i: int, scene: Scene) -> float:
-    """What boat i is short of barrier b now, m, <= 0; nothing where nothing is known of it."""
-    h = _margin(b, scene.state[i, L.X], scene.state[i, L.Y], 0.0, scene.registered)
-    return min(0.0, h) if h > LOST_M else 0.0
+def unknown_at(i: int, scene: Scene) -> int:
+    """First barrier that gives no margin where boat i is, -1 for none: what was wanted of it rests on nothing."""
+    state, registered = scene.state, scene.registered
+    for b in range(registered.address.shape[0]):
+        if _margin(b, state[i, L.X], state[i, L.Y], 0.0, registered) <= LOST_M:
+            return b
+    return -1
 
 
 @lean_kernel
-def _write_slope(b: int, x: float, y: float, ahead_s: float, registered: Registered, out: Array) -> None:
-    """Write the slope of barrier b into a clearance row; one that is none, or far too steep, makes it `LOST_M`."""
+def write_slope(b: int, i: int, slot: int, scene: Scene, out: Array) -> None:
+    """Write the slope of barrier b at the sample of a clearance row; one that is none, or far too steep, as 0.
+
+    It only helps the program to propose: what is proposed is checked by margins.
+    """
+    boats, tuning, registered, path = scene.boats, scene.tuning, scene.registered, scene.work.path[slot]
+    k = int(out[SAMPLE])
+    x, y, ahead_s = path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s
     nx, ny = _ask(b, x, y, ahead_s, 1, registered), _ask(b, x, y, ahead_s, 2, registered)
-    out[NORMAL_X], out[NORMAL_Y] = nx, ny
     if not nx * nx + ny * ny <= STEEPEST * STEEPEST:
         registered.faults[b] += 1
-        out[MARGIN], out[NORMAL_X], out[NORMAL_Y] = LOST_M, 0.0, 0.0
+        nx, ny = 0.0, 0.0
+    out[NORMAL_X], out[NORMAL_Y] = nx, ny
 
 
 @lean_kernel
@@ -72,22 +81,22 @@ def clear_of_registered(i: int, slot: int, samples: int, drift_m: float, scene: 
         samples: last sample.
         drift_m: most a current carries it from sample to sample, m.
         scene: the scene.
-        out: clearance row; its normal is the slope of the barrier, m per m.
+        out: clearance row; its normal is not written, see `write_slope`.
 
     Returns:
         Number of the barrier that lowered it, -1 for none.
     """
-    boats, tuning, registered, path = scene.boats, scene.tuning, scene.registered, scene.work.path[slot]
-    keeps, least = grace(boats, scene.static), -1
+    state, boats, tuning, registered = scene.state, scene.boats, scene.tuning, scene.registered
+    path, keeps, least = scene.work.path[slot], grace(boats, scene.static), -1
     for b in range(registered.address.shape[0]):
-        excused = _excused(b, i, scene)
+        now_m = _margin(b, state[i, L.X], state[i, L.Y], 0.0, registered)
+        if now_m <= LOST_M:
+            continue
+        excused = min(0.0, now_m)
         for k in range(samples + 1):
             margin = _margin(b, path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s, registered)
             margin -= excused * keeps**k + k * drift_m
             if margin < out[MARGIN]:
                 lower(out, margin, k, 0.0, 0.0)
                 least = b
-    if least >= 0 and out[MARGIN] < BEYOND_M:
-        k = int(out[SAMPLE])
-        _write_slope(least, path[k, 0], path[k, 1], tuning.model_s + k * boats.sample_s, registered, out)
     return least

@@ -11,7 +11,7 @@ from __future__ import annotations
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Scene
-from .clearance import MARGIN
+from .clearance import FAR, MARGIN
 from .obstacles import clear_of_obstacles, grace
 from .registered import clear_of_registered
 from .rules import clear_of_rules
@@ -22,7 +22,10 @@ STATIC = -2
 
 @lean_kernel
 def about(barrier: int) -> int:
-    """What binds, in the place of a neighbour: the registered barrier of that number; -1: something else static."""
+    """What binds, in the place of a neighbour: the registered barrier of that number; -1: something else static.
+
+    The same turns it back into the number.
+    """
     return STATIC - 1 - barrier
 
 
@@ -43,16 +46,16 @@ def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
     drift_m = static.current_mps * boats.sample_s
     near = boats.static_samples[i]
     clear_of_rules(state[i], path, near, last, static, way_m, drift_m, boats.sample_s, out)
-    clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, static), static, work.spare2)
+    clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, static), static, FAR, work.spare2)
     if work.spare2[MARGIN] < out[MARGIN]:
         copy_row(out, work.spare2)
     return about(clear_of_registered(i, slot, last, drift_m, scene, out))
 
 
 @lean_kernel
-def clear_of_near_obstacles(i: int, slot: int, scene: Scene, out: Array) -> int:
-    """The same from obstacles and registered barriers alone until a half turn could be over."""
+def clear_of_near_obstacles(i: int, slot: int, scene: Scene, most_m: float, out: Array) -> int:
+    """The same from obstacles and registered barriers alone until a half turn could be over, ``most_m`` at most."""
     state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
     path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.static_samples[i]
-    clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, static), static, out)
+    clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, static), static, most_m, out)
     return about(clear_of_registered(i, slot, last, 0.0, scene, out))

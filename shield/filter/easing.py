@@ -50,7 +50,7 @@ def _no_worse(scene: Scene) -> bool:
     ours, work, plan = scene.ours, scene.work, scene.plan
     worse = not all_keep(ALL, ours, work)
     for i in range(ours.shape[0]):
-        worse = worse or (ours[i] and work.worth_m[i] < plan.eased[i, 2] - SAME_M)
+        worse = worse or (ours[i] and not work.worth_m[i] >= plan.eased[i, 2] - SAME_M)
     return not worse
 
 

@@ -14,10 +14,11 @@ from ..backup.assign import hold
 from ..backup.effort import all_spent
 from ..backup.rank import ALL, OBSTACLES, OPPONENTS
 from ..barriers.clearance import MARGIN
-from ..barriers.static import STATIC
+from ..barriers.registered import unknown_at
+from ..barriers.static import STATIC, about
 from ..jit import Array, copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
-from ..plan import BACKUP, BEST_EFFORT, QP, unchanged
+from ..plan import BACKUP, BEST_EFFORT, HELD, QP, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
@@ -100,9 +101,14 @@ def _note_causes(scene: Scene) -> None:
 
 @lean_kernel
 def _name_static(scene: Scene) -> None:
-    """Say of a command that was changed for static constraints, and keeps them now, that these bind and no boat."""
+    """Say of a command that was changed for static constraints, and keeps them now, that these bind and no boat.
+
+    So does a barrier of a boat that is to stop since it tells nothing where that is.
+    """
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
+        if ours[i] and plan.reason[i] == HELD and unknown_at(i, scene) >= 0:
+            work.bound[i] = about(unknown_at(i, scene))
         if ours[i] and plan.cause[i] <= STATIC and work.kept[i] == ALL and not unchanged(i, plan):
             work.bound[i] = plan.cause[i]
 

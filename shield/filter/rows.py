@@ -20,7 +20,8 @@ import math
 
 from ..barriers.boats import clear_of_boat, must_keep
 from ..barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
-from ..barriers.static import clear_of_near_obstacles, clear_of_static
+from ..barriers.registered import write_slope
+from ..barriers.static import about, clear_of_near_obstacles, clear_of_static
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -145,6 +146,13 @@ def _static_row(r: int, m: int, target_m: float, count: int, scene: Scene) -> bo
 
 
 @lean_kernel
+def _write_slope(nearest: int, i: int, scene: Scene) -> None:
+    """Complete the clearance row in ``work.out`` of boat i by the slope of a registered barrier, if it is one's."""
+    if about(nearest) >= 0:
+        write_slope(about(nearest), i, i, scene, scene.work.out)
+
+
+@lean_kernel
 def _out_of_reach(r: int, count: int, lack: float, tuning: Tuning, plan: Plan) -> bool:
     """Whether no inputs within their limits could violate row r: the margin exceeds all they can take from it."""
     root = math.sqrt(tuning.speed_weight)
@@ -209,10 +217,10 @@ def build_rows(count: int, scene: Scene) -> int:
         r = _rows_of_boats(r, m, count, scene)
         if r < 0:
             return -1
-        clear_of_near_obstacles(i, i, scene, work.out)
+        _write_slope(clear_of_near_obstacles(i, i, scene, FAR, work.out), i, scene)
         if _static_row(r, m, 0.0, count, scene):
             r = _label(r, i, NEAR_OBSTACLES, plan)
-        clear_of_static(i, i, scene, work.out)
+        _write_slope(clear_of_static(i, i, scene, work.out), i, scene)
         if _static_row(r, m, work.static_target_m[i], count, scene):
             r = _label(r, i, ALL_STATIC, plan)
     return _box_rows(r, count, scene.tuning, plan)

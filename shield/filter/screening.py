@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..backup.assign import assign_plans
 from ..barriers.clearance import FAR
 from ..barriers.neighbours import find_neighbours
+from ..barriers.registered import unknown_at
 from ..jit import Array, copy_row, lean_kernel
 from ..liveness.right_of_way import apply_right_of_way
 from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
@@ -66,8 +67,8 @@ def set_targets(scene: Scene) -> None:
 def screen(scene: Scene) -> bool:
     """Check the wanted commands as they are; True when every boat still has its backup after them.
 
-    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`) is replaced by holding course at zero speed before
-    the check.
+    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`), or one of a boat of whose place a registered
+    barrier tells nothing, is replaced by holding course at zero speed before the check.
     """
     state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
     n, wanted = state.shape[0], work.wanted
@@ -80,7 +81,8 @@ def screen(scene: Scene) -> bool:
         plan.reason[i] = PASSED if ours[i] else NOT_COVERED
         if not ours[i]:
             continue
-        if not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
+        usable = abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND
+        if not usable or unknown_at(i, scene) >= 0:
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
         apply_right_of_way(i, scene)

@@ -18,10 +18,10 @@ from ..backup.assign import assign_plans
 from ..backup.candidates import IN_MEMORY, candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
-from ..backup.rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_of, rank_path
+from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_of, rank_path
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
-from ..barriers.static import STATIC, clear_of_near_obstacles
+from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
 from ..jit import BoolArray, lean_kernel
 from ..plan import BACKUP, BEST_EFFORT, Plan, unchanged
@@ -71,8 +71,8 @@ def _given_up(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and static constraints, m."""
     state, work = scene.state, scene.work
     least = min(reported_margin(i, state, work), work.static[i, MARGIN])
-    if work.kept[i] < OPPONENTS and work.bound[i] <= STATIC:  # of an obstacle near in time nothing is noted
-        clear_of_near_obstacles(i, i, scene, work.spare2)
+    if work.kept[i] == BOATS:  # of an obstacle near in time nothing else is noted
+        clear_of_near_obstacles(i, i, scene, 0.0, work.spare2)
         least = min(least, work.spare2[MARGIN])
     return max(0.0, -least)
 

@@ -1,6 +1,7 @@
 """Barriers of other people's: boats keep them as they keep off obstacles, and what is broken there fails closed."""
 
 import copy
+import functools
 import json
 import logging
 import math
@@ -107,12 +108,12 @@ def test_what_binds_is_named():
 
 
 def test_a_barrier_counts_as_an_obstacle_of_the_same_place_does():
-    """A circle as an obstacle without a hull, and as a barrier: every command is the same, to rounding."""
+    """A circle as an obstacle without a hull, and as a barrier: the same way, but for millimetres kept and easing's quarters."""
     register_barrier(Barrier("rock", ferrys, values=(1.0, 20.0, 0.0, 0.0, 4.0)))
     round_it = sail(Shield(barriers=("rock",)), lone(), north, 250)
     stopped = sail(Shield(surroundings=Surroundings(stops=((1.0, 20.0, 4.0),))), lone(), north, 250)
     assert (stopped.reason != Reason.PASSED).any()
-    assert np.allclose(round_it.position, stopped.position, atol=0.05)
+    assert np.allclose(round_it.position, stopped.position, atol=0.15)
 
 
 def test_where_it_does_not_matter_commands_pass_bit_for_bit():
@@ -131,18 +132,26 @@ def test_where_nothing_is_kept_a_margin_may_be_infinite(settings):
 
 
 def test_its_own_slope_is_taken():
-    asked = []
+    """By the program, which is asked where team-mates are in the way."""
 
     def slope(x_m, y_m, ahead_s, values):
         asked.append((x_m, y_m))
         return 0.0, -1.0
 
-    shore = Barrier("shore", lambda x, y, ahead, values: 12.0 - y + 0.0 * len(asked), slope)
-    register_barrier(shore)
-    run = sail(Shield(barriers=("shore",)), lone(), north, 120)
+    asked = []
+    register_barrier(Barrier("shore", lambda x, y, ahead, values: 12.0 - y + 0.0 * len(asked), slope))
+    fleet = Fleet.of(
+        position_m=[[0.0, 0.0], [8.0, 0.0]],
+        heading_rad=[0.5 * math.pi, -0.5 * math.pi],
+        speed_mps=[1.5, 1.5],
+        team=[0, 0],
+        platforms="heron",
+    )
+    ahead = lambda step, state: np.array([[1.5, 0.0], [1.5, 0.0]])  # noqa: E731
+    run = sail(Shield(barriers=("shore",)), fleet, ahead, 60)
     assert asked
+    assert (run.reason == Reason.QP).any()
     assert run.position[..., 1].max() < 12.01
-    assert run.position[..., 1].max() > 10.0
 
 
 def wrong_value(x, y, ahead, values):
@@ -165,23 +174,22 @@ def of_no_type(x, y, ahead, values):
     return "deep"
 
 
-@pytest.mark.parametrize("margin", [wrong_value, raises, beyond_its_values, cliff, of_no_type])
+@pytest.mark.parametrize("margin", [wrong_value, raises, beyond_its_values, of_no_type])
 @pytest.mark.parametrize("compiled", [True, False])
-def test_what_gives_no_usable_margin_counts_as_violated_and_the_log_says_so(margin, compiled, caplog, monkeypatch):
+def test_where_a_barrier_gives_no_margin_the_boat_stops_and_the_log_says_so(margin, compiled, caplog, monkeypatch):
     if not compiled:
         monkeypatch.setattr("steerclear.shield.barriers.pointer._compiled", lambda barrier: None)
     monkeypatch.setattr("steerclear.shield.barriers.pointer._MADE", {})
     register_barrier(Barrier("chart", margin))
     with caplog.at_level(logging.WARNING):
         decision = Shield(barriers=("chart",)).decide(lone(y_m=4.0), Commands.relative_deg([[1.5, 0.0]]))[0]
-    assert decision.reason in (Reason.BACKUP, Reason.BEST_EFFORT)
+    assert (decision.reason, decision.sent_speed_mps) == (Reason.HELD, 0.0)
     assert decision.binding == ("chart",)
-    assert math.isfinite(decision.sent_speed_mps)
     assert "'chart' gave no usable margin" in caplog.text
 
 
 @pytest.mark.parametrize("broken", ["raises", "nan"])
-def test_values_that_cannot_be_had_count_as_violated(broken, caplog):
+def test_without_its_values_the_boat_stops(broken, caplog):
     answers = [[1.0]]
 
     def now():
@@ -195,7 +203,7 @@ def test_values_that_cannot_be_had_count_as_violated(broken, caplog):
     with caplog.at_level(logging.WARNING):
         decision = shield.decide(lone(), wanted)[0]
     assert decision.binding == ("ais",)
-    assert decision.reason is Reason.BEST_EFFORT
+    assert (decision.reason, decision.sent_speed_mps) == (Reason.HELD, 0.0)
     assert "no values now" in caplog.text
 
 
@@ -266,3 +274,80 @@ def test_a_good_barrier_conforms_and_others_are_told_why():
         check_barrier("sloping")
     register_barrier(Barrier("free", lambda x, y, ahead, values: math.inf))
     check_barrier("free")
+
+
+def test_a_cliff_is_kept_whatever_its_slope():
+    register_barrier(Barrier("cliff", cliff))
+    run = sail(Shield(barriers=("cliff",)), lone(y_m=-4.0), north, 120)
+    assert 3.0 < run.position[..., 1].max() < 5.01
+
+
+class Callable:
+    def __call__(self, x_m, y_m, ahead_s, ferry):
+        return ferrys(x_m, y_m, ahead_s, ferry)
+
+
+@pytest.mark.parametrize("odd", [functools.partial(ferrys), Callable(), Callable().__call__])
+def test_what_is_no_plain_function_is_interpreted(odd):
+    register_barrier(Barrier("odd", odd, values=NEAR))
+    decision = Shield(barriers=("odd",)).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
+    assert decision.intervened
+    assert decision.binding == ("odd",)
+
+
+def test_what_is_seen_too_late_or_raises_does_not_conform():
+    def no_values():
+        if answers:
+            raise OSError("no AIS")
+        answers.append(1)
+        return FERRY
+
+    answers = []
+    register_barrier(Barrier("fast", ferrys, values=(0.0, 0.0, 15.0, 0.0, 5.0)))
+    register_barrier(Barrier("ais", ferrys, values=no_values))
+    register_barrier(Barrier("triple", ferrys, lambda x, y, ahead, values: (0.0, 0.0, 0.0), FERRY))
+    for name, why in (("fast", "in a second"), ("ais", "OSError: no AIS"), ("triple", "no pair of numbers")):
+        with pytest.raises(NotConforming, match=why):
+            check_barrier(name)
+
+
+def wall_of_nothing(x, y, ahead, values):
+    return math.nan
+
+
+def edge_and_rammer(step, state):
+    """Boat 0 wants east, over the edge; boat 1 steers at it."""
+    dx, dy = state[0, :2] - state[1, :2]
+    bearing = np.degrees(np.arctan2(dx, dy))
+    return np.array([[1.5, 90.0 - state[0, 2]], [2.0, (bearing - state[1, 2] + 180.0) % 360.0 - 180.0]])
+
+
+@pytest.mark.parametrize("barriers", [(), ("far",), ("nothing",)])
+def test_a_barrier_hides_neither_pursuers_nor_edges_nor_obstacles(barriers):
+    """One that is kept with no slope, and one of which nothing is known: then the boat stops, but for a backup."""
+    register_barrier(Barrier("far", lambda x, y, ahead, values: 30.0, lambda x, y, ahead, values: (math.nan, 0.0)))
+    register_barrier(Barrier("nothing", wall_of_nothing))
+    around = Surroundings(field=(-60.0, -60.0, 12.0, 60.0), circles=((6.0, 0.0, 1.0),))
+    fleet = Fleet.of(
+        position_m=[[0.0, 0.0], [-10.0, 14.0]],
+        heading_rad=[0.5 * math.pi, math.pi],
+        speed_mps=[1.5, 2.0],
+        team=[0, 1],
+        platforms="heron",
+        controlled=[True, False],
+    )
+    run = sail(Shield(barriers=barriers), fleet, edge_and_rammer, 100, around)
+    gap_m = np.linalg.norm(run.position[:, 0] - run.position[:, 1], axis=1)
+    assert gap_m.min() > 2.5
+    assert run.position[:, 0, 0].max() < 12.0
+    assert np.linalg.norm(run.position[:, 0] - (6.0, 0.0), axis=1).min() > 1.0
+
+
+def uncharted(x, y, ahead, values):
+    return 30.0 if y < 6.0 else math.nan
+
+
+def test_a_boat_stays_out_of_where_nothing_is_known():
+    register_barrier(Barrier("chart", uncharted))
+    run = sail(Shield(barriers=("chart",)), lone(), north, 200)
+    assert 4.0 < run.position[:, 0, 1].max() < 6.01

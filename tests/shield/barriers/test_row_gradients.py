@@ -61,7 +61,7 @@ class Linearised:
         if j >= 0:
             clear_of_boat(i, j, at.work.path[i], at.scene, -FAR, FAR)
         elif j == rows.NEAR_OBSTACLES:
-            clear_of_near_obstacles(i, i, at.scene, at.work.out)
+            clear_of_near_obstacles(i, i, at.scene, FAR, at.work.out)
         else:
             clear_of_static(i, i, at.scene, at.work.out)
         return at.work.out[MARGIN]

@@ -71,7 +71,7 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
     out, static = np.zeros(N_CLEARANCE), things(circles, walls, hull_m, side_m)
-    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, static, out)
+    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, static, FAR, out)
     excuse = grace ** np.arange(last + 1)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     left = [each - min(0.0, each[0]) * excuse for each in margins]
@@ -90,14 +90,14 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
 def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
     out, circle = np.zeros(N_CLEARANCE), np.array([[0.0, 0.0, 5.0]])
     outwards = np.column_stack([np.linspace(4.0, 9.0, 20), np.zeros(20)])
-    clear_of_obstacles(outwards[0], outwards, 19, 1.0, 0.0, 1.0, things(circle), out)
+    clear_of_obstacles(outwards[0], outwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
     assert out[MARGIN] == 0.0
-    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, 0.0, 1.0, things(circle), out)
+    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
     assert out[MARGIN] == 0.0
     inwards = np.column_stack([np.linspace(4.0, 1.0, 20), np.zeros(20)])
-    clear_of_obstacles(inwards[0], inwards, 19, 1.0, 0.0, 1.0, things(circle), out)
+    clear_of_obstacles(inwards[0], inwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
     assert out[MARGIN] == pytest.approx(-3.0)
-    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, 0.0, 1.0, things(circle), out)
+    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
     assert out[MARGIN] == pytest.approx(-4.0)  # outside so far: there is nothing to excuse
 
 
@@ -107,10 +107,10 @@ WALL = np.array([[-5.0, 0.0, 5.0, 0.0]])
 def test_a_wall_that_no_sample_is_near_is_not_gone_through():
     """Samples 0.5 m before a wall and 0.5 m behind it, of a boat of 0.2 m."""
     path, out = np.array([[0.0, -1.5], [0.0, -0.5], [0.0, 0.5], [0.0, 1.5]]), np.zeros(N_CLEARANCE)
-    clear_of_obstacles(path[0], path, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), out)
+    clear_of_obstacles(path[0], path, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), FAR, out)
     assert out[[MARGIN, SAMPLE, NORMAL_Y]] == pytest.approx([-1.7, 3, -1.0])
     aside = path + np.array([5.5, 0.0])
-    clear_of_obstacles(aside[0], aside, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), out)
+    clear_of_obstacles(aside[0], aside, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), FAR, out)
     assert out[MARGIN] > 0.0  # past its end
 
 
@@ -119,7 +119,7 @@ def test_a_boat_too_near_to_a_wall_may_leave_it_on_its_side_and_on_either_when_t
     out = np.zeros(N_CLEARANCE)
     for way in (1.0, -1.0):
         path = np.column_stack([np.zeros(20), -0.1 + way * np.linspace(0.0, 6.0, 20)])
-        clear_of_obstacles(path[0], path, 19, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.7, side_m=side_m), out)
+        clear_of_obstacles(path[0], path, 19, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.7, side_m=side_m), FAR, out)
         if way < 0.0 or side_m > 0.1:
             assert out[MARGIN] >= -0.1
         else:
@@ -162,7 +162,7 @@ def test_the_edge_counts_only_as_long_as_it_is_looked_at():
 def test_nothing_there_is_far_away():
     out = np.zeros(N_CLEARANCE)
     path = np.zeros((5, 2))
-    clear_of_obstacles(path[0], path, 4, 1.0, 0.3, 1.0, things(hull_m=1.0), out)
+    clear_of_obstacles(path[0], path, 4, 1.0, 0.3, 1.0, things(hull_m=1.0), FAR, out)
     assert out[MARGIN] == FAR
     clear_of_rules(path[0], path, 4, 4, things(field=np.array([-1e9, -1e9, 1e9, 1e9])), 1.0, 0.3, 0.5, out)
     assert out[MARGIN] == FAR
