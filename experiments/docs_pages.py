@@ -98,6 +98,8 @@ def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[
         pictures += picture
     for content in (one for one in results if one.get("command") not in POOLED and one not in dials):
         name, text, picture = _page_of(content, folder)
+        if name in pages:
+            raise ConfigError(f"two of the results make {name}; give them one at a time, with an --out for each")
         pages[name] = text
         pictures += picture
     return pages, pictures

@@ -39,7 +39,7 @@ COSTS = {
     "adversary_s": Cost("s", "the dial between safety and play", "[price](price.md)"),
     "visitor_s": Cost("s", "less: tags are kept, and visitors that ram get nearer", "[studies](studies/method.md)"),
     "profile": Cost("name", "names an `adversary_s` and a `visitor_s`", "[price](price.md)"),
-    "response_per_s": Cost("1/s", "lower: earlier, gentler, more commands changed; inf: as late as possible", _STUDY),
+    "response_per_s": Cost("1/s", "lower: earlier and gentler; inf: as late as possible", _STUDY),
     "table_response_per_s": Cost("1/s", "as above", _STUDY),
     "fixed_response_per_s": Cost(
         "1/s", "without it boats weave along edges and lose up to two thirds of their speed", _STUDY

@@ -37,8 +37,8 @@ class ShieldConfig:
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
         solver: what solves the program: "active_set", the compiled solver, or a backend by its name in qpsolvers.
         adversary_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds its
-            course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and the more
-            commands are changed. Against a boat that is slow it counts from when that is under way, see
+            course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and of slow
+            boats the more commands are changed. Against a boat that is slow it counts from when that is under way, see
             `barriers.feared`.
         profile: whom the opponents are taken for, see `PROFILES`: "players" of the game, "rammers" that are out to hit
             our boats, or boats that "hold-course".

@@ -102,5 +102,8 @@ def get_barrier(name: str) -> Barrier:
         load_others(GROUP, register_barrier)
     if name not in BARRIERS:
         known = ", ".join(sorted(BARRIERS)) or "none"
-        raise ConfigError(f"unknown barrier {name!r}; known: {known}; register it first (register_barrier)")
+        raise ConfigError(
+            f"unknown barrier {name!r}; known: {known}; register it first (register_barrier); "
+            f"for the command line, by an entry point of {GROUP}"
+        )
     return BARRIERS[name]

@@ -150,3 +150,11 @@ def test_no_page_is_made_of_other_results(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="choose another --out"):
         write_pages([], tmp_path / "file" / "docs")
+
+
+def test_no_page_is_written_over_another(tmp_path):
+    settings = {"preset": "aamas2024", "own": "medium", "games": 1, "rules": {}}
+    about = {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "bars": []}
+    games = {"command": "evaluate", "settings": settings, "pairings": [], **about}
+    with pytest.raises(ConfigError, match=r"two of the results make evaluation_aamas2024\.md; give them one at a time"):
+        write_pages([games, games], tmp_path)

@@ -108,7 +108,7 @@ def test_what_binds_is_named():
 
 
 def test_a_barrier_counts_as_an_obstacle_of_the_same_place_does():
-    """A circle as an obstacle without a hull, and as a barrier: the same way, but for millimetres kept and easing's quarters."""
+    """A circle as an obstacle without a hull, and as a barrier: the same way, but for easing's quarters."""
     register_barrier(Barrier("rock", ferrys, values=(1.0, 20.0, 0.0, 0.0, 4.0)))
     round_it = sail(Shield(barriers=("rock",)), lone(), north, 250)
     stopped = sail(Shield(surroundings=Surroundings(stops=((1.0, 20.0, 4.0),))), lone(), north, 250)
