@@ -113,8 +113,8 @@ def run_study(
         write_json(folder / RESULTS, _results(base, seeds, games, rows))
     if failed:
         raise ConfigError(
-            f"{len(failed)} training(s) failed, the first {failed[0]}; {len(rows)} cells are done and kept: mend that and "
-            "give the same command again"
+            f"{len(failed)} training(s) failed, the first {failed[0]}; {len(rows)} cells are done and kept: mend that, "
+            "then the same command"
         )
     return _results(base, seeds, games, rows)
 
