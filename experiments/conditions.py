@@ -76,6 +76,13 @@ def words_of(values: Mapping[str, Any]) -> str:
     return ", ".join(form.format(values[name]) for name, form in _WORDS.items() if values.get(name))
 
 
+def words_of_settings(shield: Mapping[str, Any]) -> str:
+    """Write the settings that a shield was given: ``separation_m 4, response_per_s inf``; empty without any."""
+    return ", ".join(
+        f"{name} {'+'.join(value) if isinstance(value, (list, tuple)) else value}" for name, value in shield.items()
+    )
+
+
 def draw(rng: np.random.Generator) -> tuple[tuple[float, float], int]:
     """Draw the direction of a current, unit length, and the seed of the position errors."""
     angle = float(rng.uniform(-math.pi, math.pi))

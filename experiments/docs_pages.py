@@ -12,7 +12,7 @@ from steerclear.shield.visible import visible
 
 from .bench.report import bench_tables
 from .comparison_page import LIBRARY_STEM, STEM, has_library, write_comparison
-from .conditions import words_of
+from .conditions import words_of, words_of_settings
 from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, bars_table, line, table
@@ -191,12 +191,13 @@ def keys_page() -> str:
 def _what_was_played(content: Mapping[str, Any]) -> str:
     settings = content["settings"]
     length = settings["rules"].get("max_time_s")
-    conditions = words_of(settings.get("conditions") or {})
+    conditions, shield = words_of(settings.get("conditions") or {}), settings.get("shield") or {}
     size = "the small version, " if content["quick"] else ""
     return (
         f"{size}{settings['games']} games per pairing and shield state"
         + (f" of {length:g} s" if length else "")
         + (f" under {conditions}" if conditions else "")
+        + (f", shield with {line(words_of_settings(shield))}" if shield else "")
         + f", seeds {content['seeds'][0]} to {content['seeds'][-1]}, "
         f"steerclear {line(content['versions']['steerclear'])}. "
         "Means per game with 95 % intervals (Poisson for counts, Wilson for shares, bootstrap for means)."

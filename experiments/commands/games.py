@@ -13,7 +13,7 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
-from ..conditions import words_of
+from ..conditions import words_of, words_of_settings
 from ..engines import Workers
 from ..judging import check_judge
 from ..kept_distance import check_shield, words_of_less
@@ -26,6 +26,9 @@ from ..tally import RADII_M
 from ..warming import WARMED, warm_up
 from .console import Interrupted, err, out, progress
 from .policies_tried import try_policies
+
+FEW_GAMES = 20
+"""Fewer of a pairing give intervals that say little."""
 
 KEYBOARD = "keyboard"
 HITS_WORDS = (
@@ -117,6 +120,10 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     conditions = words_of(results["settings"]["conditions"])
     if conditions:
         console.print(f"All games with {conditions}.\n", soft_wrap=True)
+    if results["settings"]["shield"]:
+        console.print(
+            f"Shield with {words_of_settings(results['settings']['shield'])}.\n", markup=False, soft_wrap=True
+        )
     for words in results["warnings"]:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for summary in results["pairings"]:
@@ -137,6 +144,11 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print(f"{folder / name}", soft_wrap=True)
     if results["quick"]:
         console.print(_small_version(results["settings"]))
+    elif results["settings"]["games"] < FEW_GAMES:
+        console.print(
+            f"Intervals of {results['settings']['games']} games per pairing say little: those of means are drawn from these "
+            f"games alone. Ask for {FEW_GAMES} and more."
+        )
 
 
 def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
