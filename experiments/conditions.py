@@ -78,9 +78,8 @@ def words_of(values: Mapping[str, Any]) -> str:
 
 def words_of_settings(shield: Mapping[str, Any]) -> str:
     """Write the settings that a shield was given: ``separation_m 4, response_per_s inf``; empty without any."""
-    return ", ".join(
-        f"{name} {'+'.join(value) if isinstance(value, (list, tuple)) else value}" for name, value in shield.items()
-    )
+    lists = {name: "+".join(value) for name, value in shield.items() if isinstance(value, (list, tuple))}
+    return ", ".join(f"{name} {value}" for name, value in {**shield, **lists}.items())
 
 
 def draw(rng: np.random.Generator) -> tuple[tuple[float, float], int]:

@@ -120,10 +120,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     conditions = words_of(results["settings"]["conditions"])
     if conditions:
         console.print(f"All games with {conditions}.\n", soft_wrap=True)
-    if results["settings"]["shield"]:
-        console.print(
-            f"Shield with {words_of_settings(results['settings']['shield'])}.\n", markup=False, soft_wrap=True
-        )
+    if shield := words_of_settings(results["settings"]["shield"]):
+        console.print(f"Shield with {shield}.\n", markup=False, soft_wrap=True)
     for words in results["warnings"]:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for summary in results["pairings"]:
@@ -146,8 +144,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print(_small_version(results["settings"]))
     elif results["settings"]["games"] < FEW_GAMES:
         console.print(
-            f"Intervals of {results['settings']['games']} games per pairing say little: those of means are drawn from these "
-            f"games alone. Ask for {FEW_GAMES} and more."
+            f"Intervals of {results['settings']['games']} games per pairing say little: those of means are drawn from "
+            f"these games alone. Ask for {FEW_GAMES} and more."
         )
 
 

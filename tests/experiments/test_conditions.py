@@ -10,7 +10,7 @@ from steerclear.experiments import cli, keys
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.campaign import Campaign
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.conditions import CALM, Conditions, draw, words_of
+from steerclear.experiments.conditions import CALM, Conditions, draw, words_of, words_of_settings
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.spec import MatchSpec
 from steerclear.experiments.store import ResultStore
@@ -119,3 +119,8 @@ def test_bad_input_is_one_error_with_its_remedy(command, option, value, tmp_path
     assert len(done.stderr.strip().splitlines()) == 1
     assert "; give " in done.stderr
     assert not (tmp_path / "results").exists()
+
+
+def test_settings_of_a_shield_in_words():
+    assert words_of_settings({}) == ""
+    assert words_of_settings({"separation_m": 4.0, "barriers": ["a", "b"]}) == "separation_m 4.0, barriers a+b"
