@@ -83,6 +83,11 @@ class BatchedShield:
         """(B,) which of the last decisions were ended by `ShieldConfig.search_limit`."""
         return np.asarray(self._deciders.decided.cut_short.any(axis=1))
 
+    @property
+    def remembered(self) -> dict[str, np.ndarray]:
+        """What goes on from one decision to the next, by name: live arrays, (B, ...). Copies written back go on there."""
+        return {**self._deciders.memory._asdict(), "pending": self._deciders.pending}
+
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
 

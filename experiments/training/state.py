@@ -31,9 +31,7 @@ def live_arrays(batch: Any) -> dict[str, np.ndarray]:
     for name, term in batch.reward.terms.items():
         found |= dict(arrays_in(term, f"reward/{name}"))
     if batch.shield is not None:
-        deciders = batch.shield._deciders
-        found |= dict(arrays_in(deciders.memory, "shield/memory"))
-        found["shield/pending"] = deciders.pending
+        found |= {f"shield/{name}": values for name, values in batch.shield.remembered.items()}
     for name, member in batch.opponent.members.items():
         if not hasattr(member, "plays"):  # those that do play game after game, and begin anew
             found |= dict(arrays_in(member, f"opponent/{name}"))

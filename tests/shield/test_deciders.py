@@ -110,3 +110,23 @@ def test_whatever_is_wanted_and_wherever_boats_are_what_is_sent_is_a_command(del
             assert np.isfinite(decisions.slack_m).all()
             if not np.isfinite(value):
                 assert (decisions.reason[own] != Reason.PASSED).all()
+
+
+def test_a_batch_goes_on_from_what_another_remembered():
+    """Without it the same states and commands are decided otherwise, so the copies do matter."""
+    make = lambda: BatchedShield(ShieldConfig(delay_s=0.2), 8, ("heron",) * 5, TEAM)  # noqa: E731
+    first, second, third = make(), make(), make()
+    states = np.stack([crowd(seed).state for seed in range(8)])
+    ours = np.tile(crowd(0).controlled, (8, 1))
+    otherwise = 0
+    for step in range(40):
+        wanted = np.random.default_rng(step).uniform([0.0, -90.0], [2.0, 90.0], (8, 5, 2))
+        if step == 20:
+            for name, values in second.remembered.items():
+                values[...] = first.remembered[name]
+        sent = first.decide(states, wanted, ours).copy()
+        if step >= 20:
+            assert bits(second.decide(states, wanted, ours)) == bits(sent)
+            otherwise += (third.decide(states, wanted, ours) != sent).any()
+        step_all(packed(("heron",) * 5), states, sent, 0.1)
+    assert otherwise > 0
