@@ -85,7 +85,7 @@ class BatchedShield:
 
     @property
     def remembered(self) -> dict[str, np.ndarray]:
-        """What goes on from one decision to the next, by name: live arrays, (B, ...). Copies written back go on there."""
+        """What goes on from decision to decision, by name: live arrays, (B, ...). Copies written back go on there."""
         return {**self._deciders.memory._asdict(), "pending": self._deciders.pending}
 
     def reset(self, mask: BoolArray | None = None) -> None:
