@@ -141,8 +141,8 @@ def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0
         area_m: (xmin, ymin, xmax, ymax) where it is tried, up to a minute ahead.
 
     Raises:
-        NotConforming: it does not.
-        ConfigError: there is no such barrier, or its values are none.
+        NotConforming: it does not, or its values are none.
+        ConfigError: there is no such barrier.
     """
     barrier, random = get_barrier(name), np.random.default_rng(1)
     values, h, off = _values(barrier), 0.05, list[bool]()

@@ -34,7 +34,8 @@ class Reason(IntEnum):
     BEST_EFFORT = plan.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
     HELD = plan.HELD
-    """The wanted command was not finite or absurdly large; the boat is told to stop on its course."""
+    """The wanted command was not finite or absurdly large, or a registered barrier tells nothing where the boat is: the
+    boat is told to stop on its course."""
     NOT_COVERED = plan.NOT_COVERED
     """The shield does not decide for this boat."""
     RIGHT_OF_WAY = plan.RIGHT_OF_WAY

@@ -66,6 +66,6 @@ class KeptBarriers:
                 say_once(
                     f"margin of {name}",
                     f"barrier {name!r} gave no usable margin ({faults} times in one decision): NaN, an error, or a "
-                    "slope beyond 10 m per m; it counts as violated there. Find out why by check_barrier of "
-                    "steerclear.experiments.conformance",
+                    "slope beyond 10 m per m; boats keep out of there, and stop where it is so. Find out why by "
+                    "check_barrier of steerclear.experiments.conformance",
                 )
