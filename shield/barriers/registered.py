@@ -1,6 +1,7 @@
 """Clearance on a path from registered barriers: they count as obstacles do, which stop a boat.
 
-h(x, t) is asked at every sample of the path. A boat that is short of it now has to come no nearer, as from obstacles.
+h(x, t) is asked at every sample of the path. A boat that is short of it now has to come no nearer, as from obstacles,
+and is led out, see `way_back`.
 What is no number counts as `LOST_M`: nobody knows what is there. Where nothing is known of the boat's own place, paths
 say nothing of the barrier, and the boat is to stop, see `unknown_at`. How often that was so is noted, and said.
 """
@@ -15,6 +16,7 @@ from ..scene import Registered, Scene
 from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, lower
 from .obstacles import grace
 from .pointer import call
+from .way_back import RETURN_S, straight_on, worth_of_way_back
 
 LOST_M = -100.0
 """Margin, m, where a barrier gives none that can be used."""
@@ -99,4 +101,29 @@ def clear_of_registered(i: int, slot: int, samples: int, drift_m: float, scene: 
             if margin < out[MARGIN]:
                 lower(out, margin, k, 0.0, 0.0)
                 least = b
+    return least
+
+
+@lean_kernel
+def way_out_of_registered(i: int, slot: int, scene: Scene, out: Array) -> int:
+    """Lower a clearance row of boat i to the worth of the path in ``slot`` as a way out of barriers it is short of.
+
+    Returns the last one that lowered it, -1 for none.
+    """
+    state, boats, tuning, registered = scene.state, scene.boats, scene.tuning, scene.registered
+    path, last, least = scene.work.path[slot], boats.samples[i], -1
+    for b in range(registered.address.shape[0]):
+        now_m = _margin(b, state[i, L.X], state[i, L.Y], 0.0, registered)
+        if now_m >= 0.0 or now_m <= LOST_M:
+            continue
+        least_m = FAR
+        for k in range(last + 1):
+            ahead_s = tuning.model_s + k * boats.sample_s
+            least_m = min(least_m, _margin(b, path[k, 0], path[k, 1], ahead_s, registered))
+        x, y = straight_on(path, last, boats.sample_s)
+        end_m = _margin(b, x, y, tuning.model_s + last * boats.sample_s + RETURN_S, registered)
+        worth_m = worth_of_way_back(now_m, least_m, end_m)
+        if worth_m < out[MARGIN]:
+            lower(out, worth_m, last, 0.0, 0.0)
+            least = b
     return least

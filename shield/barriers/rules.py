@@ -1,4 +1,4 @@
-"""What is kept by rule: the field's edge, and keep-out circles."""
+"""What is kept by rule: the field's edge, keep-out circles, and the way out of obstacles that are circles."""
 
 from __future__ import annotations
 
@@ -6,18 +6,7 @@ from ..jit import Array, lean_kernel
 from ..scene import Static
 from .clearance import FAR, MARGIN, lower
 from .obstacles import to_circle
-
-RETURN_S = 10.0
-"""How long a boat outside the field is followed straight on from the end of its path, s."""
-
-HOME_M = 1.0
-"""A path that leads so far inside by then leads back, m."""
-
-FARTHEST_M = 100.0
-"""Boats farther outside are looked at as if they were that far, m: what tells their paths apart is the same."""
-
-RETURN_WORTH = 0.01
-"""What a metre of a path outside the field counts beside a metre that the boat is outside now."""
+from .way_back import straight_on, worth_of_way_back
 
 
 @lean_kernel
@@ -43,22 +32,29 @@ def _inwards(side: int) -> tuple[float, float]:
 
 
 @lean_kernel
-def _way_back(side: int, here: Array, path: Array, last: int, sample_s: float, field: Array, out: Array) -> None:
-    """The same of a boat that is beyond that side: how far, and a trifle for where the path leads.
-
-    It is followed straight on from its end. One that leads back is worth most, even if it leads farther out at first:
-    lying still outside is none. Of those that lead back, the one that goes out least.
-    """
-    x, y = path[last, 0], path[last, 1]
-    after = RETURN_S / sample_s
-    end_m = _inside(side, x + after * (x - path[last - 1, 0]), y + after * (y - path[last - 1, 1]), field)
-    now_m, least_m = _inside(side, here[0], here[1], field), FAR
+def _back_within(side: int, here: Array, path: Array, last: int, sample_s: float, field: Array, out: Array) -> None:
+    """The same of a boat that is beyond that side, see `way_back`."""
+    least_m = FAR
     for k in range(last + 1):
         least_m = min(least_m, _inside(side, path[k, 0], path[k, 1], field))
-    farther_m = max(0.0, -now_m - FARTHEST_M)
-    short_m = max(0.0, HOME_M - end_m - farther_m)
+    x, y = straight_on(path, last, sample_s)
     nx, ny = _inwards(side)
-    lower(out, now_m + farther_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m)), last, nx, ny)
+    worth_m = worth_of_way_back(_inside(side, here[0], here[1], field), least_m, _inside(side, x, y, field))
+    lower(out, worth_m, last, nx, ny)
+
+
+@lean_kernel
+def _way_out(here: Array, path: Array, last: int, sample_s: float, circle: Array, out: Array) -> bool:
+    """Whether a boat is in a circle; the clearance is then lowered to what its path is worth, see `way_back`."""
+    now_m, nx, ny = to_circle(here[0], here[1], circle)
+    if now_m >= 0.0:
+        return False
+    least_m = FAR
+    for k in range(last + 1):
+        least_m = min(least_m, to_circle(path[k, 0], path[k, 1], circle)[0])
+    x, y = straight_on(path, last, sample_s)
+    lower(out, worth_of_way_back(now_m, least_m, to_circle(x, y, circle)[0]), last, nx, ny)
+    return True
 
 
 @lean_kernel
@@ -76,7 +72,7 @@ def clear_of_rules(
     """Least clearance, m, of a path from the field edge and from circles kept by rule.
 
     The edge is looked at only until a half turn could be over, since every straight run ends beyond it. A boat that is
-    beyond it has to come back, see `_way_back`.
+    beyond it, in a keep-out circle or in a round obstacle has to come back, see `way_back`.
 
     Args:
         here: where the boat is now, m, shape (>= 2,).
@@ -92,11 +88,13 @@ def clear_of_rules(
     out[MARGIN] = FAR
     for side in range(4):
         if _inside(side, here[0], here[1], static.field) < 0.0:
-            _way_back(side, here, path, samples, sample_s, static.field, out)
+            _back_within(side, here, path, samples, sample_s, static.field, out)
         else:
             _within(side, path, near_samples, drift_m, static.field, out)
+    for c in range(static.circles.shape[0]):
+        _way_out(here, path, samples, sample_s, static.circles[c], out)
     for c in range(static.keep_out.shape[0]):
-        k = 0
+        k = samples + 1 if _way_out(here, path, samples, sample_s, static.keep_out[c], out) else 0
         while k <= samples:
             margin, nx, ny = to_circle(path[k, 0], path[k, 1], static.keep_out[c])
             margin -= k * drift_m

@@ -13,7 +13,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Scene
 from .clearance import FAR, MARGIN
 from .obstacles import clear_of_obstacles, grace
-from .registered import clear_of_registered
+from .registered import clear_of_registered, way_out_of_registered
 from .rules import clear_of_rules
 
 STATIC = -2
@@ -49,7 +49,9 @@ def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
     clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, static), static, FAR, work.spare2)
     if work.spare2[MARGIN] < out[MARGIN]:
         copy_row(out, work.spare2)
-    return about(clear_of_registered(i, slot, last, drift_m, scene, out))
+    barrier = clear_of_registered(i, slot, last, drift_m, scene, out)
+    short_of = way_out_of_registered(i, slot, scene, out)
+    return about(short_of if short_of >= 0 else barrier)
 
 
 @lean_kernel

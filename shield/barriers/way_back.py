@@ -1,0 +1,44 @@
+"""The way back of a boat that is beyond a static constraint: it has to come back, and is led back at once.
+
+However a path leads, such a boat does not keep the constraint. What the path leads to tells paths apart: they are
+followed straight on from their end, and those that lead back are worth most, even if they lead farther out at first,
+since lying still outside is none. Of those, the one that goes out least.
+"""
+
+from __future__ import annotations
+
+from ..jit import Array, lean_kernel
+
+RETURN_S = 10.0
+"""How long a path is followed straight on from its end, s."""
+
+HOME_M = 1.0
+"""A path that leads so far inside by then leads back, m."""
+
+FARTHEST_M = 100.0
+"""Boats farther outside are looked at as if they were that far, m: what tells their paths apart is the same."""
+
+RETURN_WORTH = 0.01
+"""What a metre of a path outside counts beside a metre that the boat is outside now."""
+
+
+@lean_kernel
+def straight_on(path: Array, last: int, sample_s: float) -> tuple[float, float]:
+    """Where a path leads by `RETURN_S` after its end, m."""
+    x, y = path[last, 0], path[last, 1]
+    after = RETURN_S / sample_s
+    return x + after * (x - path[last - 1, 0]), y + after * (y - path[last - 1, 1])
+
+
+@lean_kernel
+def worth_of_way_back(now_m: float, least_m: float, end_m: float) -> float:
+    """Clearance, m, negative, of a path of a boat that is outside.
+
+    Args:
+        now_m: margin of the constraint where the boat is, m, negative.
+        least_m: least of it along the path, m.
+        end_m: the same where the path leads, see `straight_on`, m.
+    """
+    farther_m = max(0.0, -now_m - FARTHEST_M)
+    short_m = max(0.0, HOME_M - end_m - farther_m)
+    return now_m + farther_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m))
