@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import NoNumbersError, numbers
-from .barriers.obstacles import LEAVE_S
+from .barriers.static import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
 from .jit import Array

@@ -2,14 +2,17 @@
 
 Each is asked about the path of a manoeuvre. All but `value_function`, which tells a margin alone, write one row
 (`clearance`): the margin h, m, the sample of the path where it is least, and dh/dx, dh/dy there (`registered` only
-where the program asks). `filter.rows` makes of `boats` and of what stays the slopes by the commands of this step.
+where the program asks). `filter.rows` makes of `boats` and `static` the slopes by the commands of this step.
 
     boats             team-mates on their manoeuvres, opponents that hold their course
     pursuit           an opponent that pursues; `opponents` asks for the worst of them
     value_function    the same, looked up in a value table
-    obstacles         circles and walls, which stop a boat
-    rules             the field's edge, and keep-out circles
-    registered        other people's, see `register_barrier`; `static` asks for the worst of these three
+    static            the worst of all that stays, and of registered barriers, over a path: each is a number
+                      (`constraints`) with a margin and slope by place of its own
+    circles, walls    which stop a boat; circles are also kept by rule
+    edge              a side of the field
+    registered        other people's, see `register_barrier`
+    way_back          what paths are worth to a boat that is beyond one of these
 """
 
 from .registry import Barrier, register_barrier

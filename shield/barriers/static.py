@@ -4,20 +4,61 @@ An obstacle stops a boat, and who is stopped is caught: one that is touched befo
 before what pursuers may do. Later ones leave time for another manoeuvre, and count with what is kept by rule. So does
 what a current may do by then: only its drift of a moment, which static constraints are widened by, comes before
 pursuers.
+
+Samples of a path that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times
+the way the boat goes from sample to sample, its drift included. Registered barriers, which may move, are asked at
+every one. What a current of unknown direction may do to a boat is a distance that grows with time: a clearance that is
+to hold is that much larger.
+
+Who goes through a wall is behind it from there on, by as much as it is off it: from sample to sample a boat may go from
+before a wall to behind it, and be near it at neither.
 """
 
 from __future__ import annotations
 
-from ..jit import Array, copy_row, lean_kernel
+import math
+from typing import NamedTuple
+
+from ..jit import Array, lean_kernel
 from ..platforms import layout as L
-from ..scene import Boats, Scene
-from .clearance import FAR, MARGIN
-from .obstacles import clear_of_obstacles, grace
-from .registered import clear_of_registered, way_out_of_registered
-from .rules import clear_of_rules
+from ..scene import Boats, Registered, Scene, Static
+from .clearance import FAR, MARGIN, lower
+from .constraints import SIDES, count_all, count_obstacles, margin_at, registered_number, wall_number
+from .registered import LOST_M
+from .walls import goes_through
+from .way_back import RETURN_S, straight_on, worth_of_way_back
 
 STATIC = -2
 """In the place of the neighbour that binds: an obstacle, an edge or a circle does; below, registered barriers."""
+
+LEAVE_S = 0.5
+"""Time constant with which a boat too near to an obstacle has to come away from it where there may be a current, s."""
+
+
+class Track(NamedTuple):
+    """A path of a boat, as static constraints look at it.
+
+    Attributes:
+        here: where the boat is now, m, shape (>= 2,).
+        path: positions from the next step on, m, shape (>= last + 1, 2).
+        near: sample at which a half turn could be over.
+        last: last sample.
+        first_s: time until the first sample, s.
+        sample_s: time from sample to sample, s.
+        way_m: most the boat moves through the water from sample to sample, m.
+        drift_m: most a current carries it meanwhile, m.
+        grace: factor per sample on what is excused of a boat that is too near to an obstacle, see `_clearance`.
+    """
+
+    here: Array
+    path: Array
+    near: int
+    last: int
+    first_s: float
+    sample_s: float
+    way_m: float
+    drift_m: float
+    grace: float
 
 
 @lean_kernel
@@ -36,28 +77,114 @@ def way_per_sample(i: int, state: Array, boats: Boats) -> float:
 
 
 @lean_kernel
-def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
-    """Clearance row of boat i on the path in ``slot`` from obstacles and registered barriers at any time, and rules.
+def _track(i: int, slot: int, drift_m: float, scene: Scene) -> Track:
+    """The path in ``slot`` of boat i.
 
-    ``work.spare2`` is overwritten. Returns what the least is from: `STATIC`, or below it the barrier, see `about`.
+    Where there may be a current less and less is excused: asked only to come no nearer than it is, a boat would be
+    carried in a little in every step.
     """
-    state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
-    path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.samples[i]
-    drift_m = static.current_mps * boats.sample_s
-    near = boats.static_samples[i]
-    clear_of_rules(state[i], path, near, last, static, way_m, drift_m, boats.sample_s, out)
-    clear_of_obstacles(state[i], path, last, way_m, drift_m, grace(boats, static), static, FAR, work.spare2)
-    if work.spare2[MARGIN] < out[MARGIN]:
-        copy_row(out, work.spare2)
-    barrier = clear_of_registered(i, slot, last, drift_m, scene, out)
-    short_of = way_out_of_registered(i, slot, scene, out)
-    return about(short_of if short_of >= 0 else barrier)
+    state, boats, work = scene.state, scene.boats, scene.work
+    return Track(
+        state[i],
+        work.path[slot],
+        boats.static_samples[i],
+        boats.samples[i],
+        scene.tuning.model_s,
+        boats.sample_s,
+        way_per_sample(i, state, boats),
+        drift_m,
+        math.exp(-boats.sample_s / LEAVE_S) if scene.static.current_mps > 0.0 else 1.0,
+    )
+
+
+@lean_kernel
+def _clearance(
+    o: int, now_m: float, last: int, track: Track, static: Static, registered: Registered, out: Array
+) -> bool:
+    """Lower a clearance row to that from constraint number o until sample ``last``; whether it was lower.
+
+    A boat that is already too near to an obstacle has to come no nearer: its clearance there counts from where it is.
+    With ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
+    Going through a wall is not excused, unless it is not known which side of it the boat is on.
+    """
+    path, drift_m, hull_m = track.path, track.drift_m, static.segment_m
+    wall, moves = wall_number(o, static), registered_number(o, static, registered) >= 0
+    excused = min(0.0, now_m)
+    fall_m = track.way_m + drift_m - excused * (1.0 - track.grace)
+    known = now_m + hull_m >= static.side_m
+    lowered, behind, x, y, k = False, False, track.here[0], track.here[1], 0
+    while k <= last:
+        margin, nx, ny = margin_at(o, path[k, 0], path[k, 1], track.first_s + k * track.sample_s, static, registered)
+        near_m = margin + hull_m if wall >= 0 else FAR  # a wall farther off is not gone through
+        if wall >= 0 and known and goes_through(x, y, path[k, 0], path[k, 1], static.segments[wall]):
+            behind = not behind
+        if behind:
+            margin, nx, ny = -near_m - hull_m - k * drift_m, -nx, -ny
+        else:
+            margin -= excused * track.grace**k + k * drift_m
+        lowered = lowered or margin < out[MARGIN]
+        lower(out, margin, k, nx, ny)
+        x, y = path[k, 0], path[k, 1]
+        k += 1 if moves else max(1, int(min(margin - out[MARGIN], near_m) / fall_m))
+    return lowered
+
+
+@lean_kernel
+def _way_back(o: int, now_m: float, track: Track, static: Static, registered: Registered, out: Array) -> bool:
+    """Lower a clearance row of a boat beyond constraint number o to what its path is worth; whether it was lower."""
+    path, last, first_s, least_m = track.path, track.last, track.first_s, FAR
+    for k in range(last + 1):
+        at_s = first_s + k * track.sample_s
+        least_m = min(least_m, margin_at(o, path[k, 0], path[k, 1], at_s, static, registered)[0])
+    x, y = straight_on(path, last, track.sample_s)
+    end_m = margin_at(o, x, y, first_s + last * track.sample_s + RETURN_S, static, registered)[0]
+    worth_m = worth_of_way_back(now_m, least_m, end_m)
+    lowered = worth_m < out[MARGIN]
+    _, nx, ny = margin_at(o, track.here[0], track.here[1], 0.0, static, registered)
+    lower(out, worth_m, last, nx, ny)
+    return lowered
+
+
+@lean_kernel
+def clear_of_constraints(near_only: bool, track: Track, static: Static, registered: Registered, out: Array) -> int:
+    """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
+
+    The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
+    boat that is beyond a constraint has to come back, see `way_back`; those near in time only ask that it comes no
+    nearer. Paths say nothing of a barrier of which nothing is known where the boat is, see `registered.unknown_at`.
+
+    Returns:
+        What the least is from: `STATIC`, or below it the barrier, see `about`.
+    """
+    binds, total = -1, count_all(static, registered)
+    for o in range(count_obstacles(static, registered) if near_only else total):
+        now_m = margin_at(o, track.here[0], track.here[1], 0.0, static, registered)[0]
+        barrier = registered_number(o, static, registered)
+        if barrier >= 0 and now_m <= LOST_M:
+            continue
+        if now_m < 0.0 and not near_only:
+            lowered = _way_back(o, now_m, track, static, registered, out)
+        else:
+            last = track.near if near_only or o >= total - SIDES else track.last
+            lowered = _clearance(o, now_m, last, track, static, registered, out)
+        if lowered:
+            binds = barrier
+    return about(binds)
+
+
+@lean_kernel
+def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
+    """Clearance row of boat i on the path in ``slot`` from all static constraints and registered barriers.
+
+    Returns what the least is from, see `clear_of_constraints`.
+    """
+    out[MARGIN] = FAR
+    track = _track(i, slot, scene.static.current_mps * scene.boats.sample_s, scene)
+    return clear_of_constraints(False, track, scene.static, scene.registered, out)
 
 
 @lean_kernel
 def clear_of_near_obstacles(i: int, slot: int, scene: Scene, most_m: float, out: Array) -> int:
     """The same from obstacles and registered barriers alone until a half turn could be over, ``most_m`` at most."""
-    state, boats, static, work = scene.state, scene.boats, scene.static, scene.work
-    path, way_m, last = work.path[slot], way_per_sample(i, state, boats), boats.static_samples[i]
-    clear_of_obstacles(state[i], path, last, way_m, 0.0, grace(boats, static), static, most_m, out)
-    return about(clear_of_registered(i, slot, last, 0.0, scene, out))
+    out[MARGIN] = most_m
+    return clear_of_constraints(True, _track(i, slot, 0.0, scene), scene.static, scene.registered, out)

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.barriers.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
-from steerclear.shield.barriers.obstacles import clear_of_obstacles
-from steerclear.shield.barriers.rules import clear_of_rules
-from steerclear.shield.scene import Static
+from steerclear.shield.barriers.static import Track, clear_of_constraints
+from steerclear.shield.scene import Registered, Static
 from steerclear.shield.shared import share
 
 NO_EDGE = np.array([-np.inf, -np.inf, np.inf, np.inf])
@@ -18,6 +17,29 @@ NO_WALL = np.zeros((0, 4))
 def things(circles=NONE, walls=NO_WALL, hull_m=0.0, side_m=0.0, field=NO_EDGE, keep_out=NONE):
     """Static constraints, as compiled code takes them."""
     return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0))
+
+
+NONE_REGISTERED = Registered(
+    np.zeros(0, np.int64), np.zeros((0, 64)), np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0, 0.0
+)
+
+
+def clear_of(near_only, path, static, here=None, near=None, drift_m=0.0, grace=1.0):
+    """Clearance row of a path sampled every 0.5 s, on which a boat goes 1 m from sample to sample."""
+    out, last = np.full(N_CLEARANCE, FAR), len(path) - 1
+    here, near = path[0] if here is None else np.asarray(here), last if near is None else near
+    clear_of_constraints(
+        near_only, Track(here, path, near, last, 0.1, 0.5, 1.0, drift_m, grace), static, NONE_REGISTERED, out
+    )
+    return out
+
+
+def clear_of_obstacles(path, static, **how):
+    return clear_of(True, path, static, **how)
+
+
+def clear_of_all(path, static, **how):
+    return clear_of(False, path, static, **how)
 
 
 @st.composite
@@ -77,8 +99,7 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
     circles = np.column_stack([random.uniform(-20, 20, (3, 2)), random.uniform(0.0, 8.0, 3)])
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
-    out, static = np.zeros(N_CLEARANCE), things(circles, walls, hull_m, side_m)
-    clear_of_obstacles(path[0], path, last, 1.0, drift_m, grace, static, FAR, out)
+    out = clear_of_obstacles(path, things(circles, walls, hull_m, side_m), drift_m=drift_m, grace=grace)
     excuse = grace ** np.arange(last + 1)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     left = [each - min(0.0, each[0]) * excuse for each in margins]
@@ -86,7 +107,7 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
     drift = drift_m * np.arange(last + 1)  # no less than any current of that speed can do
     left = [each - drift for each in left]
     assert out[MARGIN] == pytest.approx(min(each.min() for each in left), abs=1e-9)
-    clear_of_rules(path[0], path, last, last, things(keep_out=circles), 1.0, drift_m, 0.5, out)
+    out = clear_of_all(path, things(keep_out=circles), drift_m=drift_m, grace=grace)
     within = [each[0] < 0.0 for each in margins]
     by_rule = [
         worth_of(each, path, circle) if inside else (each - drift).min()
@@ -102,17 +123,14 @@ def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
 
 
 def test_a_boat_inside_an_obstacle_may_leave_and_must_not_go_deeper():
-    out, circle = np.zeros(N_CLEARANCE), np.array([[0.0, 0.0, 5.0]])
+    circle = np.array([[0.0, 0.0, 5.0]])
     outwards = np.column_stack([np.linspace(4.0, 9.0, 20), np.zeros(20)])
-    clear_of_obstacles(outwards[0], outwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
-    assert out[MARGIN] == 0.0
-    clear_of_obstacles(outwards[0] - [2.5, 0.0], outwards - [2.5, 0.0], 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
-    assert out[MARGIN] == 0.0
+    assert clear_of_obstacles(outwards, things(circle))[MARGIN] == 0.0
+    assert clear_of_obstacles(outwards - [2.5, 0.0], things(circle))[MARGIN] == 0.0
     inwards = np.column_stack([np.linspace(4.0, 1.0, 20), np.zeros(20)])
-    clear_of_obstacles(inwards[0], inwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
-    assert out[MARGIN] == pytest.approx(-3.0)
-    clear_of_obstacles(np.array([5.4, 0.0]), inwards, 19, 1.0, 0.0, 1.0, things(circle), FAR, out)
-    assert out[MARGIN] == pytest.approx(-4.0)  # outside so far: there is nothing to excuse
+    assert clear_of_obstacles(inwards, things(circle))[MARGIN] == pytest.approx(-3.0)
+    # outside so far: there is nothing to excuse
+    assert clear_of_obstacles(inwards, things(circle), here=[5.4, 0.0])[MARGIN] == pytest.approx(-4.0)
 
 
 WALL = np.array([[-5.0, 0.0, 5.0, 0.0]])
@@ -120,20 +138,18 @@ WALL = np.array([[-5.0, 0.0, 5.0, 0.0]])
 
 def test_a_wall_that_no_sample_is_near_is_not_gone_through():
     """Samples 0.5 m before a wall and 0.5 m behind it, of a boat of 0.2 m."""
-    path, out = np.array([[0.0, -1.5], [0.0, -0.5], [0.0, 0.5], [0.0, 1.5]]), np.zeros(N_CLEARANCE)
-    clear_of_obstacles(path[0], path, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), FAR, out)
+    path = np.array([[0.0, -1.5], [0.0, -0.5], [0.0, 0.5], [0.0, 1.5]])
+    out = clear_of_obstacles(path, things(walls=WALL, hull_m=0.2))
     assert out[[MARGIN, SAMPLE, NORMAL_Y]] == pytest.approx([-1.7, 3, -1.0])
     aside = path + np.array([5.5, 0.0])
-    clear_of_obstacles(aside[0], aside, 3, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.2), FAR, out)
-    assert out[MARGIN] > 0.0  # past its end
+    assert clear_of_obstacles(aside, things(walls=WALL, hull_m=0.2))[MARGIN] > 0.0  # past its end
 
 
 @pytest.mark.parametrize("side_m", [0.0, 0.3])
 def test_a_boat_too_near_to_a_wall_may_leave_it_on_its_side_and_on_either_when_that_is_not_known(side_m):
-    out = np.zeros(N_CLEARANCE)
     for way in (1.0, -1.0):
         path = np.column_stack([np.zeros(20), -0.1 + way * np.linspace(0.0, 6.0, 20)])
-        clear_of_obstacles(path[0], path, 19, 1.0, 0.0, 1.0, things(walls=WALL, hull_m=0.7, side_m=side_m), FAR, out)
+        out = clear_of_obstacles(path, things(walls=WALL, hull_m=0.7, side_m=side_m))
         if way < 0.0 or side_m > 0.1:
             assert out[MARGIN] >= -0.1
         else:
@@ -145,8 +161,7 @@ FIELD = np.array([-50.0, -50.0, 50.0, 10.0])
 
 def way_back(*places):
     """Margin of a path through these places, of a boat 2 m beyond the field's northern edge."""
-    out = np.zeros(N_CLEARANCE)
-    clear_of_rules(np.array([0.0, 12.0]), np.array(places), 1, 3, things(field=FIELD), 1.0, 0.0, 0.5, out)
+    out = clear_of_all(np.array(places, dtype=np.float64), things(field=FIELD), here=[0.0, 12.0], near=1)
     assert out[NORMAL_Y] == -1.0
     return out[MARGIN]
 
@@ -163,20 +178,16 @@ def test_outside_the_field_the_way_back_is_worth_most_even_if_it_leads_farther_o
 
 
 def test_the_edge_counts_only_as_long_as_it_is_looked_at():
-    path = np.column_stack([np.zeros(20), np.arange(20.0)])
-    out, field = np.zeros(N_CLEARANCE), np.array([-50.0, -50.0, 50.0, 10.0])
-    clear_of_rules(path[0], path, 5, 19, things(field=field), 1.0, 0.0, 0.5, out)
+    path, field = np.column_stack([np.zeros(20), np.arange(20.0)]), things(field=FIELD)
+    out = clear_of_all(path, field, near=5)
     assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
-    clear_of_rules(path[0], path, 19, 19, things(field=field), 1.0, 0.0, 0.5, out)
-    assert out[MARGIN] == -9.0
-    clear_of_rules(path[0], path, 5, 19, things(field=field), 1.0, 0.5, 0.5, out)
+    assert clear_of_all(path, field)[MARGIN] == -9.0
+    out = clear_of_all(path, field, near=5, drift_m=0.5)
     assert (out[MARGIN], out[SAMPLE]) == (2.5, 5.0)
 
 
 def test_nothing_there_is_far_away():
-    out = np.zeros(N_CLEARANCE)
     path = np.zeros((5, 2))
-    clear_of_obstacles(path[0], path, 4, 1.0, 0.3, 1.0, things(hull_m=1.0), FAR, out)
-    assert out[MARGIN] == FAR
-    clear_of_rules(path[0], path, 4, 4, things(field=np.array([-1e9, -1e9, 1e9, 1e9])), 1.0, 0.3, 0.5, out)
-    assert out[MARGIN] == FAR
+    assert clear_of_obstacles(path, things(hull_m=1.0), drift_m=0.3)[MARGIN] == FAR
+    assert clear_of_all(path, things(), drift_m=0.3)[MARGIN] == FAR
+    assert clear_of_all(path, things(field=np.array([-1e9, -1e9, 1e9, 1e9])), drift_m=0.3)[MARGIN] == FAR

@@ -57,3 +57,18 @@ def test_out_of_what_stops_boats_where_the_way_leads_no_deeper(platform, kind, w
     outwards = np.abs(OFF_OUTWARDS_DEG) < 80.0
     assert (out_m[-1, outwards] > -0.1).all()
     assert out_m.min() > START_M - RADIUS_M - 0.1, "nobody goes deeper"
+
+
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_off_a_wall(platform):
+    """Boats that lie 1 m off a wall, of which 3 m are to be kept, their bows off it, and want to stay."""
+    state = np.stack([fresh_state(1.0, 0.0, 90.0 + off, 0.0) for off in (-80.0, -40.0, 0.0, 60.0)])[:, None]
+    wall = ((0.0, -90.0), (0.0, 90.0), (-0.5, 0.0))
+
+    def still(step, state):
+        return np.zeros((*state.shape[:-1], 2))
+
+    config = ShieldConfig(hull_m=3.0)
+    run = sail_games(config, state, [platform], [0], still, 400, surroundings=Surroundings(polygons=[wall]))
+    assert (run.position[-1, :, 0, 0] > 2.9).all()
+    assert run.position[..., 0].min() > 0.9
