@@ -21,11 +21,12 @@ class Plan(NamedTuple):
     ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
     ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
     of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each backup the turn, deg, the speed, m/s, and the
-    worth, m, see `easing`.
+    worth, m, see `easing`. ``screened`` are the commands that screening looked at: wanted ones, but for boats that
+    hold or give way.
     """
 
     commands: Array
-    kept_commands: Array
+    screened: Array
     wanted_turn: Array
     held: Array
     cause: IntArray
@@ -49,7 +50,7 @@ def new_plan(boats: int, rows: int) -> Plan:
     return share(
         Plan(
             commands=np.zeros((boats, 2)),
-            kept_commands=np.zeros((boats, 2)),
+            screened=np.zeros((boats, 2)),
             wanted_turn=np.zeros(boats),
             held=np.zeros((boats, 3)),
             cause=np.full(boats, -1, np.int64),
@@ -73,4 +74,4 @@ def new_plan(boats: int, rows: int) -> Plan:
 @lean_kernel
 def unchanged(i: int, plan: Plan) -> bool:
     """Whether boat i's command is the wanted one, bit for bit."""
-    return plan.commands[i, 0] == plan.kept_commands[i, 0] and plan.commands[i, 1] == plan.kept_commands[i, 1]
+    return plan.commands[i, 0] == plan.screened[i, 0] and plan.commands[i, 1] == plan.screened[i, 1]

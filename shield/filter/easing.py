@@ -38,7 +38,7 @@ def _go_back(share: float, i: int, scene: Scene) -> None:
     """Command of boat i that share of the way back from its backup, ``plan.eased``."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
-    speed = plan.eased[i, 1] + share * (plan.kept_commands[i, 0] - plan.eased[i, 1])
+    speed = plan.eased[i, 1] + share * (plan.screened[i, 0] - plan.eased[i, 1])
     speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
     plan.commands[i, 0] = speed
     plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, turn, tuning.dt_s)

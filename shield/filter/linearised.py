@@ -78,7 +78,7 @@ def take_answer(z: Array, count: int, scene: Scene) -> bool:
             return False
     for m in range(count):
         i = plan.movers[m]
-        wanted = plan.kept_commands[i]
+        wanted = plan.screened[i]
         same_speed = abs(z[2 * m + 1] - plan.z0[2 * m + 1]) <= SAME
         if same_speed and abs(z[2 * m] - plan.z0[2 * m]) <= SAME:
             copy_row(plan.commands[i], wanted)

@@ -118,7 +118,7 @@ def inputs_of(count: int, scene: Scene) -> None:
         plan.z_now[2 * m] = max(-1.0, min(1.0, turn / full))
         plan.z_now[2 * m + 1] = root * max(0.0, min(1.0, speed_mps / top))
         plan.z0[2 * m] = max(-1.0, min(1.0, plan.wanted_turn[i] / full))
-        plan.z0[2 * m + 1] = root * max(0.0, min(1.0, plan.kept_commands[i, 0] / top))
+        plan.z0[2 * m + 1] = root * max(0.0, min(1.0, plan.screened[i, 0] / top))
 
 
 @lean_kernel

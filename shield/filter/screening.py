@@ -51,7 +51,7 @@ def set_targets(scene: Scene) -> None:
         work.threat_target_m[i, :] = 0.0
         work.joint_target_m[i] = 0.0
         work.static_target_m[i] = 0.0
-        if ours[i] and memory.kept[i]:
+        if ours[i] and memory.under_way[i]:
             least_m = max(0.0, memory.margin_m[i])
             work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
             work.mate_target_m[i] = boats.decay[i] * min(least_m, tuning.mate_cap_m, boats.cap_m[i])
@@ -89,5 +89,5 @@ def screen(scene: Scene) -> bool:
         predict(i, plan.commands, scene)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):
-        copy_row(plan.kept_commands[i], plan.commands[i])
+        copy_row(plan.screened[i], plan.commands[i])
     return assign_plans(scene, 1, ours)

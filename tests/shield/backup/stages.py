@@ -78,7 +78,7 @@ def screened_with_all_pairs(at, wanted):
             screening.predict(i, at.plan.commands, at.scene)
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
-    at.plan.kept_commands[:] = at.plan.commands
+    at.plan.screened[:] = at.plan.commands
     safe = assign_plans(at.scene, 1, at.ours)
     return safe, int(left_out.sum()) // 2
 
