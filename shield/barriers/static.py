@@ -35,12 +35,10 @@ LEAVE_S = 0.5
 """Time constant with which a boat too near to an obstacle has to come away from it where there may be a current, s."""
 
 
-class Track(NamedTuple):
-    """A path of a boat, as static constraints look at it.
+class Sampling(NamedTuple):
+    """How a path is sampled, and how far a boat gets from sample to sample.
 
     Attributes:
-        here: where the boat is now, m, shape (>= 2,).
-        path: positions from the next step on, m, shape (>= last + 1, 2).
         near: sample at which a half turn could be over.
         last: last sample.
         first_s: time until the first sample, s.
@@ -50,8 +48,6 @@ class Track(NamedTuple):
         grace: factor per sample on what is excused of a boat that is too near to an obstacle, see `_clearance`.
     """
 
-    here: Array
-    path: Array
     near: int
     last: int
     first_s: float
@@ -77,16 +73,14 @@ def way_per_sample(i: int, state: Array, boats: Boats) -> float:
 
 
 @lean_kernel
-def _track(i: int, slot: int, drift_m: float, scene: Scene) -> Track:
-    """The path in ``slot`` of boat i.
+def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
+    """How paths of boat i are sampled.
 
     Where there may be a current less and less is excused: asked only to come no nearer than it is, a boat would be
     carried in a little in every step.
     """
-    state, boats, work = scene.state, scene.boats, scene.work
-    return Track(
-        state[i],
-        work.path[slot],
+    state, boats = scene.state, scene.boats
+    return Sampling(
         boats.static_samples[i],
         boats.samples[i],
         scene.tuning.model_s,
@@ -99,7 +93,15 @@ def _track(i: int, slot: int, drift_m: float, scene: Scene) -> Track:
 
 @lean_kernel
 def _clearance(
-    o: int, now_m: float, last: int, track: Track, static: Static, registered: Registered, out: Array
+    o: int,
+    now_m: float,
+    last: int,
+    here: Array,
+    path: Array,
+    sampling: Sampling,
+    static: Static,
+    registered: Registered,
+    out: Array,
 ) -> bool:
     """Lower a clearance row to that from constraint number o until sample ``last``; whether it was lower.
 
@@ -107,21 +109,23 @@ def _clearance(
     With ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
     Going through a wall is not excused, unless it is not known which side of it the boat is on.
     """
-    path, drift_m, hull_m = track.path, track.drift_m, static.segment_m
+    drift_m, hull_m = sampling.drift_m, static.segment_m
     wall, moves = wall_number(o, static), registered_number(o, static, registered) >= 0
     excused = min(0.0, now_m)
-    fall_m = track.way_m + drift_m - excused * (1.0 - track.grace)
+    fall_m = sampling.way_m + drift_m - excused * (1.0 - sampling.grace)
     known = now_m + hull_m >= static.side_m
-    lowered, behind, x, y, k = False, False, track.here[0], track.here[1], 0
+    lowered, behind, x, y, k = False, False, here[0], here[1], 0
     while k <= last:
-        margin, nx, ny = margin_at(o, path[k, 0], path[k, 1], track.first_s + k * track.sample_s, static, registered)
+        margin, nx, ny = margin_at(
+            o, path[k, 0], path[k, 1], sampling.first_s + k * sampling.sample_s, static, registered
+        )
         near_m = margin + hull_m if wall >= 0 else FAR  # a wall farther off is not gone through
         if wall >= 0 and known and goes_through(x, y, path[k, 0], path[k, 1], static.segments[wall]):
             behind = not behind
         if behind:
             margin, nx, ny = -near_m - hull_m - k * drift_m, -nx, -ny
         else:
-            margin -= excused * track.grace**k + k * drift_m
+            margin -= excused * sampling.grace**k + k * drift_m
         lowered = lowered or margin < out[MARGIN]
         lower(out, margin, k, nx, ny)
         x, y = path[k, 0], path[k, 1]
@@ -130,23 +134,34 @@ def _clearance(
 
 
 @lean_kernel
-def _way_back(o: int, now_m: float, track: Track, static: Static, registered: Registered, out: Array) -> bool:
+def _way_back(
+    o: int,
+    now_m: float,
+    here: Array,
+    path: Array,
+    sampling: Sampling,
+    static: Static,
+    registered: Registered,
+    out: Array,
+) -> bool:
     """Lower a clearance row of a boat beyond constraint number o to what its path is worth; whether it was lower."""
-    path, last, first_s, least_m = track.path, track.last, track.first_s, FAR
+    last, first_s, least_m = sampling.last, sampling.first_s, FAR
     for k in range(last + 1):
-        at_s = first_s + k * track.sample_s
+        at_s = first_s + k * sampling.sample_s
         least_m = min(least_m, margin_at(o, path[k, 0], path[k, 1], at_s, static, registered)[0])
-    x, y = straight_on(path, last, track.sample_s)
-    end_m = margin_at(o, x, y, first_s + last * track.sample_s + RETURN_S, static, registered)[0]
+    x, y = straight_on(path, last, sampling.sample_s)
+    end_m = margin_at(o, x, y, first_s + last * sampling.sample_s + RETURN_S, static, registered)[0]
     worth_m = worth_of_way_back(now_m, least_m, end_m)
     lowered = worth_m < out[MARGIN]
-    _, nx, ny = margin_at(o, track.here[0], track.here[1], 0.0, static, registered)
+    _, nx, ny = margin_at(o, here[0], here[1], 0.0, static, registered)
     lower(out, worth_m, last, nx, ny)
     return lowered
 
 
 @lean_kernel
-def clear_of_constraints(near_only: bool, track: Track, static: Static, registered: Registered, out: Array) -> int:
+def clear_of_constraints(
+    near_only: bool, here: Array, path: Array, sampling: Sampling, static: Static, registered: Registered, out: Array
+) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
     The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
@@ -158,15 +173,15 @@ def clear_of_constraints(near_only: bool, track: Track, static: Static, register
     """
     binds, total = -1, count_all(static, registered)
     for o in range(count_obstacles(static, registered) if near_only else total):
-        now_m = margin_at(o, track.here[0], track.here[1], 0.0, static, registered)[0]
+        now_m = margin_at(o, here[0], here[1], 0.0, static, registered)[0]
         barrier = registered_number(o, static, registered)
         if barrier >= 0 and now_m <= LOST_M:
             continue
         if now_m < 0.0 and not near_only:
-            lowered = _way_back(o, now_m, track, static, registered, out)
+            lowered = _way_back(o, now_m, here, path, sampling, static, registered, out)
         else:
-            last = track.near if near_only or o >= total - SIDES else track.last
-            lowered = _clearance(o, now_m, last, track, static, registered, out)
+            last = sampling.near if near_only or o >= total - SIDES else sampling.last
+            lowered = _clearance(o, now_m, last, here, path, sampling, static, registered, out)
         if lowered:
             binds = barrier
     return about(binds)
@@ -179,12 +194,14 @@ def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
     Returns what the least is from, see `clear_of_constraints`.
     """
     out[MARGIN] = FAR
-    track = _track(i, slot, scene.static.current_mps * scene.boats.sample_s, scene)
-    return clear_of_constraints(False, track, scene.static, scene.registered, out)
+    sampling = _sampling(i, scene.static.current_mps * scene.boats.sample_s, scene)
+    here, path = scene.state[i], scene.work.path[slot]
+    return clear_of_constraints(False, here, path, sampling, scene.static, scene.registered, out)
 
 
 @lean_kernel
 def clear_of_near_obstacles(i: int, slot: int, scene: Scene, most_m: float, out: Array) -> int:
     """The same from obstacles and registered barriers alone until a half turn could be over, ``most_m`` at most."""
     out[MARGIN] = most_m
-    return clear_of_constraints(True, _track(i, slot, 0.0, scene), scene.static, scene.registered, out)
+    here, path = scene.state[i], scene.work.path[slot]
+    return clear_of_constraints(True, here, path, _sampling(i, 0.0, scene), scene.static, scene.registered, out)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.barriers.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
-from steerclear.shield.barriers.static import Track, clear_of_constraints
+from steerclear.shield.barriers.static import Sampling, clear_of_constraints
 from steerclear.shield.scene import Registered, Static
 from steerclear.shield.shared import share
 
@@ -28,9 +28,8 @@ def clear_of(near_only, path, static, here=None, near=None, drift_m=0.0, grace=1
     """Clearance row of a path sampled every 0.5 s, on which a boat goes 1 m from sample to sample."""
     out, last = np.full(N_CLEARANCE, FAR), len(path) - 1
     here, near = path[0] if here is None else np.asarray(here), last if near is None else near
-    clear_of_constraints(
-        near_only, Track(here, path, near, last, 0.1, 0.5, 1.0, drift_m, grace), static, NONE_REGISTERED, out
-    )
+    sampling = Sampling(near, last, 0.1, 0.5, 1.0, drift_m, grace)
+    clear_of_constraints(near_only, here, path, sampling, static, NONE_REGISTERED, out)
     return out
 
 
