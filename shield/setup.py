@@ -63,7 +63,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
             static_decay=_decay(config.fixed_response_per_s, config),
             give_way_after_s=config.give_way_after_s,
-            feared_s=config.feared_s if fears_somebody(config) else 0.0,
+            feared_s=config.feared_s,
             visitor_s=config.visitor_feared_s,
             position_error_m=config.position_error_m,
             delay_s=config.delay_s,
@@ -73,18 +73,13 @@ def tuning_of(config: ShieldConfig) -> Tuning:
     )
 
 
-def fears_somebody(config: ShieldConfig) -> bool:
-    """Whether opponents are granted more than to hold their course, at least where nothing else is told of them."""
-    return CERTIFICATES[config.certificate].pursuers and config.feared_s > 0.0
-
-
 def _mates_are_known(config: ShieldConfig) -> bool:
     """Whether what team-mates will do is known: one program decides for all, and sees and steers them as they are.
 
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    return config.coordination == "team" and exact and fears_somebody(config)
+    return config.coordination == "team" and exact and config.feared_s > 0.0
 
 
 @lru_cache(maxsize=256)
@@ -97,7 +92,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.model_s) for kind in kinds]
     certificate = CERTIFICATES[config.certificate]
-    granted = 1.0 if fears_somebody(config) else 0.0
+    granted = 1.0 if config.feared_s > 0.0 else 0.0
     strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     lookup = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
@@ -142,7 +137,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     sides = np.array(team)
-    wanted = fears_somebody(config)
+    wanted = config.feared_s > 0.0
     limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
     kinds = [get_platform(name) for name in platforms]
     uses = np.array(
@@ -167,8 +162,7 @@ def _horizons(
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
     pursuit_s, static_s, thrust_s = list(horizon_s), [], []
     for i, limit in enumerate(limits):
-        turn_s = horizon_s[i] if certificate.braking else limit.half_turn_s + STATIC_REACTION_S
-        static_s.append(min(turn_s, horizon_s[i]))
+        static_s.append(min(limit.half_turn_s + STATIC_REACTION_S, horizon_s[i]))
         thrust_s.append(limit.thrust_s if pursuers else 0.0)
         if pursuers:
             pursuit_s[i] = max(horizon_s[i], certificate.pursuit_s(limit))

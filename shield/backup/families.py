@@ -54,8 +54,6 @@ class Certificate:
         plans: (m, 3) manoeuvres of boats whose opponents are run through.
         looked_up: (m, 3) manoeuvres of boats whose opponents are looked up in value tables.
         slowing: (m, 3) what boats look at besides that steer without thrust; others lose their rudder with it.
-        braking: whether the horizon is the stopping time rather than the time of a turn.
-        pursuers: whether opponents are granted a turn against us.
         tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
     """
 
@@ -64,14 +62,11 @@ class Certificate:
     plans: Array
     looked_up: Array
     slowing: Array
-    braking: bool
-    pursuers: bool
     tables: str = "none"
 
     def horizon_s(self, platform: Platform, dt_s: float) -> float:
         """Time over which the manoeuvres are followed, s."""
-        limits = limits_of(platform, dt_s)
-        return limits.stop_s + 1.0 if self.braking else limits.half_turn_s + REACTION_S
+        return limits_of(platform, dt_s).half_turn_s + REACTION_S
 
     def manoeuvres(self, platform: Platform, with_table: bool) -> Array:
         """(m, 3) manoeuvres that a boat looks at, in the order in which they are tried."""
@@ -104,24 +99,12 @@ def _slowing() -> Array:
     return np.array(rows)
 
 
-BRAKING = Certificate(
-    "braking",
-    "distance left after stopping straight ahead while the others hold their course (the textbook form)",
-    plans=np.array([(1.0, 0.0, 0.0)]),
-    looked_up=np.array([(1.0, 0.0, 0.0)]),
-    slowing=np.zeros((0, 3)),
-    braking=True,
-    pursuers=False,
-)
-
 TURNING_CIRCLE = Certificate(
     "turning_circle",
     "distance kept on the best turning circle, either side, any exit; opponents may pursue with their granted share",
     plans=_turning(TURNS_DEG),
     looked_up=_turning(LOOKED_UP_TURNS_DEG, GENTLE_SHARES),
     slowing=_slowing(),
-    braking=False,
-    pursuers=True,
 )
 
 VALUE_TABLE = replace(
@@ -138,4 +121,4 @@ AUTO = replace(
     tables="slow",
 )
 
-CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_CIRCLE, VALUE_TABLE, BRAKING)}
+CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_CIRCLE, VALUE_TABLE)}

@@ -39,7 +39,6 @@ class Limits:
         turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
         thrust: thrust at top speed, percent; 0 without a thrust model.
         thrust_s: longest time under a full speed command until 90 % of that is there, from rest or out of a stop, s.
-        stop_s: time from top speed to below 5 % of it under a stop command, s.
     """
 
     top_speed_mps: float
@@ -50,7 +49,6 @@ class Limits:
     turn_deceleration_mps2: float
     thrust: float
     thrust_s: float
-    stop_s: float
 
     @property
     def regain_s(self) -> float:
@@ -71,7 +69,6 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
         turn_deceleration_mps2=_deceleration(speeds, dt_s),
         thrust=round(float(cruise(platform, dt_s)[1][L.THRUST]), 3),
         thrust_s=_thrust(platform, dt_s),
-        stop_s=_stop(platform, dt_s),
     )
 
 
@@ -174,14 +171,5 @@ def _until_thrust(platform: Platform, state: Array, enough: float, dt_s: float) 
     params, step = platform.pack(), 0
     while state[L.THRUST] < enough and step * dt_s < LONGEST_S:
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
-        step += 1
-    return step * dt_s
-
-
-def _stop(platform: Platform, dt_s: float) -> float:
-    params, state = cruise(platform, dt_s)
-    step = 0
-    while state[L.SPEED] > 0.05 * platform.max_speed_mps and step * dt_s < LONGEST_S:
-        actuate(params, state, 0.0, 0.0, dt_s)
         step += 1
     return step * dt_s

@@ -70,7 +70,6 @@ def test_a_decision_says_how_long_it_feared_whom():
     told = Shield().decide(near(visiting=np.array([False, True])), STRAIGHT)
     assert [decision.feared_s for decision in told] == [None, 7.0]
     assert [d.feared_s for d in Shield(profile="rammers").decide(near(), STRAIGHT)] == [None, np.inf]
-    assert [d.feared_s for d in Shield(certificate="braking").decide(near(), STRAIGHT)] == [None, 0.0]
     told = Shield(profile="hold-course").decide(near(adversary_s=np.array([np.nan, 20.0])), STRAIGHT)
     assert [d.feared_s for d in told] == [None, 0.0], "with this profile nobody is feared, whatever is said of one"
 

@@ -20,7 +20,7 @@ HARBOUR = Surroundings(
 )
 FORMS = st.fixed_dictionaries(
     {
-        "certificate": st.sampled_from(["turning_circle", "braking"]),
+        "certificate": st.sampled_from(["turning_circle", "value_table"]),
         "coordination": st.sampled_from(["team", "per_boat"]),
         "adversary_s": st.sampled_from([0.0, 3.0, math.inf]),
         "response_per_s": st.sampled_from([0.5, math.inf]),
@@ -104,7 +104,7 @@ def test_a_batch_takes_unknown_memory_as_a_single_shield_does(column):
     fleet.state[:, [L.THRUST, L.RUDDER]] = 60.0, 0.0
     fleet.state[:, column] = math.nan
     state, wanted = fleet.state.copy(), relative((2.0, 0.0), (2.0, 0.0))
-    config = ShieldConfig(certificate="braking")
+    config = ShieldConfig()
     one = Shield(config).decide(fleet, wanted)
     many = BatchedShield(config, 1, fleet.platforms, (0, 1))
     sent = many.decide(state[None], wanted.values[None], fleet.controlled[None])
@@ -115,7 +115,7 @@ def test_a_batch_takes_unknown_memory_as_a_single_shield_does(column):
 
 
 @settings(parent=quick, max_examples=80)
-@given(st.integers(0, 2**31), st.booleans(), st.sampled_from(["turning_circle", "braking"]))
+@given(st.integers(0, 2**31), st.booleans(), st.sampled_from(["turning_circle", "value_table"]))
 def test_a_batch_never_answers_anything_but_numbers(seed, crowded, certificate):
     random = np.random.default_rng(seed)
     platforms = ("heron", "surveyor", "si", "di")

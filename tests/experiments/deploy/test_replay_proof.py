@@ -83,7 +83,7 @@ def test_a_log_proves_itself(log):
     [
         {},
         {"coordination": "per_boat", "delay_s": 0.3},
-        {"certificate": "braking", "position_error_m": 0.3, "response_per_s": math.inf},
+        {"certificate": "value_table", "position_error_m": 0.3, "response_per_s": math.inf},
         {"separation_m": 4.0, "edge_m": None, "solver": "quadprog", "certificate": "turning_circle"},
     ],
     ids=lambda settings: ",".join(settings) or "defaults",

@@ -19,7 +19,6 @@ def looked_at(kinds, team, **settings):
         (("surveyor", "surveyor"), {"profile": "hold-course"}, [27, 27]),
         (("heron", "surveyor"), {}, [27, 21]),
         (("heron", "ardurover_boat"), {}, [27, 40]),
-        (("heron", "surveyor"), {"certificate": "braking"}, [1, 1]),
     ],
 )
 def test_so_many_are_looked_at(kinds, settings, count):
