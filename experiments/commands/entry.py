@@ -17,6 +17,7 @@ from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrapping.wrap import wrap_entry
 from ..match import play_match
+from ..new_file import NEW
 from ..pool import check_jobs, run_all
 from ..provenance import machine, versions
 from ..replay_html import write_replay
@@ -155,7 +156,7 @@ def report(
 @command
 def wrap(
     entry: Entry,
-    out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; none may be there.")],
+    out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; a new file."), NEW],
     preset: o.Preset = "mctf2026",
     separation: o.Separation = None,
     profile: o.Profile = None,

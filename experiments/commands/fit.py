@@ -15,6 +15,7 @@ from ..fit.models import MODELS
 from ..fit.plot import draw
 from ..fit.reading import read_logs
 from ..fit.words import about_the_boat, promise
+from ..new_file import NEW, check_new
 from ..store import write_json
 from . import options as o
 from .console import command, err, out
@@ -24,13 +25,15 @@ Logs = Annotated[
     list[Path],
     typer.Argument(metavar="LOG...", help="Logs of one boat: .csv of steps, .tlog, ArduPilot .bin, .mcap, .alog."),
 ]
-Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="Platform file to write (.yaml).")]
+Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="Platform file to write (.yaml); a new one."), NEW]
 Name = Annotated[str | None, typer.Option(metavar="NAME", help="Of the boat.", show_default="the file's name")]
 Kind = Annotated[str, typer.Option(metavar="KIND", help="rate, usv, or auto: the one that foretells best.")]
 Boat = Annotated[str | None, typer.Option(metavar="NAME", help="The boat, of a black-box log with several.")]
 SystemId = Annotated[int | None, typer.Option(metavar="N", help="The boat, of a .tlog with several.")]
 Plot = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Picture of the fit.", show_default="beside --out, .png")
+    Path | None,
+    typer.Option(metavar="FILE", help="Picture of the fit, a new file.", show_default="beside --out, .png"),
+    NEW,
 ]
 
 
@@ -52,6 +55,7 @@ def fit(
     check_ending(file, "--out", (".yaml", ".yml"))
     picture = plot or file.with_suffix(".png")
     check_ending(picture, "--plot", (".png", ".pdf", ".svg"))
+    check_new(picture, "--plot")
     if kind != "auto" and kind not in MODELS:
         raise ConfigError(f"--kind is {kind!r}; give auto or one of {', '.join(MODELS)}")
     runs = read_logs(logs, boat, system_id)

@@ -14,6 +14,7 @@ from steerclear.shield.config import PROFILES
 from steerclear.shield.exceptions import ConfigError
 
 from ..kept_distance import counted_m
+from ..new_file import NEW
 from ..tally import RADII_M
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
@@ -78,7 +79,9 @@ AnswerTime = Annotated[
 ]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON; a new file."), NEW
+]
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:

@@ -5,6 +5,7 @@ Trainings with the same games are made once: without a shield and with one at de
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..json_file import read_json
 from ..pool import run_all
 from ..provenance import machine, versions
-from ..store import write_json
+from ..store import finite, write_json
 from .algorithms import training_of
 from .curve import CURVE
 from .playing import play_games, summary_of
@@ -97,10 +98,12 @@ def run_study(
         jobs: trainings at once, a process each.
 
     Raises:
-        ConfigError: QMIX or cloning, as a study is of PPO; or a training failed: the others are finished before.
+        ConfigError: QMIX or cloning, as a study is of PPO; the folder holds a study of another config; or a training
+            failed: the others are finished before.
     """
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
+    _check_same(base, folder)
     rows: dict[Cell, list[dict[str, Any]]] = {}
     failed = []
     notice(0, "")
@@ -117,6 +120,24 @@ def run_study(
             "then the same command"
         )
     return _results(base, seeds, games, rows)
+
+
+def _check_same(base: TrainingSettings, folder: Path) -> None:
+    """Refuse a folder whose trainings are of other settings: its networks would count as those of this config.
+
+    Raises:
+        ConfigError: they are.
+    """
+    if not (folder / RESULTS).exists():
+        return
+    remedy = "name another --out"
+    content = read_json(folder / RESULTS, "the results of a study", remedy)
+    if not isinstance(content, dict) or content.get("command") != COMMAND:
+        raise ConfigError(f"{folder / RESULTS} holds no study; {remedy}")
+    before, now = content["settings"]["training"], finite(asdict(base))
+    other = [name for name in now if json.loads(json.dumps(now[name])) != before.get(name)]
+    if other:
+        raise ConfigError(f"{folder} holds a study of another config ({', '.join(other)}); give its own, or {remedy}")
 
 
 def _rows_of(training: Training) -> dict[Cell, list[dict[str, Any]]]:

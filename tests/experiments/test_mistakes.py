@@ -145,7 +145,7 @@ MISTAKES = [
     ("render text.txt", "text.txt"),
     ("render a_folder", "a_folder"),
     ("render game.npz --to game.npz", "named twice"),
-    ("render game.npz --to a_folder", "end the name"),
+    ("render game.npz --to a_folder", "is a folder; name a file in it"),
     ("render game.npz --to text.txt/a.png", "text.txt"),
     ("render game.npz --to a.png --at -5", "--at"),
     ("render game.npz --to a.gif --speed 0", "speed"),

@@ -12,6 +12,7 @@ from typing import Any
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
+from ...new_file import check_new
 from ..checking import check_entry
 from ..team import EntryTeam
 from .facts import facts_for
@@ -79,8 +80,7 @@ def check_out(out: Path) -> None:
     """
     if out.suffix != ".zip":
         raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
-    if out.exists() or out.is_symlink():
-        raise ConfigError(f"{out} exists; give another name with --out, or remove it")
+    check_new(out, "--out")
     if not out.absolute().parent.is_dir():
         raise ConfigError(f"there is no folder {out.absolute().parent} for --out; make it first")
 

@@ -129,7 +129,7 @@ def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
         (["medium", "--out", "x.zip"], "medium is no entry"),
         (["empty.zip", "--out", "x.zip"], "needs one solution.py"),
         (["gone.zip", "--out", "x.zip"], "there is no submission at"),
-        (["{bare}", "--out", "there.zip"], "there.zip exists"),
+        (["{bare}", "--out", "there.zip"], "there.zip is there already"),
         (["{bare}", "--out", "shielded"], "give the name of a zip"),
         (["{bare}", "--out", "nowhere/x.zip"], "there is no folder"),
         (["{bare}", "--out", "x.zip", "--profile", "pirates"], "unknown profile 'pirates'"),
