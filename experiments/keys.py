@@ -125,6 +125,7 @@ RESULTS = {
     "failed[].game": "its number",
     "failed[].shielded": "whether with a shield",
     "failed[].error": "why",
+    "failed[].fault": "whether that is a fault of steerclear, not of what was given",
     "policy_files.*": "digests of the files of policies that are no named ones",
     "warnings[]": "what a reader has to know first: policies that failed while they played",
     "held[]": "policies that gave nothing usable throughout a game: the exit status is 2",

@@ -15,6 +15,7 @@ from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
 from ..engines import Workers as Engines
 from ..engines import engine_of
+from ..failed_jobs import end_failed
 from ..store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
@@ -67,7 +68,7 @@ def attack(
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
-        raise ConfigError(f"{len(results['failed'])} searches failed: {results['failed'][0]['error']}")
+        end_failed(results["failed"], f"{len(results['failed'])} searches failed", f": {results['failed'][0]['error']}")
     finish(passed(results))
 
 

@@ -18,6 +18,7 @@ from ..encounters.results import cells_table, heads_legend, results_of, write_al
 from ..encounters.scenes import Conditions
 from ..engines import Workers as Engines
 from ..engines import engine_of
+from ..failed_jobs import end_failed
 from ..store import LINES_FILE, ResultStore, write_json
 from ..tables import bars_table
 from . import options as o
@@ -104,7 +105,8 @@ def encounters(
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
-        raise ConfigError(f"{len(results['failed'])} chunks could not be played (see above); mend it, then --resume")
+        count = len(results["failed"])
+        end_failed(results["failed"], f"{count} chunks could not be played", " (see above); mend it, then --resume")
     finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
 
 

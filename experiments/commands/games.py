@@ -15,6 +15,7 @@ from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
 from ..conditions import words_of, words_of_settings
 from ..engines import Workers
+from ..failed_jobs import end_failed
 from ..judging import check_judge
 from ..kept_distance import check_shield, words_of_less
 from ..results import replay_of, results_of, write_results
@@ -154,11 +155,12 @@ def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
 
     Raises:
         ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
         PolicyError: a policy gave nothing usable throughout some game.
     """
     if results["failed"]:
-        missing = len(results["failed"])
-        raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+        words = f"{len(results['failed'])} games could not be played"
+        end_failed(results["failed"], words, " (see above); put that right, then add --resume")
     if results["held"]:
         raise PolicyError("; ".join(results["held"]))
 

@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..conditions import CALM
 from ..engines import Workers, engine_of
+from ..failed_jobs import end_failed
 from ..judging import check_judge
 from ..kept_distance import check_shield
 from ..score import DEFAULT_PENALTY, check_penalty
@@ -198,11 +199,12 @@ def _check_complete(results: dict[str, Any]) -> None:
 
     Raises:
         ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
         PolicyError: a team gave nothing usable throughout some game.
     """
     if results["failed"]:
-        missing = len(results["failed"])
-        raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+        words = f"{len(results['failed'])} games could not be played"
+        end_failed(results["failed"], words, " (see above); put that right, then add --resume")
     if results["silent"]:
         names = ", ".join(results["silent"])
         raise PolicyError(f"{names} gave no usable answer throughout some game; mend it or leave it out")

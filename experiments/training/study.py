@@ -15,6 +15,7 @@ import numpy as np
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..failed_jobs import end_failed
 from ..json_file import read_json
 from ..pool import run_all
 from ..provenance import machine, versions
@@ -100,6 +101,7 @@ def run_study(
     Raises:
         ConfigError: QMIX or cloning, as a study is of PPO; the folder holds a study of another config; or a training
             failed: the others are finished before.
+        JobFault: one failed by a fault of steerclear.
     """
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
@@ -109,16 +111,14 @@ def run_study(
     notice(0, "")
     for outcome in run_all(_rows_of, trainings_of(base, folder, seeds, games), jobs):
         if outcome.answer is None:
-            failed.append(f"{outcome.job.name}: {outcome.error}")
+            failed.append({"name": outcome.job.name, **outcome.why})
             continue
         rows.update(outcome.answer)
         notice(len(rows), outcome.job.name)
         write_json(folder / RESULTS, _results(base, seeds, games, rows))
     if failed:
-        raise ConfigError(
-            f"{len(failed)} training(s) failed, the first {failed[0]}; {len(rows)} cells are done and kept: mend that, "
-            "then the same command"
-        )
+        words = f"{len(failed)} training(s) failed, {len(rows)} cells are done and kept"
+        end_failed(failed, words, f"; {failed[0]['name']}: {failed[0]['error']}; mend that, then the same command")
     return _results(base, seeds, games, rows)
 
 
