@@ -157,6 +157,27 @@ RESULTS = {
     "files.*": "what was written, relative to the folder",
 }
 
+COMPARE = {
+    **_PROVENANCE,
+    **{
+        f"{which}.{name}": words
+        for which in ("first", "second")
+        for name, words in {
+            "folder": "of the results",
+            "own": "policy whose results are counted",
+            "shielded": "whether the games compared are those with its shield",
+            "games": "of them, in that folder",
+        }.items()
+    },
+    "differs.*[]": "settings that differ, the first's value and the second's; null: not given",
+    "pairings[].opponent": "policy of the other team",
+    "pairings[].pairs": "games of both from the same seed and side",
+    "pairings[].metrics.*.label": "words of the tables",
+    **{f"pairings[].metrics.*.first.{k}": f"{v}, the first, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.second.{k}": f"{v}, the second, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.difference.{k}": f"{v}, second - first, paired" for k, v in _FIGURE.items()},
+}
+
 ENTRY_WRAP = {
     **_PROVENANCE,
     "entry": "what was put behind the shield",
@@ -302,6 +323,7 @@ REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for n
 KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
+    "compare": COMPARE,
     "tournament": _TOURNAMENT,
     "entry check": ENTRY_CHECK,
     "entry report": RESULTS,

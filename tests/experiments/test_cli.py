@@ -304,7 +304,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
     assert failed.exit_code == ExitCode.BAR_FAILED
     assert "position_m 0.001 is over 1e-06" in failed.stdout
     assert "captures of blue" in failed.stdout
-    content = json.loads(Path("p.json").read_text())
+    content = json.loads(Path("q.json").read_text())
     assert keys.undocumented(content, keys.PARITY) == []
     assert [row["passed"] for row in content["traces"]] == [True, False]
 
