@@ -202,6 +202,8 @@ def _show(results: dict[str, Any], folder: Path) -> None:
         console.print(bars_table(results["bars"]))
         console.print()
     for failed in results["failed"]:
-        console.print(f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", soft_wrap=True)
+        console.print(
+            f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", markup=False, soft_wrap=True
+        )
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)

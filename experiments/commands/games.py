@@ -138,7 +138,7 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     for failed in results["failed"]:
         state = "on" if failed["shielded"] else "off"
         words = f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}"
-        console.print(words)
+        console.print(words, markup=False, soft_wrap=True)
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)
     if results["quick"]:

@@ -171,7 +171,7 @@ def test_a_game_that_cannot_be_played_is_told_and_the_rest_is_kept(error, code, 
     done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out")
     assert done.exit_code == code
     words = "no such game" if error is BAD_INPUT else "this is a fault of steerclear, not of yours (RuntimeError: sunk)"
-    assert f"not played: medium vs hold, game 0, shield off: {words}" in done.stdout.replace("\n", " ")
+    assert f"not played: medium vs hold, game 0, shield off: {words}" in done.stdout
     assert "4 games could not be played" in done.stderr
     assert ("its traceback is in" in done.stderr) == (error is FAULT)
     assert "Traceback" not in done.output
