@@ -26,6 +26,7 @@ from ..store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
 from .games import check_complete, default_folder, run_games, say_of_distance
+from .policies_tried import say_of_elsewhere
 
 app = typer.Typer(
     help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
@@ -64,6 +65,7 @@ def check(
     Exit status: 0 it plays, 1 a boat had no usable action in some step, 2 it cannot be loaded or gave nothing usable.
     """
     check_path(entry)
+    say_of_elsewhere([entry], GameConfig.preset(preset))
     found = check_entry(entry, preset, max_time, answer_time)
     console = out()
     for line in check_lines(found):
@@ -86,11 +88,19 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
         f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
     ]
+    if (made := found["made_for"]) is not None:
+        lines.insert(1, f"made by steerclear for preset {made['preset']}; {_kept(made['shield'])}")
     lines += [f"could not be read as Python: {name}" for name in imports["unread"]]
     for one in found["failures"]:
         boats = ", ".join(f"{boat} x {count}" for boat, count in one["boats"].items())
         lines.append(f"failed: {one['kind']} ({boats}): {one['message']}")
     return lines
+
+
+def _kept(shield: dict[str, Any] | None) -> str:
+    return (
+        "no shield in it" if shield is None else f"its shield keeps {shield['separation_m']:g} m, {shield['profile']}"
+    )
 
 
 def time_text(time_ms: float) -> str:
@@ -169,13 +179,14 @@ def wrap(
     """
     check_path(entry)
     asked = o.shield_settings(separation, None, profile, None, shield_set)
+    say_of_elsewhere([entry], GameConfig.preset(preset))
     made = wrap_entry(entry, out_file, preset, o.with_distance(asked, preset, {}))
     tried, settings = made.pop("tried"), made["shield"]
     if tried["failures"]:
         err().print(f"warning: {headline(tried)}; its shield tells them to stop", markup=False, soft_wrap=True)
     say_of_distance(settings["separation_m"], GameConfig.preset(preset))
     console = out()
-    words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
+    words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; for preset {made['preset']}; {_kept(settings)}"
     console.print(words, markup=False, soft_wrap=True)
     if json_file is not None:
         write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+import zipfile
 from inspect import Parameter, signature
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from steerclear.experiments.commands import train
 from steerclear.experiments.folder_lock import _HELD
 from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
+from steerclear.policies.submissions.made_for import made_for
 from typer.testing import CliRunner
 
 ROOT = Path(__file__).parents[3]
@@ -29,6 +31,10 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     exported = call("export", folder / "model.zip", *files)
     assert exported.exit_code == 0
     assert exported.output.count("for games of preset aamas2024") == 2
+    made = made_for(tmp_path / "solution.zip")
+    assert (made.preset, made.shielded) == ("aamas2024", False)
+    with zipfile.ZipFile(tmp_path / "solution.zip") as packed:
+        assert "It learned in preset aamas2024. There is no shield in it" in packed.read("solution.py").decode()
     for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
         played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
@@ -39,6 +45,7 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     ):
         elsewhere = call(*words)
         assert elsewhere.exit_code == 2
+        assert ("learned in preset aamas2024 and plays mctf2026" in elsewhere.output) == (words[0] == "entry")
         assert "take" in elsewhere.output
         assert "--preset aamas2024" in elsewhere.output
 
