@@ -20,7 +20,7 @@ from ..store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
 from .encounters import Current, Delay, Noise, Radius, Workers, platform_pairs
-from .games import default_folder
+from .games import results_folder
 from .scenes import play_scene_files
 
 
@@ -73,9 +73,7 @@ def attack(
 
 
 def _run(searches: list[Search], folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder("attack")
+    folder = results_folder("attack", folder, resume)
     store, started = ResultStore(folder, resume, "attack"), time.perf_counter()
     try:
         with progress("searches", len(searches)) as notice:

@@ -23,7 +23,7 @@ from ..store import LINES_FILE, ResultStore, write_json
 from ..tables import bars_table
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
-from .games import default_folder
+from .games import results_folder
 from .scenes import play_scene_files
 
 Platform = Annotated[
@@ -169,9 +169,7 @@ def family_names(text: str) -> tuple[str, ...]:
 
 
 def _run(settings: Settings, folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder("encounters")
+    folder = results_folder("encounters", folder, resume)
     campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), workers)
     started = time.perf_counter()
     try:

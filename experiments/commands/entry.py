@@ -25,7 +25,7 @@ from ..spec import ANSWER_S
 from ..store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
-from .games import check_complete, default_folder, run_games, say_of_distance
+from .games import check_complete, results_folder, run_games, say_of_distance
 from .policies_tried import say_of_elsewhere
 
 app = typer.Typer(
@@ -154,7 +154,7 @@ def report(
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
-    folder = out_folder or default_folder("entry-report")
+    folder = results_folder("entry-report", out_folder, resume)
     results = run_games("entry report", settings, folder, jobs, resume, quick)
     _show(settings, folder, results, looks, check_jobs(jobs))
     if json_file is not None:

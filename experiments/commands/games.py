@@ -72,6 +72,17 @@ def default_folder(command: str) -> Path:
     return Path("results") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
 
 
+def results_folder(command: str, folder: Path | None, resume: bool) -> Path:
+    """The folder of results: the one named, or a new one.
+
+    Raises:
+        ConfigError: a run is to be gone on with, and it is not said which.
+    """
+    if resume and folder is None:
+        raise ConfigError("--resume needs the --out folder of the run to go on with")
+    return folder or default_folder(command)
+
+
 def run_games(
     command: str,
     settings: AblationSettings,
@@ -98,9 +109,7 @@ def run_games(
         Interrupted: by Ctrl-C; what is finished has been written.
     """
     check_settings(settings)
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder(command)
+    folder = results_folder(command, folder, resume)
     campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), workers)
     if resume:
         warn(campaign.words_of_before)

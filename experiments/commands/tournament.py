@@ -29,7 +29,7 @@ from ..tournament.tables import agreement_lines, all_tables
 from ..warming import WARMED, warm_up
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
-from .games import KEYBOARD, default_folder, say_of_distance
+from .games import KEYBOARD, results_folder, say_of_distance
 from .policies_tried import try_policies
 
 Teams = Annotated[str, typer.Option(metavar="A,B", help="Teams: names or submissions' paths, separated by commas.")]
@@ -104,9 +104,8 @@ def tournament(
     settings = quick(settings, QUICK_TIME_S) if quick_version else settings
     workers = engine_of(engine, address, jobs)
     _check(settings)
-    if resume and out_folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    results = _run(settings, out_folder or default_folder("tournament"), workers, resume, replays)
+    folder = results_folder("tournament", out_folder, resume)
+    results = _run(settings, folder, workers, resume, replays)
     if json_file is not None:
         write_json(json_file, results)
     _check_complete(results)

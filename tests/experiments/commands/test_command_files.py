@@ -1,6 +1,7 @@
 """Nothing that a command reads, or that is there, is written over by what it writes."""
 
 import inspect
+import zipfile
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -207,6 +208,20 @@ def test_results_write_over_nothing(command, name, tmp_path, monkeypatch):
     assert done.exit_code == ExitCode.BAD_INPUT
     assert f"{name} would be written over; choose another --out, or move it" in done.stderr
     assert {path.name: path.read_text() for path in Path("out").iterdir()} == {name: "mine"}
+
+
+@pytest.mark.parametrize(
+    "line", ["ablate", "evaluate medium", "encounters", "attack", "tournament", "entry report a.zip --opponents hold"]
+)
+def test_a_run_to_go_on_with_is_named(line, tmp_path, monkeypatch):
+    """Else a new folder would be begun beside it."""
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("a.zip", "w") as packed:
+        packed.writestr("solution.py", "class solution:\n    def compute_action(self, agent_id, a, b, c): return 4\n")
+    done = CliRunner().invoke(app, [*line.split(), "--resume"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--resume needs the --out folder of the run to go on with" in done.stderr
+    assert not Path("results").exists()
 
 
 @pytest.mark.parametrize("words", ["encounters --scene none.json", "attack --replay none.json"])
