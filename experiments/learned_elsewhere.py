@@ -23,7 +23,7 @@ def words_of_elsewhere(policy: str, game: GameConfig) -> str:
     Raises:
         PolicyError: its file cannot be read.
     """
-    made = _made(policy)
+    made = made_of(policy)
     preset = learned_in(policy) if made is None or made.shielded else made.preset
     if preset in ("", game.preset_name):
         return ""
@@ -39,14 +39,15 @@ def words_of_shield(policy: str, game: GameConfig) -> str:
     Raises:
         PolicyError: the shield in it is for decisions of another length, or for other boats.
     """
-    made = _made(policy)
+    made = made_of(policy)
     if made is None:
         return ""
     check_game(made, game, policy)
     return words_of_less(made, game, policy)
 
 
-def _made(policy: str) -> MadeFor | None:
+def made_of(policy: str) -> MadeFor | None:
+    """What an entry says of itself, see `made_for`; None for named policies and models."""
     return made_for(policy) if is_entry(policy) and not policy.startswith(SB3_PREFIX) else None
 
 

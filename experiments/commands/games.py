@@ -18,6 +18,7 @@ from ..engines import Workers
 from ..failed_jobs import end_failed
 from ..judging import check_judge
 from ..kept_distance import check_shield, words_of_less
+from ..learned_elsewhere import made_of
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..sea import check_current
@@ -54,6 +55,7 @@ def check_settings(settings: AblationSettings) -> None:
     kept_m = check_shield(settings.shield, game).separation_m
     if any(settings.states):
         say_of_distance(kept_m, game)
+        say_of_second(settings.own)
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
@@ -65,6 +67,13 @@ def say_of_distance(kept_m: float, game: GameConfig) -> None:
     """Say, once a command, that its shield keeps less than the distance at which the game counts collisions."""
     if words := words_of_less(kept_m, game):
         warn(words)
+
+
+def say_of_second(own: str) -> None:
+    """Say that a policy brings a shield of its own: games without ours are not games without a shield."""
+    made = made_of(own)
+    if made is not None and made.shielded:
+        warn(f"{own} has a shield in it: off means that one alone, on that one and ours; play the bare entry instead")
 
 
 def default_folder(command: str) -> Path:

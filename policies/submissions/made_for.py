@@ -94,7 +94,7 @@ def check_game(made: MadeFor, game: GameConfig, source: object) -> None:
         other = f"for boats {', '.join(made.platforms)}, but this game has {', '.join(names)}"
     if other:
         raise PolicyError(
-            f"the shield in {source} is {other}; play it by preset {made.preset}, or the bare entry with a shield of this game"
+            f"the shield in {source} is {other}; play it by preset {made.preset}, or the bare entry with --shield"
         )
 
 

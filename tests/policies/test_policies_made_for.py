@@ -102,7 +102,7 @@ def test_a_policy_of_ones_own_program_tells_it_once_and_refuses(tmp_path, caplog
     with caplog.at_level(logging.WARNING):
         begin(path, GAME)
     assert [record.message.count("keeps 2.5 m") for record in caplog.records] == [1]
-    with pytest.raises(PolicyError, match="or the bare entry with a shield of this game"):
+    with pytest.raises(PolicyError, match="or the bare entry with --shield"):
         begin(path, GameConfig.preset("mctf2025"))
 
 

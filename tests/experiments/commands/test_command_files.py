@@ -113,7 +113,8 @@ def test_an_export_writes_over_no_file(option, tmp_path, monkeypatch):
 READ = {
     "deploy fleet", "preflight fleet", "referee fleet", "sim-boats fleet", "sea-trial fleet", "train config",
     "train-study config", "export model", "encounters scene", "attack replay", "parity traces", "render records",
-    "docs sources", "replay log", "replay key", "fit logs", "reach show file", "reach check files",
+    "docs sources", "compare first", "compare second", "replay log", "replay key", "fit logs",
+    "reach show file", "reach check files",
 }  # fmt: skip
 """Files that commands read."""
 FOLDERS = {

@@ -129,6 +129,18 @@ def test_commands_refuse_a_game_it_is_not_for_and_tell_of_less(wrapped):
     assert done.stderr.count("keeps 4 m (separation_m), but this game counts collisions at 6 m") == 1
 
 
+def test_games_without_our_shield_are_not_without_one_where_the_entry_has_its_own(wrapped, tmp_path):
+    line = ["ablate", "--own", str(wrapped[0]), "--opponents", "hold", "--preset", "mctf2026", "--max-time", "1"]
+    done = CliRunner().invoke(cli.app, [*line, "--games", "1", "--jobs", "1", "--out", str(tmp_path / "x")])
+    assert done.exit_code == ExitCode.OK, done.output
+    assert done.stderr.count("has a shield in it: off means that one alone") == 1
+    bare = CliRunner().invoke(
+        cli.app, ["evaluate", *line[2:], "--games", "1", "--jobs", "1", "--out", str(tmp_path / "y")]
+    )
+    assert bare.exit_code == ExitCode.OK, bare.output
+    assert "has a shield in it" not in bare.stderr
+
+
 def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
     """In our own game, with the entry's class found by its name in the zip's module, as pickles do."""
     env = MctfEnv(GameConfig.preset("mctf2026", max_time_s=40.0))
