@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.env.config import GameConfig
-from steerclear.shield.config import PROFILES
+from steerclear.shield.config import PROFILES, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 
 from ..kept_distance import counted_m
@@ -125,10 +125,12 @@ def shield_settings(
     """Collect the settings of the shield that were given.
 
     Raises:
-        ConfigError: one is given twice.
+        ConfigError: one is given twice, or the separation, at which hits are counted as well, is no distance.
     """
     named = {"separation_m": separation, "certificate": certificate, "profile": profile, "solver": solver}
-    return _together(named, pairs, "--shield-set")
+    given = _together(named, pairs, "--shield-set")
+    ShieldConfig.of(**{name: value for name, value in given.items() if name == "separation_m"})
+    return given
 
 
 def with_distance(shield: dict[str, Any], preset: str, rules: dict[str, Any]) -> dict[str, Any]:
