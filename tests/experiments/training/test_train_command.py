@@ -12,6 +12,7 @@ from steerclear.experiments.folder_lock import _HELD
 from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
 from steerclear.policies.submissions.made_for import made_for
+from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
 ROOT = Path(__file__).parents[3]
@@ -133,3 +134,10 @@ def test_the_page_lists_every_option_of_the_environment_with_its_default():
 @pytest.mark.parametrize("command", ["train", "export", "train-study"])
 def test_the_commands_are_there(command):
     assert call(command, "--help").exit_code == 0
+
+
+@pytest.mark.parametrize("shield", ["none", {"separation_m": 3.0}, 1, None])
+def test_a_shield_of_the_id_is_there_or_not(shield):
+    """A name or settings are true: "none" would be a shield, and settings would not be kept."""
+    with pytest.raises(ConfigError, match=r"shield is .*; give True or False, or build one with settings from parts"):
+        make_learners(num_envs=3, shield=shield)
