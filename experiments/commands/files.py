@@ -6,13 +6,12 @@ import inspect
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 from typer.models import OptionInfo
 
-from ..new_file import NEW, check_new
+from ..new_file import NEW, check_new, check_place
 
 OTHERS = {
     ".mcap": "black boxes",
@@ -45,6 +44,7 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
         value = given.get(name)
         for path in value if isinstance(value, list) else (value,):
             check_new(path, spelled.get(name, name))
+            check_place(path, spelled.get(name, name))
 
 
 def written_by(function: Callable[..., Any]) -> list[str]:
@@ -79,9 +79,9 @@ def check_json_file(path: Path | None) -> None:
     try:
         if path.is_dir():
             raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
-        TemporaryFile(dir=next(folder for folder in path.absolute().parents if folder.exists())).close()
-    except OSError as error:
+    except OSError as error:  # a name that none has
         raise ConfigError(f"--json {path} cannot be written ({error.strerror}); name a file elsewhere") from error
+    check_place(path, "--json")
 
 
 def check_ending_is_not(path: Path, option: str, others: Mapping[str, str], own: str) -> None:

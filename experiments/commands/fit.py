@@ -15,7 +15,7 @@ from ..fit.models import MODELS
 from ..fit.plot import draw
 from ..fit.reading import read_logs
 from ..fit.words import about_the_boat, promise
-from ..new_file import NEW, check_new
+from ..new_file import NEW, check_new, make_folder_of
 from ..store import write_json
 from . import options as o
 from .console import command, err, out
@@ -66,6 +66,7 @@ def fit(
     results = results_of(found, chosen, described)
     head = f"Fitted by steerclear fit to {len(runs)} runs of {', '.join(sorted({log.name for log in logs}))[:200]}."
     _write(file, to_text(described, head))
+    make_folder_of(picture)
     draw(found[chosen], described.platform.name, picture)
     if json_file is not None:
         write_json(json_file, results)
@@ -77,6 +78,7 @@ def fit(
 
 def _write(file: Path, text: str) -> None:
     try:
+        make_folder_of(file)
         file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"--out {file} cannot be written ({error.strerror}); choose another place") from None

@@ -16,7 +16,7 @@ from steerclear.shield.platforms.files import PlatformFile, is_path, load_platfo
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
 
 from ..fit.words import about_the_boat, promise
-from ..new_file import NEW, check_new
+from ..new_file import NEW, check_new, make_folder_of
 from .console import command, out
 from .files import check_ending
 
@@ -91,6 +91,7 @@ def new(
     check_new(path, "--out")
     text = to_text(PlatformFile(replace(file_of(begin).platform, name=name)), "Edit, then: steerclear platform check")
     try:
+        make_folder_of(path)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path} cannot be written ({error.strerror}); choose another place with --out") from None

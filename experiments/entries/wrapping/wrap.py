@@ -14,7 +14,7 @@ from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
-from ...new_file import check_new
+from ...new_file import check_new, check_place, make_folder_of
 from ...store import told_settings
 from ..checking import check_entry
 from ..team import EntryTeam
@@ -84,8 +84,7 @@ def check_out(out: Path) -> None:
     if out.suffix != ".zip":
         raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
     check_new(out, "--out")
-    if not out.absolute().parent.is_dir():
-        raise ConfigError(f"there is no folder {out.absolute().parent} for --out; make it first")
+    check_place(out, "--out")
 
 
 def check_bare(folder: Path, entry: str) -> None:
@@ -163,6 +162,7 @@ def write_zip(out: Path, files: dict[str, Any]) -> None:
     """
     part = out.with_name(out.name + ".part")
     try:
+        make_folder_of(out)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
             for name, content in files.items():
                 raw = content.read_bytes() if isinstance(content, Path) else content

@@ -177,6 +177,35 @@ def test_no_command_writes_over_a_file(words, name, option, tmp_path, monkeypatc
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fit none.csv --out {}.yaml",
+        "fit none.csv --plot {}.png",
+        "render none.npz --to {}.png",
+        "reach solve --own heron --other heron --out {}.npz",
+        "reach show --own heron --other heron --picture {}.png",
+        "platform new mine --out {}.yaml",
+        "bench --json {}.json",
+    ],
+)
+def test_a_place_that_takes_no_file_is_found_out_before_any_work(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("mine")
+    done = CliRunner().invoke(app, words.format("file/x/y").split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "cannot be written (Not a directory); name a file elsewhere" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("words", ["platform new mine --out", "reach show --own heron --other heron --picture"])
+def test_folders_of_a_file_are_made(words, tmp_path):
+    file = tmp_path / "a" / "b" / ("mine.yaml" if "platform" in words else "sets.png")
+    done = CliRunner().invoke(app, [*words.split(), str(file)], terminal_width=200)
+    assert done.exit_code == ExitCode.OK, done.output
+    assert file.stat().st_size > 0
+
+
 def test_a_replay_beside_its_record_is_not_written_over(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("steerclear.experiments.commands.render.load", lambda path: {})

@@ -170,7 +170,7 @@ def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
         (["gone.zip", "--out", "x.zip"], "there is no submission at"),
         (["{bare}", "--out", "there.zip"], "there.zip is there already"),
         (["{bare}", "--out", "shielded"], "give the name of a zip"),
-        (["{bare}", "--out", "nowhere/x.zip"], "there is no folder"),
+        (["{bare}", "--out", "there.zip/x.zip"], "--out there.zip/x.zip cannot be written"),
         (["{bare}", "--out", "x.zip", "--profile", "pirates"], "unknown profile 'pirates'"),
         (["{bare}", "--out", "x.zip", "--separation", "-1"], "separation_m is -1"),
         (["{bare}", "--out", "x.zip", "--shield-set", "speed=3"], "unknown shield setting 'speed'"),
