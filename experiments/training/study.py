@@ -111,14 +111,14 @@ def run_study(
     notice(0, "")
     for outcome in run_all(_rows_of, trainings_of(base, folder, seeds, games), jobs):
         if outcome.answer is None:
-            failed.append({"name": outcome.job.name, **outcome.why})
+            failed.append({**outcome.why, "error": f"{outcome.job.name}: {outcome.error}"})
             continue
         rows.update(outcome.answer)
         notice(len(rows), outcome.job.name)
         write_json(folder / RESULTS, _results(base, seeds, games, rows))
     if failed:
         words = f"{len(failed)} training(s) failed, {len(rows)} cells are done and kept"
-        end_failed(failed, words, f"; {failed[0]['name']}: {failed[0]['error']}; mend that, then the same command")
+        end_failed(failed, words, f"; {failed[0]['error']}; mend that, then the same command")
     return _results(base, seeds, games, rows)
 
 

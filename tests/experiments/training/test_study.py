@@ -90,6 +90,6 @@ def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tm
     spoiled = tmp_path / "training-collision_on-seed_0"
     spoiled.mkdir()
     (spoiled / "final.npz").write_bytes(b"no weights")
-    with pytest.raises(ConfigError, match=r"training-collision_on-seed_0: .*7 cells are done"):
+    with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
         run_study(base, tmp_path, 1, 1, lambda done, words: None)
     assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7
