@@ -21,7 +21,7 @@ class Played:
 
     Attributes:
         rows: one per game played, in the order of the specs.
-        failed: games that could not be played: `pairing`, `game`, `shielded`, `error`.
+        failed: games that could not be played: `pairing`, `game`, `shielded`, `error`, `fault`.
         resumed: how many of the rows an earlier run had left.
     """
 
@@ -94,6 +94,6 @@ class Campaign:
         spec = outcome.job
         if outcome.answer is None:
             named = {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None}
-            self._failed.append({**named, "error": outcome.error})
+            self._failed.append({**named, **outcome.why})
         else:
             self.store.append(spec.key, outcome.answer)

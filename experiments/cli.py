@@ -12,6 +12,7 @@ import typer
 from .commands.ablate import ablate
 from .commands.attack import attack
 from .commands.bench import bench
+from .commands.compare import compare
 from .commands.console import leave_failed
 from .commands.demonstrate import demonstrate
 from .commands.docs import docs
@@ -44,6 +45,7 @@ for function in (
     play,
     evaluate,
     ablate,
+    compare,
     tournament,
     demonstrate,
     train,

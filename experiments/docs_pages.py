@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
@@ -45,13 +46,17 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
         What was written.
 
     Raises:
-        ConfigError: results of another command or cut short, or the folder cannot be written to.
+        ConfigError: results of another command or cut short, or the folder cannot be written to, or holds a page of
+            such a name that was not made here.
     """
     for content in results:
         check_source(content)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        pages, pictures = _pages_of(results, folder)
+        with TemporaryDirectory(dir=folder) as made:
+            pages, pictures = _pages_of(results, Path(made))
+            check_ours([folder / name for name in pages])
+            pictures = [picture.replace(folder / picture.name) for picture in pictures]
         for name, text in pages.items():
             (folder / name).write_text(text, encoding="utf-8")
     except ConfigError:
@@ -62,6 +67,17 @@ def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path
         why = visible(f"{type(error).__name__}: {error}")[:200]
         raise ConfigError(f"results are cut short or of another version ({why}); make them again") from error
     return [*(folder / name for name in pages), *pictures]
+
+
+def check_ours(pages: Sequence[Path]) -> None:
+    """Refuse to write over pages that `write_pages` did not make: those it made it makes anew.
+
+    Raises:
+        ConfigError: there is one.
+    """
+    for page in pages:
+        if page.exists() and not (page.is_file() and MADE in page.read_text(encoding="utf-8", errors="replace")):
+            raise ConfigError(f"{page} was not made by steerclear docs; choose another --out, or move it")
 
 
 def check_source(content: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ import errno
 import sys
 import tempfile
 import traceback
+from functools import lru_cache
 
 from .provenance import package_version
 
@@ -38,13 +39,27 @@ def machine_words(error: Exception) -> str:
 
 def fault_words(error: Exception) -> str:
     """One line that says this is a fault of steerclear, and where its traceback was written."""
-    name = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"error: this is a fault of steerclear, not of yours ({name[:200]}); {_kept(error)}"
+    return words_of_trace(name_of(error), trace_of(error))
 
 
-def _kept(error: Exception) -> str:
-    lines = ["".join(traceback.format_exception(error)), f"steerclear {package_version()}, Python {sys.version}"]
-    lines.append(f"command: {sys.argv!r}")
+def name_of(error: Exception) -> str:
+    """What an error says, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def trace_of(error: Exception) -> str:
+    """Its traceback as text, which goes from process to process."""
+    return "".join(traceback.format_exception(error))
+
+
+@lru_cache(maxsize=64)
+def words_of_trace(name: str, trace: str) -> str:
+    """As `fault_words`, of an error of another process; a file for all jobs that end in the same."""
+    return f"this is a fault of steerclear, not of yours ({name}); {_kept(trace)}"
+
+
+def _kept(trace: str) -> str:
+    lines = [trace, f"steerclear {package_version()}, Python {sys.version}", f"command: {sys.argv!r}"]
     try:
         with tempfile.NamedTemporaryFile(
             "w", prefix="steerclear-fault-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"

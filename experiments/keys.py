@@ -125,6 +125,7 @@ RESULTS = {
     "failed[].game": "its number",
     "failed[].shielded": "whether with a shield",
     "failed[].error": "why",
+    "failed[].fault": "whether that is a fault of steerclear, not of what was given",
     "policy_files.*": "digests of the files of policies that are no named ones",
     "warnings[]": "what a reader has to know first: policies that failed while they played",
     "held[]": "policies that gave nothing usable throughout a game: the exit status is 2",
@@ -156,6 +157,27 @@ RESULTS = {
     "files.*": "what was written, relative to the folder",
 }
 
+COMPARE = {
+    **_PROVENANCE,
+    **{
+        f"{which}.{name}": words
+        for which in ("first", "second")
+        for name, words in {
+            "folder": "of the results",
+            "own": "policy whose results are counted",
+            "shielded": "whether the games compared are those with its shield",
+            "games": "of them, in that folder",
+        }.items()
+    },
+    "differs.*[]": "settings that differ, the first's value and the second's; null: not given",
+    "pairings[].opponent": "policy of the other team",
+    "pairings[].pairs": "games of both from the same seed and side",
+    "pairings[].metrics.*.label": "words of the tables",
+    **{f"pairings[].metrics.*.first.{k}": f"{v}, the first, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.second.{k}": f"{v}, the second, per game" for k, v in _FIGURE.items()},
+    **{f"pairings[].metrics.*.difference.{k}": f"{v}, second - first, paired" for k, v in _FIGURE.items()},
+}
+
 ENTRY_WRAP = {
     **_PROVENANCE,
     "entry": "what was put behind the shield",
@@ -170,6 +192,10 @@ ENTRY_CHECK = {
     **_PROVENANCE,
     "entry": "what was checked",
     "load_s": "time until it was loaded in a process of its own, s",
+    "made_for": "what an entry that steerclear wrote says of itself; null for others",
+    "made_for.preset": "rules of the game it is for",
+    "made_for.shield": "null: there is no shield in it",
+    "made_for.shield.*": "every setting of the shield in it",
     "imports.needed[]": "packages its files import beyond Python's own and themselves",
     "imports.missing[]": "those of them that are not installed here",
     "imports.unread[]": "files that are no Python this interpreter reads",
@@ -301,6 +327,7 @@ REPLAY = {**_PROVENANCE, **_REPLAY, **{f"sides.*.breaches[].{name}": words for n
 KEYS = {
     "ablate": RESULTS,
     "evaluate": RESULTS,
+    "compare": COMPARE,
     "tournament": _TOURNAMENT,
     "entry check": ENTRY_CHECK,
     "entry report": RESULTS,

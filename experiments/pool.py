@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import multiprocessing
 import multiprocessing.connection
 import multiprocessing.process
@@ -14,14 +13,16 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
+from .faults import machine_words, name_of, trace_of, words_of_trace
+from .provenance import available_cores
+
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
-logger = logging.getLogger(__name__)
 
 DIED = "its worker process died, also when it ran alone (out of memory?); mend that, then --resume"
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
@@ -33,16 +34,24 @@ MOST_JOBS = 1024
 
 @dataclass(frozen=True)
 class Outcome(Generic[Job, Answer]):
-    """What became of one job: an answer, or the one-line reason why there is none."""
+    """What became of one job.
+
+    Attributes:
+        job: which.
+        answer: its answer; None: it has none.
+        error: why, on one line.
+        trace: traceback of what no one foresaw, a fault of steerclear; None for bad input and the machine's doing.
+    """
 
     job: Job
     answer: Answer | None
     error: str | None = None
+    trace: str | None = None
 
-
-def available_cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    @property
+    def why(self) -> dict[str, Any]:
+        """Why there is no answer, as results keep it and `failed_jobs.end_failed` reads it."""
+        return {"error": self.error, "fault": self.trace is not None}
 
 
 def check_jobs(jobs: int | None) -> int:
@@ -71,7 +80,8 @@ def run_all(
     """Run ``function`` on every job and yield the outcomes as they come.
 
     A job that raises does not stop the others; neither does a worker that dies: the jobs under way then are run again,
-    each alone. Leaving the loop early or interrupting it (Ctrl-C) drops the jobs that have not ended.
+    each alone. Leaving the loop early or interrupting it (Ctrl-C) drops the jobs that have not ended. Tracebacks of
+    faults are written to a file here, one for all that are alike.
 
     Args:
         function: importable by name (workers are spawned, not forked), as is every job's data.
@@ -81,6 +91,15 @@ def run_all(
     Yields:
         One `Outcome` per job, in the order they end.
     """
+    for outcome in _run(function, jobs, processes):
+        if outcome.trace is not None:
+            outcome = replace(outcome, error=words_of_trace(outcome.error or "", outcome.trace))
+        yield outcome
+
+
+def _run(
+    function: Callable[[Job], Answer], jobs: Sequence[Job], processes: int | Engine
+) -> Iterator[Outcome[Job, Answer]]:
     if not isinstance(processes, int):
         yield from processes.run(function, jobs)
         return
@@ -129,9 +148,9 @@ def attempt(function: Callable[[Job], Answer], job: Job) -> Outcome[Job, Answer]
         return Outcome(job, function(job))
     except SteerclearError as error:
         return Outcome(job, None, str(error))
-    except Exception as error:  # user policies may raise anything; the log keeps the traceback
-        logger.exception("a job failed")
-        return Outcome(job, None, f"{type(error).__name__}: {error}")
+    except Exception as error:
+        words = machine_words(error)
+        return Outcome(job, None, words or name_of(error), None if words else trace_of(error))
 
 
 @contextmanager

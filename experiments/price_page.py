@@ -39,7 +39,8 @@ def is_dial(content: Mapping[str, Any]) -> bool:
 ADVICE = (
     "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats "
     "often lie still (which single rammers hit: see [encounters by family](measured/comparison.md), `at_rest`), and on "
-    "boats, as `FLEET.yaml` does; `hold-course` where opponents are traffic and not a team."
+    "boats, as `FLEET.yaml` does; `hold-course` where opponents are traffic and not a team. Any two other "
+    "settings are compared, paired, by `steerclear compare` ([settings](settings.md))."
 )
 """Beside the figures: which of the profiles is for whom."""
 

@@ -10,8 +10,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from .pool import available_cores
-
 PACKAGES = (
     "steerclear",
     "numpy",
@@ -28,6 +26,11 @@ PACKAGES = (
 
 NO_GAME = ("shield/bridge", "env/render", "experiments/boats", "experiments/commands", "experiments/deploy")
 """Folders whose code changes no result that is kept on disk."""
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache

@@ -16,6 +16,7 @@ from steerclear.shield.tables.files import ValueTable
 from steerclear.shield.tables.make import COARSER
 
 from .markdown import MADE, line, table
+from .new_file import make_folder_of
 from .plot_text import plot_text
 from .tables import titled
 
@@ -133,6 +134,7 @@ def draw_sets(values: ValueTable, radii_m: tuple[float, ...], path: Path) -> Pat
     title = f"{values.card.own} (bow up) with {values.card.other}, {values.card.other_may}"
     canvas.suptitle(f"{plot_text(title)}: where the other boat must not be, m")
     try:
+        make_folder_of(path)
         canvas.savefig(path)
     except (OSError, ValueError) as error:
         raise TableError(f"picture {path} cannot be written ({error}); give a .png or .svg file") from error

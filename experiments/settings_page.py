@@ -74,6 +74,17 @@ HEAD = f"""# Settings
 What can be set: `Shield(name=value)`, `--shield-set name=value` of the commands that play games, `shield:` in a
 `FLEET.yaml`. A name that is misspelt, a value of another type or out of range is refused when the shield is built.
 
+What a setting changes is told by games from the same seeds, each setting into a folder of its own:
+
+```sh
+steerclear evaluate medium --shield --games 100 --out a
+steerclear evaluate medium --shield --games 100 --out b --shield-set response_per_s=2
+steerclear compare a b
+```
+
+`compare` pairs the games and gives B less A with 95 % intervals, for any two that differ in the shield, the policy, or
+delay, noise and current; it says what differs, and refuses games of other rules.
+
 """
 
 

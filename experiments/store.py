@@ -21,6 +21,8 @@ from .provenance import code_digest
 
 LINES_FILE = "games.jsonl"
 RESULTS_FILE = "results.json"
+BESIDE = ("games.csv", "games.parquet", "report.html", "replay.html", "entry.html")
+"""What commands write into a folder beside those two."""
 logger = logging.getLogger(__name__)
 
 
@@ -36,8 +38,8 @@ class ResultStore:
         command: whose results these are, as its results file says; those of another are not gone on with.
 
     Raises:
-        ConfigError: the folder already holds results and ``resume`` is off, or others with it, another process writes
-            there, or it cannot be written to.
+        ConfigError: the folder already holds results, or files that they would write over, and ``resume`` is off, or
+            others with it, another process writes there, or it cannot be written to.
     """
 
     def __init__(self, folder: Path, resume: bool = False, command: str | None = None) -> None:
@@ -60,6 +62,9 @@ class ResultStore:
         holds = self.lines.exists() and (not self.lines.is_file() or self.lines.stat().st_size > 0)
         if not resume and (holds or (self.folder / RESULTS_FILE).exists()):
             raise ConfigError(f"{self.folder} already holds results; add --resume to continue or choose another --out")
+        for name in [] if resume or not self.folder.exists() else BESIDE:
+            if (self.folder / name).exists():
+                raise ConfigError(f"{self.folder / name} would be written over; choose another --out, or move it")
         if resume and command is not None:
             _check_whose(self.folder / RESULTS_FILE, command)
 

@@ -39,7 +39,7 @@ def run_searches(
     notice(done)
     for outcome in run_all(run_search, missing, processes):
         if outcome.answer is None:
-            failed.append({"restart": outcome.job.restart, "error": outcome.error})
+            failed.append({"restart": outcome.job.restart, **outcome.why})
         else:
             store.append(outcome.job.key, outcome.answer)
         done += 1

@@ -15,11 +15,12 @@ from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
 from ..engines import Workers as Engines
 from ..engines import engine_of
+from ..failed_jobs import end_failed
 from ..store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
 from .encounters import Current, Delay, Noise, Radius, Workers, platform_pairs
-from .games import default_folder
+from .games import results_folder
 from .scenes import play_scene_files
 
 
@@ -67,14 +68,12 @@ def attack(
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
-        raise ConfigError(f"{len(results['failed'])} searches failed: {results['failed'][0]['error']}")
+        end_failed(results["failed"], f"{len(results['failed'])} searches failed", f": {results['failed'][0]['error']}")
     finish(passed(results))
 
 
 def _run(searches: list[Search], folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder("attack")
+    folder = results_folder("attack", folder, resume)
     store, started = ResultStore(folder, resume, "attack"), time.perf_counter()
     try:
         with progress("searches", len(searches)) as notice:

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from steerclear.shield.compiled.compiling import told_to
 from steerclear.shield.exceptions import SteerclearError
 
+from ..failed_jobs import JobFault
 from ..faults import fault_words, machine_words
 from ..pool import interrupted_by_sigterm
 from ..terminal import SafeConsole
@@ -68,6 +69,8 @@ def command(function: Command) -> Command:
                 return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
+        except JobFault as error:
+            _leave(f"error: {error}", ExitCode.FAULT)
         except Interrupted as error:
             _leave(str(error), ExitCode.INTERRUPTED)
         except KeyboardInterrupt:
@@ -129,7 +132,7 @@ def leave_failed(error: Exception) -> NoReturn:
     words = machine_words(error)
     if words:
         _leave(f"error: {words}", ExitCode.BAD_INPUT)
-    _leave(fault_words(error), ExitCode.FAULT)
+    _leave(f"error: {fault_words(error)}", ExitCode.FAULT)
 
 
 def finish(passed: bool) -> None:

@@ -11,15 +11,16 @@ from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, De
 from steerclear.shield.exceptions import ConfigError
 
 from ..match import Match
+from ..new_file import NEW
 from ..spec import MatchSpec
 from ..store import write_table
 from ..tables import game_table
 from . import options as o
 from .console import command, err, out
-from .files import check_ending, check_new
+from .files import check_ending
 from .play import Opponent, Shield, Side, Speed, _until_closed
 
-File = Annotated[Path, typer.Option("--out", metavar="FILE.parquet", help="Where demonstrations go.")]
+File = Annotated[Path, typer.Option("--out", metavar="FILE.parquet", help="Where demonstrations go; a new file."), NEW]
 OPPONENTS = ("easy", "medium")
 HOW = (
     f"{', '.join(BOAT_KEYS[:3])} choose a boat; "
@@ -98,11 +99,10 @@ def _check(opponent: str, file: Path) -> None:
     """Refuse before the window opens what would lose a person's play.
 
     Raises:
-        ConfigError: another opponent, another kind of file, one that is there, or pyarrow missing.
+        ConfigError: another opponent, another kind of file, or pyarrow missing.
     """
     if opponent not in OPPONENTS:
         raise ConfigError(f"--opponent is {opponent!r}; demonstrations are against {' or '.join(OPPONENTS)}")
     check_ending(file, "--out", (".parquet",))
-    check_new(file, "--out")
     if find_spec("pyarrow") is None:
         raise ConfigError('Parquet files need pyarrow; pip install "steerclear[parquet]"')

@@ -18,11 +18,12 @@ from ..encounters.results import cells_table, heads_legend, results_of, write_al
 from ..encounters.scenes import Conditions
 from ..engines import Workers as Engines
 from ..engines import engine_of
+from ..failed_jobs import end_failed
 from ..store import LINES_FILE, ResultStore, write_json
 from ..tables import bars_table
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
-from .games import default_folder
+from .games import results_folder
 from .scenes import play_scene_files
 
 Platform = Annotated[
@@ -104,7 +105,8 @@ def encounters(
     if json_file is not None:
         write_json(json_file, results)
     if results["failed"]:
-        raise ConfigError(f"{len(results['failed'])} chunks could not be played (see above); mend it, then --resume")
+        count = len(results["failed"])
+        end_failed(results["failed"], f"{count} chunks could not be played", " (see above); mend it, then --resume")
     finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
 
 
@@ -167,9 +169,7 @@ def family_names(text: str) -> tuple[str, ...]:
 
 
 def _run(settings: Settings, folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder("encounters")
+    folder = results_folder("encounters", folder, resume)
     campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), workers)
     started = time.perf_counter()
     try:
@@ -200,6 +200,8 @@ def _show(results: dict[str, Any], folder: Path) -> None:
         console.print(bars_table(results["bars"]))
         console.print()
     for failed in results["failed"]:
-        console.print(f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", soft_wrap=True)
+        console.print(
+            f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", markup=False, soft_wrap=True
+        )
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)

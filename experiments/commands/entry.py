@@ -17,6 +17,7 @@ from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrapping.wrap import wrap_entry
 from ..match import play_match
+from ..new_file import NEW
 from ..pool import check_jobs, run_all
 from ..provenance import machine, versions
 from ..replay_html import write_replay
@@ -24,7 +25,8 @@ from ..spec import ANSWER_S
 from ..store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
-from .games import check_complete, default_folder, run_games, say_of_distance
+from .games import check_complete, results_folder, run_games, say_of_distance
+from .policies_tried import say_of_elsewhere
 
 app = typer.Typer(
     help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
@@ -63,6 +65,7 @@ def check(
     Exit status: 0 it plays, 1 a boat had no usable action in some step, 2 it cannot be loaded or gave nothing usable.
     """
     check_path(entry)
+    say_of_elsewhere([entry], GameConfig.preset(preset))
     found = check_entry(entry, preset, max_time, answer_time)
     console = out()
     for line in check_lines(found):
@@ -85,11 +88,19 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
         f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
     ]
+    if (made := found["made_for"]) is not None:
+        lines.insert(1, f"made by steerclear for preset {made['preset']}; {_kept(made['shield'])}")
     lines += [f"could not be read as Python: {name}" for name in imports["unread"]]
     for one in found["failures"]:
         boats = ", ".join(f"{boat} x {count}" for boat, count in one["boats"].items())
         lines.append(f"failed: {one['kind']} ({boats}): {one['message']}")
     return lines
+
+
+def _kept(shield: dict[str, Any] | None) -> str:
+    return (
+        "no shield in it" if shield is None else f"its shield keeps {shield['separation_m']:g} m, {shield['profile']}"
+    )
 
 
 def time_text(time_ms: float) -> str:
@@ -143,7 +154,7 @@ def report(
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
-    folder = out_folder or default_folder("entry-report")
+    folder = results_folder("entry-report", out_folder, resume)
     results = run_games("entry report", settings, folder, jobs, resume, quick)
     _show(settings, folder, results, looks, check_jobs(jobs))
     if json_file is not None:
@@ -155,7 +166,7 @@ def report(
 @command
 def wrap(
     entry: Entry,
-    out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; none may be there.")],
+    out_file: Annotated[Path, typer.Option("--out", metavar="FILE", help="The zip to write; a new file."), NEW],
     preset: o.Preset = "mctf2026",
     separation: o.Separation = None,
     profile: o.Profile = None,
@@ -168,13 +179,14 @@ def wrap(
     """
     check_path(entry)
     asked = o.shield_settings(separation, None, profile, None, shield_set)
+    say_of_elsewhere([entry], GameConfig.preset(preset))
     made = wrap_entry(entry, out_file, preset, o.with_distance(asked, preset, {}))
     tried, settings = made.pop("tried"), made["shield"]
     if tried["failures"]:
         err().print(f"warning: {headline(tried)}; its shield tells them to stop", markup=False, soft_wrap=True)
     say_of_distance(settings["separation_m"], GameConfig.preset(preset))
     console = out()
-    words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; keeps {settings['separation_m']:g} m, {settings['profile']}"
+    words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; for preset {made['preset']}; {_kept(settings)}"
     console.print(words, markup=False, soft_wrap=True)
     if json_file is not None:
         write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})

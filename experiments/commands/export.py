@@ -13,10 +13,11 @@ from steerclear.policies.entrants.learned.sb3_file import read_sb3
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..new_file import NEW
 from ..training.checkpoints import is_checkpoint, network_in
 from ..training.submission import write_submission
 from .console import command, out
-from .files import check_ending, check_new
+from .files import check_ending
 
 Model = Annotated[
     Path,
@@ -24,9 +25,13 @@ Model = Annotated[
         metavar="MODEL", help="A model.zip of PPO or A2C, exported weights or a training's checkpoint (.npz)."
     ),
 ]
-Weights = Annotated[Path | None, typer.Option("--out", metavar="FILE.npz", help="Where the weights go; a new file.")]
+Weights = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE.npz", help="Where the weights go; a new file."), NEW
+]
 Submission = Annotated[
-    Path | None, typer.Option("--submission", metavar="FILE.zip", help="Where a competition entry goes; a new file.")
+    Path | None,
+    typer.Option("--submission", metavar="FILE.zip", help="Where a competition entry goes; a new file."),
+    NEW,
 ]
 Interval = Annotated[
     int | None, typer.Option(metavar="N", help="Game steps a decision is held for.", show_default="as it learned")
@@ -43,8 +48,6 @@ def export(model: Model, file: Weights = None, submission: Submission = None, in
         raise ConfigError("nothing to write; give --out weights.npz, --submission solution.zip or both")
     check_ending(file, "--out", (".npz",))
     check_ending(submission, "--submission", (".zip",))
-    check_new(file, "--out")
-    check_new(submission, "--submission")
     if interval is not None and not 1 <= interval <= 1000:
         raise ConfigError(f"--interval is {interval}; give 1 to 1000")
     network = _read(model, interval)

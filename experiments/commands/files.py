@@ -1,4 +1,4 @@
-"""Files named on a command line: none is both read and written, and results are not written over something else."""
+"""Files named on a command line: none is both read and written, and none that is there is written over."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import inspect
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 from typer.models import OptionInfo
+
+from ..new_file import NEW, check_new, check_place
 
 OTHERS = {
     ".mcap": "black boxes",
@@ -27,15 +28,28 @@ OTHERS = {
 def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
     """Find out before hours of work that the files a command was given can be what they are to be.
 
+    A run that is gone on with (``resume``) writes again what it wrote before.
+
     Args:
-        function: the command.
+        function: the command; options marked `NEW` are files that it writes.
         given: its arguments by name.
 
     Raises:
-        ConfigError: one file is named for two things, or that of ``--json`` cannot be written.
+        ConfigError: one file is named for two things, that of ``--json`` cannot be written, or one to write is there.
     """
-    check_apart({_spelling(function, name): value for name, value in given.items()})
+    spelled = {name: _spelling(function, name) for name in given}
+    check_apart({spelled[name]: value for name, value in given.items()})
     check_json_file(given.get("json_file"))
+    for name in [] if given.get("resume") else written_by(function):
+        value = given.get(name)
+        for path in value if isinstance(value, list) else (value,):
+            check_new(path, spelled.get(name, name))
+            check_place(path, spelled.get(name, name))
+
+
+def written_by(function: Callable[..., Any]) -> list[str]:
+    """Names of the arguments of a command that are marked as files it writes."""
+    return [name for name, hint in _hints(function).items() if NEW in typing.get_args(hint)[1:]]
 
 
 def check_apart(given: Mapping[str, Any]) -> None:
@@ -65,9 +79,9 @@ def check_json_file(path: Path | None) -> None:
     try:
         if path.is_dir():
             raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
-        TemporaryFile(dir=next(folder for folder in path.absolute().parents if folder.exists())).close()
-    except OSError as error:
+    except OSError as error:  # a name that none has
         raise ConfigError(f"--json {path} cannot be written ({error.strerror}); name a file elsewhere") from error
+    check_place(path, "--json")
 
 
 def check_ending_is_not(path: Path, option: str, others: Mapping[str, str], own: str) -> None:
@@ -91,16 +105,6 @@ def check_ending(path: Path | None, option: str, endings: tuple[str, ...]) -> No
         raise ConfigError(f"{option} {path} does not end in {' or '.join(endings)}; give a name that does")
 
 
-def check_new(path: Path | None, option: str) -> None:
-    """Refuse a name that a file has already: what a person made, learned or handed in is not written over.
-
-    Raises:
-        ConfigError: it is there.
-    """
-    if path is not None and (path.exists() or path.is_symlink()):
-        raise ConfigError(f"{path} is there already; name another {option}, or remove it")
-
-
 def _files(value: Any) -> Iterator[Path]:
     """Paths in an argument that are files, or will be."""
     for path in value if isinstance(value, list | tuple) else (value,):
@@ -116,11 +120,15 @@ def _is_file(path: Path) -> bool:
         return False
 
 
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    return typing.get_type_hints(inspect.unwrap(function), include_extras=True)
+
+
 def _spelling(function: Callable[..., Any], name: str) -> str:
     """An argument as users write it: its option, or its name."""
-    hints = typing.get_type_hints(inspect.unwrap(function), include_extras=True)
-    for info in typing.get_args(hints.get(name))[1:]:
+    for info in typing.get_args(_hints(function).get(name))[1:]:
         if isinstance(info, OptionInfo):
-            long = [text for text in info.param_decls or () if text.startswith("--")]
+            first = (info.default,) if isinstance(info.default, str) else ()  # where Typer keeps it in an `Annotated`
+            long = [text for text in (*first, *(info.param_decls or ())) if text.startswith("--")]
             return long[0] if long else f"--{name.replace('_', '-')}"
     return name

@@ -15,6 +15,7 @@ from ..fit.models import MODELS
 from ..fit.plot import draw
 from ..fit.reading import read_logs
 from ..fit.words import about_the_boat, promise
+from ..new_file import NEW, check_new, make_folder_of
 from ..store import write_json
 from . import options as o
 from .console import command, err, out
@@ -24,13 +25,15 @@ Logs = Annotated[
     list[Path],
     typer.Argument(metavar="LOG...", help="Logs of one boat: .csv of steps, .tlog, ArduPilot .bin, .mcap, .alog."),
 ]
-Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="Platform file to write (.yaml).")]
+Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="Platform file to write (.yaml); a new one."), NEW]
 Name = Annotated[str | None, typer.Option(metavar="NAME", help="Of the boat.", show_default="the file's name")]
 Kind = Annotated[str, typer.Option(metavar="KIND", help="rate, usv, or auto: the one that foretells best.")]
 Boat = Annotated[str | None, typer.Option(metavar="NAME", help="The boat, of a black-box log with several.")]
 SystemId = Annotated[int | None, typer.Option(metavar="N", help="The boat, of a .tlog with several.")]
 Plot = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Picture of the fit.", show_default="beside --out, .png")
+    Path | None,
+    typer.Option(metavar="FILE", help="Picture of the fit, a new file.", show_default="beside --out, .png"),
+    NEW,
 ]
 
 
@@ -52,6 +55,7 @@ def fit(
     check_ending(file, "--out", (".yaml", ".yml"))
     picture = plot or file.with_suffix(".png")
     check_ending(picture, "--plot", (".png", ".pdf", ".svg"))
+    check_new(picture, "--plot")
     if kind != "auto" and kind not in MODELS:
         raise ConfigError(f"--kind is {kind!r}; give auto or one of {', '.join(MODELS)}")
     runs = read_logs(logs, boat, system_id)
@@ -62,6 +66,7 @@ def fit(
     results = results_of(found, chosen, described)
     head = f"Fitted by steerclear fit to {len(runs)} runs of {', '.join(sorted({log.name for log in logs}))[:200]}."
     _write(file, to_text(described, head))
+    make_folder_of(picture)
     draw(found[chosen], described.platform.name, picture)
     if json_file is not None:
         write_json(json_file, results)
@@ -73,6 +78,7 @@ def fit(
 
 def _write(file: Path, text: str) -> None:
     try:
+        make_folder_of(file)
         file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"--out {file} cannot be written ({error.strerror}); choose another place") from None

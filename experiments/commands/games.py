@@ -15,8 +15,10 @@ from ..ablation import AblationSettings
 from ..campaign import Campaign, Played
 from ..conditions import words_of, words_of_settings
 from ..engines import Workers
+from ..failed_jobs import end_failed
 from ..judging import check_judge
 from ..kept_distance import check_shield, words_of_less
+from ..learned_elsewhere import made_of
 from ..results import replay_of, results_of, write_results
 from ..score import check_penalty
 from ..sea import check_current
@@ -53,6 +55,7 @@ def check_settings(settings: AblationSettings) -> None:
     kept_m = check_shield(settings.shield, game).separation_m
     if any(settings.states):
         say_of_distance(kept_m, game)
+        say_of_second(settings.own)
     for name in dict.fromkeys([settings.own, *settings.opponents]):
         if name == KEYBOARD:
             raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
@@ -66,9 +69,27 @@ def say_of_distance(kept_m: float, game: GameConfig) -> None:
         warn(words)
 
 
+def say_of_second(own: str) -> None:
+    """Say that a policy brings a shield of its own: games without ours are not games without a shield."""
+    made = made_of(own)
+    if made is not None and made.shielded:
+        warn(f"{own} has a shield in it: off means that one alone, on that one and ours; play the bare entry instead")
+
+
 def default_folder(command: str) -> Path:
     """Name a new results folder after the command and the time."""
     return Path("results") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+
+
+def results_folder(command: str, folder: Path | None, resume: bool) -> Path:
+    """The folder of results: the one named, or a new one.
+
+    Raises:
+        ConfigError: a run is to be gone on with, and it is not said which.
+    """
+    if resume and folder is None:
+        raise ConfigError("--resume needs the --out folder of the run to go on with")
+    return folder or default_folder(command)
 
 
 def run_games(
@@ -97,9 +118,7 @@ def run_games(
         Interrupted: by Ctrl-C; what is finished has been written.
     """
     check_settings(settings)
-    if resume and folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    folder = folder or default_folder(command)
+    folder = results_folder(command, folder, resume)
     campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), workers)
     if resume:
         warn(campaign.words_of_before)
@@ -137,7 +156,7 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     for failed in results["failed"]:
         state = "on" if failed["shielded"] else "off"
         words = f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}"
-        console.print(words)
+        console.print(words, markup=False, soft_wrap=True)
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)
     if results["quick"]:
@@ -154,11 +173,12 @@ def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
 
     Raises:
         ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
         PolicyError: a policy gave nothing usable throughout some game.
     """
     if results["failed"]:
-        missing = len(results["failed"])
-        raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+        words = f"{len(results['failed'])} games could not be played"
+        end_failed(results["failed"], words, " (see above); put that right, then add --resume")
     if results["held"]:
         raise PolicyError("; ".join(results["held"]))
 

@@ -10,10 +10,11 @@ from typing import Annotated, Any
 
 import typer
 from steerclear.env.config import GameConfig
-from steerclear.shield.config import PROFILES
+from steerclear.shield.config import PROFILES, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 
 from ..kept_distance import counted_m
+from ..new_file import NEW
 from ..tally import RADII_M
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
@@ -78,7 +79,9 @@ AnswerTime = Annotated[
 ]
 FixedStart = Annotated[bool, typer.Option("--fixed-start", help="Start on the preset's fixed places.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with status 1 when a bar is not met.")]
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON.")]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Also write the results as JSON; a new file."), NEW
+]
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
@@ -122,10 +125,12 @@ def shield_settings(
     """Collect the settings of the shield that were given.
 
     Raises:
-        ConfigError: one is given twice.
+        ConfigError: one is given twice, or the separation, at which hits are counted as well, is no distance.
     """
     named = {"separation_m": separation, "certificate": certificate, "profile": profile, "solver": solver}
-    return _together(named, pairs, "--shield-set")
+    given = _together(named, pairs, "--shield-set")
+    ShieldConfig.of(**{name: value for name, value in given.items() if name == "separation_m"})
+    return given
 
 
 def with_distance(shield: dict[str, Any], preset: str, rules: dict[str, Any]) -> dict[str, Any]:

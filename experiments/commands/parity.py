@@ -13,8 +13,8 @@ from rich.console import Group
 from rich.text import Text
 from steerclear.env.parity import replay_trace
 from steerclear.env.parity_report import ParityReport, Tolerances
-from steerclear.shield.exceptions import ConfigError
 
+from ..failed_jobs import end_failed
 from ..pool import check_jobs, run_all
 from ..provenance import machine, versions
 from ..store import write_json
@@ -51,7 +51,7 @@ def _replay(traces: Sequence[Path], processes: int) -> list[ParityReport]:
     with progress("traces", len(traces)) as notice:
         for outcome in run_all(replay_trace, list(traces), processes):
             if outcome.answer is None:
-                raise ConfigError(str(outcome.error))
+                end_failed([outcome.why], f"{outcome.job} could not be replayed", f": {outcome.error}")
             reports[outcome.job] = outcome.answer
             notice(len(reports))
     return [reports[path] for path in traces]

@@ -16,14 +16,15 @@ from steerclear.shield.platforms.files import PlatformFile, is_path, load_platfo
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
 
 from ..fit.words import about_the_boat, promise
+from ..new_file import NEW, check_new, make_folder_of
 from .console import command, out
-from .files import check_ending, check_new
+from .files import check_ending
 
 app = typer.Typer(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
 Named = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")]
 Begin = Annotated[str, typer.Option("--from", metavar="NAME", help="The platform to begin with.")]
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,31}")
-Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write there.", show_default="NAME.yaml")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="A new file.", show_default="NAME.yaml"), NEW]
 
 
 def file_of(name: str) -> PlatformFile:
@@ -90,6 +91,7 @@ def new(
     check_new(path, "--out")
     text = to_text(PlatformFile(replace(file_of(begin).platform, name=name)), "Edit, then: steerclear platform check")
     try:
+        make_folder_of(path)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path} cannot be written ({error.strerror}); choose another place with --out") from None

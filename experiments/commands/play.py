@@ -19,6 +19,7 @@ from ..conditions import Conditions
 from ..failure_words import held_games
 from ..kept_distance import check_shield
 from ..match import MatchResult, Watcher, play_match
+from ..new_file import NEW
 from ..provenance import machine, versions
 from ..score import DEFAULT_PENALTY, check_penalty
 from ..sea import check_current
@@ -42,7 +43,9 @@ Keyboard = Annotated[
     ),
 ]
 Save = Annotated[
-    list[Path] | None, typer.Option(metavar="FILE", help="Save as .npz, .html, .mp4, .gif or .png; may be repeated.")
+    list[Path] | None,
+    typer.Option(metavar="FILE", help="Save as .npz, .html, .mp4, .gif or .png, a new file; may be repeated."),
+    NEW,
 ]
 Speed = Annotated[float, typer.Option(metavar="X", help="Times faster than the game, in a window.")]
 

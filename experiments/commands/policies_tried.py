@@ -12,7 +12,7 @@ from steerclear.policies.registry import SB3_PREFIX
 from steerclear.policies.sb3 import check_origin, code_warning
 
 from ..entries.team import is_entry, make_team
-from ..learned_elsewhere import words_of_elsewhere
+from ..learned_elsewhere import words_of_elsewhere, words_of_shield
 from .console import err
 
 
@@ -33,11 +33,13 @@ def try_policies(names: Sequence[str], trust: bool, game: GameConfig) -> None:
 def say_of_elsewhere(names: Sequence[str], game: GameConfig) -> None:
     """Say, once a command, of each policy that learned by the rules of another preset than the game's.
 
+    So of a shield in an entry that keeps less than this game counts.
+
     Raises:
-        PolicyError: the file of one cannot be read.
+        PolicyError: the file of one cannot be read, or the shield in it is for another game.
     """
     for name in dict.fromkeys(names):
-        if words := words_of_elsewhere(name, game):
+        for words in filter(None, (words_of_elsewhere(name, game), words_of_shield(name, game))):
             err().print(words, markup=False, soft_wrap=True)
 
 

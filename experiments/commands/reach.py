@@ -24,6 +24,7 @@ from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_r
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
+from ..new_file import NEW, check_new
 from ..reach_show import check_picture, draw_sets, show_card
 from . import options as o
 from .console import Interrupted, command, err, finish, out
@@ -48,7 +49,9 @@ DrawnRadius = Annotated[
     ),
 ]  # fmt: skip
 OutFile = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="File to write.", show_default="the user's cache folder")
+    Path | None,
+    typer.Option("--out", metavar="FILE", help="File to write, a new one.", show_default="the user's cache folder"),
+    NEW,
 ]
 Horizon = Annotated[
     float | None, typer.Option(metavar="S", help="Longest play looked ahead, s.", show_default="fitted to the boats")
@@ -57,7 +60,9 @@ CoarseGrid = Annotated[bool, typer.Option("--quick", help="A coarse grid and few
 Checkpoint = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Where an interrupted solve is kept.", show_default="beside --out")
 ]
-Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Also draw the sets, as PNG or SVG.")]
+Picture = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Also draw the sets, as PNG or SVG; a new file."), NEW
+]
 TableFiles = Annotated[
     list[Path] | None, typer.Argument(help="Table files.", show_default="all shipped and cached ones")
 ]
@@ -89,6 +94,7 @@ def solve(
     radii = tuple(radius) if radius else RADII_M
     check_radii(problem, radii)
     target = out_file or cache_folder() / f"{problem.name}.npz"
+    check_new(target, "--out")
     kept = checkpoint or target.with_name(target.name + ".checkpoint")
     try:
         with _stages() as stage:

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import load_table
 from steerclear.shield.tables.make import check_radii
 from steerclear.shield.tables.settings import problem_of
 
+from ..failed_jobs import end_failed
 from ..played_sets import PlayedSet, Task, check_settings, play_set, tasks_of
 from ..played_sets_page import HEADS, content_of, rows_of
 from ..pool import check_jobs, run_all
@@ -75,7 +75,7 @@ def _played(tasks: list[Task], store: ResultStore, processes: int) -> list[Playe
             notice(len(found))
             for outcome in run_all(play_set, missing, processes):
                 if outcome.answer is None:
-                    raise ConfigError(f"a set could not be played: {outcome.error}")
+                    end_failed([outcome.why], "a set could not be played", f": {outcome.error}")
                 key = key_of(asdict(outcome.job))
                 found[key] = asdict(outcome.answer)
                 store.append(key, found[key])

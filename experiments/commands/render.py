@@ -10,6 +10,7 @@ import typer
 from steerclear.env.record import load
 from steerclear.shield.exceptions import ConfigError
 
+from ..new_file import NEW, check_new
 from ..provenance import machine, versions
 from ..replay_html import write_replay
 from ..store import write_json
@@ -23,9 +24,10 @@ To = Annotated[
     typer.Option(
         "--to",
         metavar="FILE",
-        help="What to write: .html, .mp4, .gif, .png or .npz.",
+        help="What to write, a new file: .html, .mp4, .gif, .png or .npz.",
         show_default="a replay beside the record",
     ),
+    NEW,
 ]
 At = Annotated[
     float | None, typer.Option(metavar="S", help="Moment a picture shows, s.", show_default="the closest approach")
@@ -43,6 +45,7 @@ def render(records: Records, to: To = None, at: At = None, speed: Speed = 4.0, j
     check_endings([to] if to else [])
     games = [load(path) for path in records]
     to = to or records[0].with_suffix(".html")
+    check_new(to, "--to")
     if len(games) > 1 and to.suffix.lower() != ".html":
         raise ConfigError(f"only a replay (.html) takes several games; give one record for {to.suffix}")
     path = write_replay(games, to) if to.suffix.lower() == ".html" else save_record(games[0], to, at, speed)

@@ -13,6 +13,7 @@ from steerclear.shield.bridge.mavlink.signing import read_key
 
 from ..deploy.replay_text import show
 from ..deploy.replaying_report import Replay, as_content, compare, draw, replay_log
+from ..new_file import NEW
 from ..provenance import machine, versions
 from ..replay_html import write_replay
 from ..store import write_json
@@ -25,10 +26,10 @@ WithoutShield = Annotated[
     bool, typer.Option("--without-shield", help="Also show what would have happened without the shield.")
 ]
 Judge = Annotated[bool, typer.Option(help="Ask the oracle about breaches that happened (with --without-shield).")]
-Html = Annotated[Path | None, typer.Option(help="Write a replay to scrub in a browser.")]
-RecordFile = Annotated[Path | None, typer.Option("--record", help="Write the game's record (.npz) for render.")]
+Html = Annotated[Path | None, typer.Option(help="Write a replay to scrub in a browser; a new file."), NEW]
+RecordFile = Annotated[Path | None, typer.Option("--record", help="Write the game's record (.npz) for render."), NEW]
 Mend = Annotated[
-    Path | None, typer.Option("--mend", help="Write what can be read of a cut-off log as a whole one (.mcap).")
+    Path | None, typer.Option("--mend", help="Write what can be read of a cut-off log as a whole one (.mcap)."), NEW
 ]
 
 Key = Annotated[Path | None, typer.Option(help="Key file of the boats: check the codes of a log written with signing.")]

@@ -13,6 +13,7 @@ from ..encounters.play import play
 from ..encounters.replays import record_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import read_scene
+from ..new_file import check_new
 from ..replay_html import write_replay
 from ..tables import number_text, titled
 from .console import out
@@ -25,8 +26,10 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
         Whether no shield had an avoidable breach.
 
     Raises:
-        SteerclearError: a file that is no scene, or a guard that cannot be made.
+        SteerclearError: a file that is no scene, a guard that cannot be made, or a folder with another replay.
     """
+    replay = None if folder is None else folder / "replay.html"
+    check_new(replay, "--out")
     rows, records, passed = [], [], True
     for path in paths:
         scenes, conditions = read_scene(path)
@@ -40,9 +43,9 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
                 film, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
                 records.append(record_of(film, worst, f"{path.stem}, {guard}", guard != NONE))
     out().print(titled("Scenes", ["file", "guard", "closest, m", "breaches", "avoidable"], rows))
-    if folder is not None:
-        _make(folder)
-        out().print(f"{write_replay(records, folder / 'replay.html', title='Scenes')}", soft_wrap=True)
+    if replay is not None:
+        _make(replay.parent)
+        out().print(f"{write_replay(records, replay, title='Scenes')}", soft_wrap=True)
     return passed
 
 

@@ -24,6 +24,7 @@ from ..boats.incidents import Plan, parse_incident
 from ..boats.off import off_platform
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from ..deploy.lifeline import end_with_parent
+from ..new_file import NEW
 from ..store import write_json
 from . import deploying as d
 from . import options as o
@@ -54,7 +55,7 @@ Fault = Annotated[
     typer.Option("--fault", metavar="BOAT:KIND@S[+S]", help="Fault at a time, for a time; may be repeated."),
 ]
 RecordFile = Annotated[
-    Path | None, typer.Option("--record", metavar="FILE", help="Write what really happened (.npz) for render.")
+    Path | None, typer.Option("--record", metavar="FILE", help="Write what really happened (.npz) for render."), NEW
 ]
 Really = Annotated[
     str | None, typer.Option(metavar="NAME|FILE", help="What our boats really are, whatever their platforms say.")

@@ -11,6 +11,7 @@ from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from ..conditions import CALM
 from ..engines import Workers, engine_of
+from ..failed_jobs import end_failed
 from ..judging import check_judge
 from ..kept_distance import check_shield
 from ..score import DEFAULT_PENALTY, check_penalty
@@ -28,7 +29,7 @@ from ..tournament.tables import agreement_lines, all_tables
 from ..warming import WARMED, warm_up
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
-from .games import KEYBOARD, default_folder, say_of_distance
+from .games import KEYBOARD, results_folder, say_of_distance
 from .policies_tried import try_policies
 
 Teams = Annotated[str, typer.Option(metavar="A,B", help="Teams: names or submissions' paths, separated by commas.")]
@@ -103,9 +104,8 @@ def tournament(
     settings = quick(settings, QUICK_TIME_S) if quick_version else settings
     workers = engine_of(engine, address, jobs)
     _check(settings)
-    if resume and out_folder is None:
-        raise ConfigError("--resume needs the --out folder of the run to go on with")
-    results = _run(settings, out_folder or default_folder("tournament"), workers, resume, replays)
+    folder = results_folder("tournament", out_folder, resume)
+    results = _run(settings, folder, workers, resume, replays)
     if json_file is not None:
         write_json(json_file, results)
     _check_complete(results)
@@ -198,11 +198,12 @@ def _check_complete(results: dict[str, Any]) -> None:
 
     Raises:
         ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
         PolicyError: a team gave nothing usable throughout some game.
     """
     if results["failed"]:
-        missing = len(results["failed"])
-        raise ConfigError(f"{missing} games could not be played (see above); put that right, then add --resume")
+        words = f"{len(results['failed'])} games could not be played"
+        end_failed(results["failed"], words, " (see above); put that right, then add --resume")
     if results["silent"]:
         names = ", ".join(results["silent"])
         raise PolicyError(f"{names} gave no usable answer throughout some game; mend it or leave it out")

@@ -20,6 +20,8 @@ Config = Annotated[Path, typer.Argument(metavar="CONFIG.yaml", help="What to tra
 Folder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder of the training.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")]
 CONFIG = "config.yaml"
+WRITTEN = ("curve.json", "best.npz", "final.npz", "model.zip")
+"""What a training writes into its folder beside checkpoints and its config."""
 EXTRA = 'training needs torch and stable-baselines3; pip install "steerclear[train]"'
 
 
@@ -36,6 +38,9 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     kept = folder / CONFIG
     if not resume and (folder / "checkpoints").exists():
         raise ConfigError(f"{folder} holds a training already; add --resume to go on with it, or name another --out")
+    for name in () if resume else (CONFIG, *WRITTEN):
+        if (folder / name).exists() and not (name == CONFIG and kept.samefile(config)):
+            raise ConfigError(f"{folder / name} would be written over; name another --out, or move it")
     _make(folder)
     lock = lock_folder(folder)  # held while this function runs: no other may write here
     training = _training_of(settings, folder, resume)
@@ -43,7 +48,7 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
         copyfile(config, kept)
     _run(training, folder)
     del lock
-    for name in ("curve.json", "best.npz", "final.npz", "model.zip"):
+    for name in WRITTEN:
         if (folder / name).exists():
             out().print(f"{folder / name}", soft_wrap=True)
 

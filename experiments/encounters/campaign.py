@@ -152,7 +152,7 @@ class Campaign:
         notice(done)
         for outcome in run_all(play_job, missing, self.processes):
             if outcome.answer is None:
-                self.failed.append({**asdict(outcome.job.cell), "first": outcome.job.first, "error": outcome.error})
+                self.failed.append({**asdict(outcome.job.cell), "first": outcome.job.first, **outcome.why})
             else:
                 self.store.append(outcome.job.key, outcome.answer)
             done += outcome.job.count

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steerclear.policies.report import PolicyReport
+from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 
 from ..match import Match
@@ -42,7 +43,7 @@ def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> d
         PolicyError: it cannot be loaded, or gave nothing usable throughout the game; the message says why.
         ConfigError: a setting is unusable.
     """
-    imports = imports_of(path)
+    imports, made = imports_of(path), made_for(path)
     started = time.perf_counter()
     EntryTeam(path, answer_s).close()
     load_s = time.perf_counter() - started
@@ -59,6 +60,7 @@ def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> d
         "entry": path,
         "load_s": load_s,
         "imports": asdict(imports),
+        "made_for": None if made is None else {"preset": made.preset, "shield": dict(made.shield) or None},
         "calls": report.calls,
         "mean_ms": report.mean_ms,
         "max_ms": report.max_ms,

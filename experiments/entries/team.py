@@ -16,6 +16,7 @@ from steerclear.policies.protocol import Action, TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
 from steerclear.policies.scripted.team import boat_numbers, game_core
+from steerclear.policies.submissions.made_for import check_game, made_for
 from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.words import plain_text
@@ -51,6 +52,7 @@ class EntryTeam:
         self._path, self._answer_s = path, answer_s
         self._process = EntryProcess(path, limits)
         self._lost = ""
+        self._made = made_for(path)
         self.held: dict[str, str] = {}
         """Boats without a usable answer of the policy's own in this step, and why."""
         self._ids: list[str] = []
@@ -61,9 +63,12 @@ class EntryTeam:
         """Begin a game.
 
         Raises:
-            PolicyError: not an `MctfEnv`, unusable agent ids, or the code cannot begin.
+            PolicyError: not an `MctfEnv`, unusable agent ids, a game that the shield in it is not for, or the code
+                cannot begin.
         """
         core = game_core(env)
+        if self._made is not None:
+            check_game(self._made, core.config, self._path)
         boat_numbers(core, agent_ids)
         self._ids = list(agent_ids)
         self._reader = ActionReader(env)

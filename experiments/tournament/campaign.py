@@ -66,7 +66,7 @@ class Tournament:
             job = outcome.job
             if outcome.answer is None:
                 game = {"blue": label(job.spec.own), "red": label(job.spec.opponent), "repetition": job.spec.game}
-                self.failed.append({"phase": job.phase, "state": job.state, **game, "error": outcome.error})
+                self.failed.append({"phase": job.phase, "state": job.state, **game, **outcome.why})
             else:
                 self.store.append(job.key, outcome.answer)
                 self._kept[job.key] = outcome.answer

@@ -95,6 +95,7 @@ TOURNAMENT = {
     **{f"failed[].{k}": f"{k} of a game that could not be played" for k in ("phase", "state", "blue", "red")},
     "failed[].repetition": "its number",
     "failed[].error": "why",
+    "failed[].fault": "whether that is a fault of steerclear, not of what was given",
     "warnings[]": "teams whose code failed, forfeited moves or missed deadlines",
     "silent[]": "teams that gave nothing usable throughout a game: the exit status is 2",
     "qualifying[].team": "name",

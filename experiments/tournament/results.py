@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..pool import available_cores
 from ..provenance import machine, versions
 from ..spec import SIDES
 from ..store import told_settings
@@ -45,7 +44,7 @@ def results_of(
         "complete": len(rows) == expected,
         "settings": told_settings(settings.as_dict()),
         "versions": versions(),
-        "machine": {**machine(), "cores": available_cores()},
+        "machine": machine(),
         "wall_s": wall_s,
         "games_played": len(rows),
         "games_resumed": resumed,

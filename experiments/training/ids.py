@@ -55,7 +55,8 @@ def make_learners(
         **rules: settings of the game that replace the preset's.
 
     Raises:
-        ConfigError: boats that make no whole teams, or another unusable setting.
+        ConfigError: boats that make no whole teams, a shield that is neither True nor False, or another unusable
+            setting.
     """
     from steerclear import policies
     from steerclear.env.config import GameConfig
@@ -66,6 +67,11 @@ def make_learners(
     config = GameConfig.preset(preset, **{"default_start": False, **rules})
     if num_envs < 1 or num_envs % config.team_size:
         raise ConfigError(f"num_envs is {num_envs}; give a multiple of {config.team_size}, one for each boat of a team")
+    if not isinstance(shield, bool):  # a name or settings would be true, and not what they say
+        raise ConfigError(
+            f"shield is {shield!r}; give True or False, or build one with settings from parts: games_shield(core, "
+            "ShieldConfig(...)) in a TeamBatch"
+        )
     core = BatchedMctf(config, n_games=num_envs // config.team_size, seed=seed)
     guard = games_shield(core, team=team) if shield else None
     batch = TeamBatch(core, policies.make_batch(opponent), team, guard, actions, seed, interval)

@@ -5,6 +5,7 @@ Trainings with the same games are made once: without a shield and with one at de
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -14,10 +15,11 @@ import numpy as np
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..failed_jobs import end_failed
 from ..json_file import read_json
 from ..pool import run_all
 from ..provenance import machine, versions
-from ..store import write_json
+from ..store import finite, write_json
 from .algorithms import training_of
 from .curve import CURVE
 from .playing import play_games, summary_of
@@ -97,26 +99,45 @@ def run_study(
         jobs: trainings at once, a process each.
 
     Raises:
-        ConfigError: QMIX or cloning, as a study is of PPO; or a training failed: the others are finished before.
+        ConfigError: QMIX or cloning, as a study is of PPO; the folder holds a study of another config; or a training
+            failed: the others are finished before.
+        JobFault: one failed by a fault of steerclear.
     """
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
+    _check_same(base, folder)
     rows: dict[Cell, list[dict[str, Any]]] = {}
     failed = []
     notice(0, "")
     for outcome in run_all(_rows_of, trainings_of(base, folder, seeds, games), jobs):
         if outcome.answer is None:
-            failed.append(f"{outcome.job.name}: {outcome.error}")
+            failed.append({**outcome.why, "error": f"{outcome.job.name}: {outcome.error}"})
             continue
         rows.update(outcome.answer)
         notice(len(rows), outcome.job.name)
         write_json(folder / RESULTS, _results(base, seeds, games, rows))
     if failed:
-        raise ConfigError(
-            f"{len(failed)} training(s) failed, the first {failed[0]}; {len(rows)} cells are done and kept: mend that, "
-            "then the same command"
-        )
+        words = f"{len(failed)} training(s) failed, {len(rows)} cells are done and kept"
+        end_failed(failed, words, f"; {failed[0]['error']}; mend that, then the same command")
     return _results(base, seeds, games, rows)
+
+
+def _check_same(base: TrainingSettings, folder: Path) -> None:
+    """Refuse a folder whose trainings are of other settings: its networks would count as those of this config.
+
+    Raises:
+        ConfigError: they are.
+    """
+    if not (folder / RESULTS).exists():
+        return
+    remedy = "name another --out"
+    content = read_json(folder / RESULTS, "the results of a study", remedy)
+    if not isinstance(content, dict) or content.get("command") != COMMAND:
+        raise ConfigError(f"{folder / RESULTS} holds no study; {remedy}")
+    before, now = content["settings"]["training"], finite(asdict(base))
+    other = [name for name in now if json.loads(json.dumps(now[name])) != before.get(name)]
+    if other:
+        raise ConfigError(f"{folder} holds a study of another config ({', '.join(other)}); give its own, or {remedy}")
 
 
 def _rows_of(training: Training) -> dict[Cell, list[dict[str, Any]]]:

@@ -7,9 +7,12 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from steerclear.env.config import GameConfig
+from steerclear.env.presets import PRESETS
 from steerclear.env.whole_file import whole_file
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.weights_file import arrays_of
+from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
 TEMPLATE = Path(__file__).parent.parent / "templates" / "learned_solution.py.txt"
@@ -27,6 +30,14 @@ def write_submission(network: Network, path: Path) -> Path:
     content = io.BytesIO()
     np.savez_compressed(content, **arrays_of(network))
     with whole_file(path, PolicyError) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("solution.py", TEMPLATE.read_text(encoding="utf-8"))
+        archive.writestr("solution.py", TEMPLATE.read_text(encoding="utf-8").replace("ABOUT", _about(network)))
+        if network.preset in PRESETS:
+            made = MadeFor(network.preset, GameConfig.preset(network.preset).decision_s)
+            archive.writestr(ABOUT_FILE, made.to_bytes())
         archive.writestr("weights.npz", content.getvalue())
     return path
+
+
+def _about(network: Network) -> str:
+    where = f"It learned in preset {network.preset}. " if network.preset else ""
+    return f"{where}There is no shield in it: ``steerclear entry wrap`` puts one round it."

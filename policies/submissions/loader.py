@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import random
 import sys
@@ -11,15 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.words import describe_error, plain_text
 
-from ..guard import Answer, ForeignCode, GuardedTeam
+from ..guard import Answer, ForeignCode, GameFacts, GuardedTeam
+from ..scripted.team import game_core
 from .history import CONFIG_FILE, History, ObservationSettings
 from .interface import METHOD_NAME, check_interface
+from .made_for import MadeFor, check_game, made_for, words_of_less
 from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
 
+logger = logging.getLogger(__name__)
 ALONE = "STEERCLEAR_ENTRY_ALONE"
 """Environment variable of processes that run one submission only: what it sets there concerns nobody else."""
 CLASS_NAME = "solution"
@@ -70,11 +75,26 @@ class SubmissionCode(ForeignCode):
             self.close()
             raise
         self._history = History(settings)
+        self._made = made_for(self.stage.folder)
+        self._told = ""
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """A fresh instance for each game, built and run from the game's seed."""
+        """A fresh instance for each game, built and run from the game's seed.
+
+        Raises:
+            PolicyError: it cannot be built, or the shield in it is for another game.
+        """
+        if self._made is not None and not isinstance(env, GameFacts):  # a runner of this process checked it
+            self._check_game(self._made, game_core(env).config)
         self._instance = self._build(seed)
         self._history.clear()
+
+    def _check_game(self, made: MadeFor, game: GameConfig) -> None:
+        check_game(made, game, self.stage.source)
+        words = words_of_less(made, game, self.stage.source)
+        if words and words != self._told:
+            logger.warning("%s", words)
+        self._told = words
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """Copies, so that nothing the submission writes into them reaches the game or its opponent."""

@@ -16,7 +16,7 @@ import numpy as np
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
-from ..tracking.tracks import thrust_at
+from ..tracking.tracks import thrust_at, whole_steps
 from .link import BoatReading
 
 GAIN = 0.5
@@ -64,12 +64,13 @@ class Estimator:
     Args:
         platform: the boat's.
         dt_s: step of the loop and the model, s.
-        delay_s: from sending a command to its effect, s.
+        delay_s: from sending a command to its effect, s; counted up to whole steps, as the shield counts it: with less
+            a command would be run here and by the shield once more.
     """
 
     def __init__(self, platform: Platform, dt_s: float, delay_s: float) -> None:
         self._params = platform.pack()
-        self._dt_s, self._delay_s = dt_s, delay_s
+        self._dt_s, self._delay_s = dt_s, whole_steps(delay_s, dt_s) * dt_s
         self._turns_by_rate = self._params[L.KIND] == L.KIND_RATE
         self._row: Array | None = None
         self._deaf: Array | None = None

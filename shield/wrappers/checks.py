@@ -65,6 +65,14 @@ def shield_for(shield: Any, reader: GameReader, team: int, held: bool = False) -
     return other
 
 
+def words_of(shield: Any) -> str:
+    """What a shield keeps, for whoever prints what it is wrapped round; its kind where it has no settings."""
+    config = getattr(shield, "config", None)
+    if not isinstance(config, ShieldConfig):
+        return type(shield).__name__
+    return f"Shield(separation_m={config.separation_m:g}, profile={config.profile!r}, dt_s={config.dt_s:g})"
+
+
 def facts_now(reader: GameReader) -> GameFacts:
     """What the game is now; later changes of its arrays do not change it.
 

@@ -11,7 +11,7 @@ from ..decision import Decisions
 from ..game_facts import GameFacts
 from ..jit import Array
 from ..shield import Shield
-from .checks import check_unchanged, facts_now, refuse_second, shield_for
+from .checks import check_unchanged, facts_now, refuse_second, shield_for, words_of
 from .readers import reader_of
 from .reading import GameReader, one_game_shield, parallel_game, team_number
 from .serving import begin_serving, check_serving
@@ -65,6 +65,9 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self.keep_out = keep_out
         self.decisions: Decisions | None = None
         self._holder: object = None
+
+    def __repr__(self) -> str:
+        return f"<ShieldedParallelEnv of {('blue', 'red')[self.team]} in {self.env!r}: {words_of(self.shield)}>"
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start a game with a shield that remembers nothing.

@@ -14,7 +14,7 @@ from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..game_facts import GameFacts
 from ..shield import Shield
-from .checks import check_unchanged, facts_now, shield_for
+from .checks import check_unchanged, facts_now, shield_for, words_of
 from .readers import reader_of
 from .reading import GameReader, one_game_shield
 from .serving import begin_serving, check_serving
@@ -100,6 +100,9 @@ class ShieldedTeamPolicy:
             if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
                 actions[agent] = sent.copy()
         return actions
+
+    def __repr__(self) -> str:
+        return f"<{self.name}: {words_of(self.shield)}>"
 
     def _check_game(self, reader: GameReader, observations: Mapping[str, Any]) -> None:
         """Check that the game whose positions are read is the one that is played: it moves on when what is shown does.
@@ -190,6 +193,9 @@ class ShieldedCallable:
             wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
         self.decisions = self.shield.decide(fleet, wanted)
         return self.decisions.sent
+
+    def __repr__(self) -> str:
+        return f"<shielded {getattr(self.policy, '__name__', type(self.policy).__name__)}: {words_of(self.shield)}>"
 
     def _note(self, failure: str) -> None:
         """Log a failure when it begins, or becomes another one, and when it is over."""

@@ -118,6 +118,7 @@ def test_a_bad_later_pairing_loses_nothing(tmp_path):
         "game": 0,
         "shielded": False,
         "error": "no room; use a larger field",
+        "fault": False,
     }
     assert len(ResultStore(tmp_path, resume=True).load()) == 4
 

@@ -17,7 +17,7 @@ from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.shield import ShieldConfig
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, GameError
 from typer.testing import CliRunner
 
 TRACES = sorted((Path(__file__).parents[1] / "data" / "traces").glob("*.npz"))
@@ -154,26 +154,33 @@ def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
     assert len(Path("out/games.jsonl").read_text().splitlines()) == 4
 
 
-def test_a_game_that_cannot_be_played_is_bad_input_and_the_rest_is_kept(monkeypatch):
+BAD_INPUT, FAULT = GameError("no such game"), RuntimeError("sunk")
+
+
+@pytest.mark.parametrize(("error", "code"), [(BAD_INPUT, ExitCode.BAD_INPUT), (FAULT, ExitCode.FAULT)])
+def test_a_game_that_cannot_be_played_is_told_and_the_rest_is_kept(error, code, monkeypatch):
     whole = campaign.play_row
 
     def broken(spec):
         if spec.opponent == "hold":
-            raise RuntimeError("sunk")
+            raise error
         return whole(spec)
 
     make = games_command.Campaign
     monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
     done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out")
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert "not played: medium vs hold, game 0, shield off: RuntimeError: sunk" in done.stdout.replace("\n", " ")
+    assert done.exit_code == code
+    words = "no such game" if error is BAD_INPUT else "this is a fault of steerclear, not of yours (RuntimeError: sunk)"
+    assert f"not played: medium vs hold, game 0, shield off: {words}" in done.stdout
     assert "4 games could not be played" in done.stderr
+    assert ("its traceback is in" in done.stderr) == (error is FAULT)
+    assert "Traceback" not in done.output
     assert json.loads(Path("out/results.json").read_text())["games_played"] == 4
 
 
 def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
     def broken(spec):
-        raise RuntimeError("sunk")
+        raise BAD_INPUT
 
     make = games_command.Campaign
     monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
@@ -293,11 +300,11 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
     arrays["position"][-1, 0, 0] += 1e-3
     arrays["captures"][-1, 0] += 1
     np.savez(tmp_path / "moved.npz", **arrays)
-    failed = run("parity", trace, "moved.npz", "--json", "p.json")
+    failed = run("parity", trace, "moved.npz", "--json", "q.json")
     assert failed.exit_code == ExitCode.BAR_FAILED
     assert "position_m 0.001 is over 1e-06" in failed.stdout
     assert "captures of blue" in failed.stdout
-    content = json.loads(Path("p.json").read_text())
+    content = json.loads(Path("q.json").read_text())
     assert keys.undocumented(content, keys.PARITY) == []
     assert [row["passed"] for row in content["traces"]] == [True, False]
 

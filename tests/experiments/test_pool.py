@@ -1,12 +1,15 @@
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
-from steerclear.experiments.pool import attempt, available_cores, check_jobs, run_all
+from steerclear.experiments.pool import attempt, check_jobs, run_all
+from steerclear.experiments.provenance import available_cores
 from steerclear.shield.exceptions import ConfigError, GameError
 
 
@@ -30,7 +33,8 @@ def test_one_process_answers_in_order_and_errors_do_not_stop_the_rest():
     assert [outcome.job for outcome in outcomes] == [3, -1, -2, 4]
     assert [outcome.answer and outcome.answer[0] for outcome in outcomes] == [9, None, None, 16]
     assert outcomes[1].error == "a game setting is wrong; change it"
-    assert outcomes[2].error == "RuntimeError: went wrong"
+    assert "a fault of steerclear, not of yours (RuntimeError: went wrong)" in outcomes[2].error
+    assert [outcome.why["fault"] for outcome in outcomes] == [False, False, True, False]
 
 
 def test_several_processes_answer_every_job():
@@ -110,9 +114,23 @@ def test_an_interrupt_keeps_what_is_finished_and_ends_the_workers():
     assert finished == [1]
 
 
-def test_an_error_keeps_its_traceback_in_the_log(caplog):
-    attempt(work, -2)
-    assert "RuntimeError: went wrong" in caplog.text
+def lack(job):
+    raise OSError(28, "No space left on device", "/a") if job else MemoryError
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_faults_that_are_alike_keep_their_traceback_in_one_file(processes):
+    faults = list(run_all(work, [-5, -6, -5], processes))
+    assert len({outcome.error for outcome in faults}) == 1
+    text = Path(re.search(r"its traceback is in (.*): please report it", faults[0].error)[1]).read_text()
+    assert 'raise RuntimeError("went wrong")' in text
+
+
+@pytest.mark.parametrize(("job", "words"), [(0, "not enough memory"), (1, "free some space")])
+def test_what_the_machine_refuses_a_job_is_no_fault(job, words):
+    outcome = attempt(lack, job)
+    assert words in outcome.error
+    assert outcome.why == {"error": outcome.error, "fault": False}
 
 
 def test_number_of_processes():

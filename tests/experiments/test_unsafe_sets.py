@@ -89,6 +89,7 @@ def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_pa
     assert {bar["met"] for bar in content["bars"] if "misses" in bar["name"]} == {None}
     write_pages([content], tmp_path)
     assert "looks opponents up in this very table" in (tmp_path / "unsafe_sets.md").read_text()
+    file.unlink()
     run_through = compare("--json", str(file), "--shield-set", "certificate=turning_circle")
     assert run_through.exit_code == 0
     assert not json.loads(file.read_text())["looked_up"]

@@ -5,13 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import textwrap
 import zipfile
 from pathlib import Path
 from typing import Any
 
+from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
+from ...new_file import check_new, check_place, make_folder_of
+from ...store import told_settings
 from ..checking import check_entry
 from ..team import EntryTeam
 from .facts import facts_for
@@ -50,7 +54,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
     try:
         check_bare(stage.folder, entry)
         tried = check_entry(entry, preset, TRIED_S, ANSWER_S)
-        package, added = shielded_files(facts)
+        package, added = shielded_files(facts, preset)
         own = own_files(stage.folder, package)
         write_zip(out, {**own, **added})
     finally:
@@ -79,10 +83,8 @@ def check_out(out: Path) -> None:
     """
     if out.suffix != ".zip":
         raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
-    if out.exists() or out.is_symlink():
-        raise ConfigError(f"{out} exists; give another name with --out, or remove it")
-    if not out.absolute().parent.is_dir():
-        raise ConfigError(f"there is no folder {out.absolute().parent} for --out; make it first")
+    check_new(out, "--out")
+    check_place(out, "--out")
 
 
 def check_bare(folder: Path, entry: str) -> None:
@@ -95,8 +97,14 @@ def check_bare(folder: Path, entry: str) -> None:
         raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
 
 
-def shielded_files(facts: dict[str, Any]) -> tuple[str, dict[str, bytes]]:
-    """Name of the private package, and all files that a shielded zip has beside the entry's own."""
+def shielded_files(facts: dict[str, Any], preset: str) -> tuple[str, dict[str, bytes]]:
+    """Name of the private package, and all files that a shielded zip has beside the entry's own.
+
+    Args:
+        facts: of `facts_for`.
+        preset: rules of the game that they are of.
+    """
+    made = about(facts, preset)
     plain: dict[str, bytes] = {name: text.encode() for name, text in code().items()}
     plain |= data(facts["platforms"])
     plain["facts.json"] = json.dumps(facts).encode()
@@ -110,7 +118,24 @@ def shielded_files(facts: dict[str, Any]) -> tuple[str, dict[str, bytes]]:
     }
     text = TEMPLATE.read_text().replace("ENTRY_FILE", f"{entry_name(package)}.py")
     text = text.replace("ENTRY_NAME", entry_name(package)).replace("PACKAGE", package)
-    return package, {**files, ENTRY_FILE: text.encode()}
+    text = text.replace("ABOUT", textwrap.fill(words_of(made), 100))
+    return package, {**files, ENTRY_FILE: text.encode(), ABOUT_FILE: made.to_bytes()}
+
+
+def about(facts: dict[str, Any], preset: str) -> MadeFor:
+    """What a shielded zip says of itself."""
+    shield = facts["shield"]
+    return MadeFor(
+        preset, facts["decision_s"], tuple(facts["platforms"]), shield["separation_m"], told_settings(shield)
+    )
+
+
+def words_of(made: MadeFor) -> str:
+    """The same for people: which game, which shield."""
+    return (
+        f"For preset {made.preset}, a decision every {made.decision_s:g} s. The shield keeps {made.separation_m:g} m, "
+        f"profile {made.shield['profile']}; all its settings are in {ABOUT_FILE}."
+    )
 
 
 def entry_name(package: str) -> str:
@@ -137,6 +162,7 @@ def write_zip(out: Path, files: dict[str, Any]) -> None:
     """
     part = out.with_name(out.name + ".part")
     try:
+        make_folder_of(out)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
             for name, content in files.items():
                 raw = content.read_bytes() if isinstance(content, Path) else content

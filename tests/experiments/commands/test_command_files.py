@@ -1,12 +1,17 @@
-"""Nothing that a command reads is written over by what it writes."""
+"""Nothing that a command reads, or that is there, is written over by what it writes."""
 
+import inspect
+import zipfile
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 from logged_runs import header_of, write_log
 from steerclear.experiments.cli import app
+from steerclear.experiments.commands.ablate import ablate
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.commands.files import check_apart, check_json_file
+from steerclear.experiments.commands.files import check_apart, check_files, check_json_file, written_by
+from steerclear.experiments.new_file import check_new
 from steerclear.policies.entrants.learned.entered import FILES
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
@@ -28,7 +33,7 @@ def written(tmp_path_factory):
         ("--mend run.mcap", "named twice, by log and by --mend"),
         ("--mend ../here/run.mcap", "named twice, by log and by --mend"),
         ("--record run.mcap", "named twice, by log and by --record"),
-        ("--html out.html --json out.html", "named twice, by --html and by --json"),
+        ("--html out.html --json out.html", "named twice, by --html and by --json;"),
         ("--html other.mcap", "does not end in .html"),
         ("--record game.html", "does not end in .npz"),
         ("--mend whole.npz", "does not end in .mcap"),
@@ -103,3 +108,181 @@ def test_an_export_writes_over_no_file(option, tmp_path, monkeypatch):
     assert f"{name} is there already; name another {place}" in done.stderr
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["there.npz", "there.zip"]
     assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+READ = {
+    "deploy fleet", "preflight fleet", "referee fleet", "sim-boats fleet", "sea-trial fleet", "train config",
+    "train-study config", "export model", "encounters scene", "attack replay", "parity traces", "render records",
+    "docs sources", "compare first", "compare second", "replay log", "replay key", "fit logs",
+    "reach show file", "reach check files",
+}  # fmt: skip
+"""Files that commands read."""
+FOLDERS = {
+    "evaluate out", "ablate out", "tournament out_folder", "train out_folder", "encounters folder", "attack folder",
+    "docs folder", "train-study folder", "reach play out_folder", "entry report out_folder",
+}  # fmt: skip
+"""Folders of results: refused or gone on with by `ResultStore` and its like, see test_results_write_over_nothing."""
+GOES_ON = {"reach solve checkpoint"}
+"""Files that an interrupted command leaves for the same command to go on from."""
+
+
+def all_commands(where, begin=""):
+    for entry in where.registered_commands:
+        yield f"{begin}{entry.name or entry.callback.__name__}", entry.callback
+    for group in where.registered_groups:
+        yield from all_commands(group.typer_instance, f"{begin}{group.name} ")
+
+
+def files_of(function):
+    """Names of arguments that are paths."""
+    hints = get_type_hints(inspect.unwrap(function), include_extras=True)
+    return [name for name, hint in hints.items() if name != "return" and "pathlib.Path" in str(get_args(hint)[:1])]
+
+
+def test_every_file_that_a_command_writes_must_be_new():
+    """A new option for a path is one of these, or marked `NEW`: then no file there is written over."""
+    known, marked = READ | FOLDERS | GOES_ON, set()
+    for name, function in all_commands(app):
+        written = {f"{name} {argument}" for argument in written_by(function)}
+        assert {f"{name} {argument}" for argument in files_of(function)} - known == written
+        marked |= written
+    assert len(marked) > 30
+    assert {"fit file", "reach solve out_file", "render to", "play save", "ablate json_file"} <= marked
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "option"),
+    [
+        ("fit none.csv --out mine.yaml", "mine.yaml", "--out"),
+        ("fit none.csv", "boat.yaml", "--out"),
+        ("fit none.csv --out new.yaml", "new.png", "--plot"),
+        ("fit none.csv --plot mine.svg", "mine.svg", "--plot"),
+        ("render none.npz --to mine.html", "mine.html", "--to"),
+        ("play --save new.npz --save mine.npz", "mine.npz", "--save"),
+        ("reach solve --own heron --other heron --out mine.npz", "mine.npz", "--out"),
+        ("reach show --own heron --other heron --picture mine.png", "mine.png", "--picture"),
+        ("sim-boats --demo --record mine.npz", "mine.npz", "--record"),
+        ("demonstrate --out mine.parquet", "mine.parquet", "--out"),
+        ("platform new mine", "mine.yaml", "--out"),
+        ("ablate --json mine.json", "mine.json", "--json"),
+        ("entry check none.zip --json mine.json", "mine.json", "--json"),
+    ],
+)
+def test_no_command_writes_over_a_file(words, name, option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text("mine")
+    done = CliRunner().invoke(app, words.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"error: {name} is there already; name another {option}, or remove it" in done.stderr
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fit none.csv --out {}.yaml",
+        "fit none.csv --plot {}.png",
+        "render none.npz --to {}.png",
+        "reach solve --own heron --other heron --out {}.npz",
+        "reach show --own heron --other heron --picture {}.png",
+        "platform new mine --out {}.yaml",
+        "bench --json {}.json",
+    ],
+)
+def test_a_place_that_takes_no_file_is_found_out_before_any_work(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("mine")
+    done = CliRunner().invoke(app, words.format("file/x/y").split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "cannot be written (Not a directory); name a file elsewhere" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("words", ["platform new mine --out", "reach show --own heron --other heron --picture"])
+def test_folders_of_a_file_are_made(words, tmp_path):
+    file = tmp_path / "a" / "b" / ("mine.yaml" if "platform" in words else "sets.png")
+    done = CliRunner().invoke(app, [*words.split(), str(file)], terminal_width=200)
+    assert done.exit_code == ExitCode.OK, done.output
+    assert file.stat().st_size > 0
+
+
+def test_a_replay_beside_its_record_is_not_written_over(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("steerclear.experiments.commands.render.load", lambda path: {})
+    Path("game.html").write_text("mine")
+    done = CliRunner().invoke(app, ["render", "game.npz"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "game.html is there already; name another --to, or remove it" in done.stderr
+
+
+def test_a_file_to_write_is_no_folder(tmp_path):
+    with pytest.raises(ConfigError, match=r"--out .* is a folder; name a file in it"):
+        check_new(tmp_path, "--out")
+
+
+def test_a_run_that_is_gone_on_with_writes_its_json_again(tmp_path):
+    (tmp_path / "a.json").write_text("mine")
+    given = {"json_file": tmp_path / "a.json", "resume": True}
+    check_files(ablate, given)
+    with pytest.raises(ConfigError, match=r"a\.json is there already; name another --json"):
+        check_files(ablate, {**given, "resume": False})
+
+
+@pytest.mark.parametrize("command", ["ablate --quick", "evaluate medium --quick", "encounters", "attack", "tournament"])
+@pytest.mark.parametrize("name", ["report.html", "games.csv"])
+def test_results_write_over_nothing(command, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    Path("out", name).write_text("mine")
+    done = CliRunner().invoke(app, [*command.split(), "--out", "out"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"{name} would be written over; choose another --out, or move it" in done.stderr
+    assert {path.name: path.read_text() for path in Path("out").iterdir()} == {name: "mine"}
+
+
+@pytest.mark.parametrize(
+    "line", ["ablate", "evaluate medium", "encounters", "attack", "tournament", "entry report a.zip --opponents hold"]
+)
+def test_a_run_to_go_on_with_is_named(line, tmp_path, monkeypatch):
+    """Else a new folder would be begun beside it."""
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("a.zip", "w") as packed:
+        packed.writestr("solution.py", "class solution:\n    def compute_action(self, agent_id, a, b, c): return 4\n")
+    done = CliRunner().invoke(app, [*line.split(), "--resume"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--resume needs the --out folder of the run to go on with" in done.stderr
+    assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("words", ["encounters --scene none.json", "attack --replay none.json"])
+def test_scenes_write_over_no_replay(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("replay.html").write_text("mine")
+    done = CliRunner().invoke(app, [*words.split(), "--out", "."], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "replay.html is there already; name another --out, or remove it" in done.stderr
+    assert Path("replay.html").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "best.npz"])
+def test_a_training_writes_over_nothing(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("algorithm: cloning\n")
+    Path("out").mkdir()
+    Path("out", name).write_text("mine")
+    done = CliRunner().invoke(app, ["train", "a.yaml", "--out", "out"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"{name} would be written over; name another --out, or move it" in done.stderr
+    assert Path("out", name).read_text() == "mine"
+
+
+def test_docs_makes_its_own_pages_anew_and_no_others(tmp_path):
+    (tmp_path / "settings.md").write_text("# Our settings\n")
+    done = CliRunner().invoke(app, ["docs", "--out", str(tmp_path)], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "settings.md was not made by steerclear docs; choose another --out, or move it" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["settings.md"]
+    (tmp_path / "settings.md").unlink()
+    for _ in range(2):
+        assert CliRunner().invoke(app, ["docs", "--out", str(tmp_path)]).exit_code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["json_keys.md", "settings.md"]

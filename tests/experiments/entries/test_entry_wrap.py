@@ -23,6 +23,7 @@ from steerclear.experiments.entries.wrapping.inline import Inliner, small
 from steerclear.experiments.entries.wrapping.package import code
 from steerclear.experiments.entries.wrapping.sources import sources
 from steerclear.experiments.keys import KEYS, undocumented
+from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from typer.testing import CliRunner
 
@@ -102,6 +103,44 @@ def test_it_is_small_and_says_what_is_in_it(wrapped):
     assert (folder / "helper.py").read_text() == "TOP = 3.0\n"
 
 
+def test_it_says_which_game_and_which_shield_it_is_for(wrapped, tmp_path):
+    path, told, folder = wrapped
+    made = made_for(path)
+    assert (made.preset, made.separation_m, made.decision_s) == ("mctf2026", 4.0, 1.0)
+    assert made.shield == told["shield"]
+    read_me = ast.get_docstring(ast.parse((folder / "solution.py").read_text()))
+    assert "For preset mctf2026, a decision every 1 s. The shield keeps 4 m, profile rammers" in " ".join(
+        read_me.split()
+    )
+    file = tmp_path / "c.json"
+    done = run("check", path, "--max-time", 2, "--json", file)
+    assert "made by steerclear for preset mctf2026; its shield keeps 4 m, rammers" in done.stdout
+    assert json.loads(file.read_text())["made_for"]["shield"] == told["shield"]
+    assert undocumented(json.loads(file.read_text()), KEYS["entry check"]) == []
+
+
+def test_commands_refuse_a_game_it_is_not_for_and_tell_of_less(wrapped):
+    other = run("check", wrapped[0], "--max-time", 2, "--preset", "mctf2025")
+    assert other.exit_code == ExitCode.BAD_INPUT
+    assert "is for decisions of 1 s, but this game's last 0.1 s; play it by preset mctf2026" in other.stderr
+    wider = ["play", "--own", str(wrapped[0]), "--opponent", "hold", "--preset", "mctf2026", "--max-time", "1"]
+    done = CliRunner().invoke(cli.app, [*wider, "--set", "agent_radius_m=3", "--no-shield"])
+    assert done.exit_code == ExitCode.OK, done.output
+    assert done.stderr.count("keeps 4 m (separation_m), but this game counts collisions at 6 m") == 1
+
+
+def test_games_without_our_shield_are_not_without_one_where_the_entry_has_its_own(wrapped, tmp_path):
+    line = ["ablate", "--own", str(wrapped[0]), "--opponents", "hold", "--preset", "mctf2026", "--max-time", "1"]
+    done = CliRunner().invoke(cli.app, [*line, "--games", "1", "--jobs", "1", "--out", str(tmp_path / "x")])
+    assert done.exit_code == ExitCode.OK, done.output
+    assert done.stderr.count("has a shield in it: off means that one alone") == 1
+    bare = CliRunner().invoke(
+        cli.app, ["evaluate", *line[2:], "--games", "1", "--jobs", "1", "--out", str(tmp_path / "y")]
+    )
+    assert bare.exit_code == ExitCode.OK, bare.output
+    assert "has a shield in it" not in bare.stderr
+
+
 def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
     """In our own game, with the entry's class found by its name in the zip's module, as pickles do."""
     env = MctfEnv(GameConfig.preset("mctf2026", max_time_s=40.0))
@@ -129,9 +168,9 @@ def test_two_boats_that_run_at_each_other_are_kept_apart(wrapped):
         (["medium", "--out", "x.zip"], "medium is no entry"),
         (["empty.zip", "--out", "x.zip"], "needs one solution.py"),
         (["gone.zip", "--out", "x.zip"], "there is no submission at"),
-        (["{bare}", "--out", "there.zip"], "there.zip exists"),
+        (["{bare}", "--out", "there.zip"], "there.zip is there already"),
         (["{bare}", "--out", "shielded"], "give the name of a zip"),
-        (["{bare}", "--out", "nowhere/x.zip"], "there is no folder"),
+        (["{bare}", "--out", "there.zip/x.zip"], "--out there.zip/x.zip cannot be written"),
         (["{bare}", "--out", "x.zip", "--profile", "pirates"], "unknown profile 'pirates'"),
         (["{bare}", "--out", "x.zip", "--separation", "-1"], "separation_m is -1"),
         (["{bare}", "--out", "x.zip", "--shield-set", "speed=3"], "unknown shield setting 'speed'"),

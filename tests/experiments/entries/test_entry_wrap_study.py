@@ -54,7 +54,7 @@ def noted_in(opponent, seed, settings):
 @pytest.mark.study
 def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
     facts = facts_for("mctf2026", {"separation_m": 4.0})
-    package, files = shielded_files(facts)
+    package, files = shielded_files(facts, "mctf2026")
     for name, content in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(content)

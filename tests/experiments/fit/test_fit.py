@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from steerclear.experiments.cli import app
 from steerclear.experiments.fit.fitting import measured_of, platform_file
 from steerclear.experiments.fit.judge import judge
 from steerclear.experiments.fit.models import RATE, Seen
 from steerclear.experiments.fit.reading import read_logs
 from steerclear.experiments.fit.rollout import distance_m, errors_of
 from steerclear.shield.platforms.files import parse_platform, to_text
+from typer.testing import CliRunner
 
 STEPS = Path(__file__).parents[2] / "data" / "boat_steps"
 
@@ -67,3 +69,12 @@ def test_another_boat_is_foretold_worse(judged, runs):
         return max(float(distance_m(errors_of(params, run, judged.fit.delay_s, 3, 30))[:, -1].max()) for run in turns)
 
     assert missed(vector) > 2.0 * missed(judged.fit.vector)
+
+
+def test_the_command_writes_file_and_picture_into_folders_that_it_makes(tmp_path):
+    file, picture = tmp_path / "a" / "boat.yaml", tmp_path / "b" / "boat.svg"
+    logs = [str(path) for path in sorted(STEPS.glob("*.csv"))]
+    done = CliRunner().invoke(app, ["fit", *logs, "--kind", "rate", "--out", str(file), "--plot", str(picture)])
+    assert done.exit_code == 0, done.output
+    assert parse_platform(file.read_text()).platform.name == "boat"
+    assert picture.read_text().startswith("<?xml")

@@ -2,6 +2,7 @@ import json
 
 import pytest
 from steerclear.experiments.docs_pages import write_pages
+from steerclear.experiments.store import write_json
 from steerclear.experiments.training.settings import settings_of
 from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
 from steerclear.shield.exceptions import ConfigError
@@ -67,6 +68,20 @@ def test_trainings_at_once_give_what_they_give_one_after_another(tiny_content, t
     assert told[-1] == 8
 
 
+def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
+    """Its networks would be taken for those of the config given."""
+    pytest.importorskip("stable_baselines3")
+    from steerclear.experiments.training.study import RESULTS, _results, run_study
+
+    base = settings_of({"decisions": 100})
+    write_json(tmp_path / RESULTS, _results(settings_of({"decisions": 200}), 1, 1, {}))
+    with pytest.raises(ConfigError, match=r"holds a study of another config \(decisions\); give its own, or name"):
+        run_study(base, tmp_path, 1, 1, lambda done, words: None)
+    (tmp_path / RESULTS).write_text('{"command": "ablate"}')
+    with pytest.raises(ConfigError, match="holds no study; name another --out"):
+        run_study(base, tmp_path, 1, 1, lambda done, words: None)
+
+
 def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tmp_path):
     pytest.importorskip("stable_baselines3")
     from steerclear.experiments.training.study import RESULTS, run_study
@@ -75,6 +90,6 @@ def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tm
     spoiled = tmp_path / "training-collision_on-seed_0"
     spoiled.mkdir()
     (spoiled / "final.npz").write_bytes(b"no weights")
-    with pytest.raises(ConfigError, match=r"training-collision_on-seed_0: .*7 cells are done"):
+    with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
         run_study(base, tmp_path, 1, 1, lambda done, words: None)
     assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+import zipfile
 from inspect import Parameter, signature
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from steerclear.experiments.commands import train
 from steerclear.experiments.folder_lock import _HELD
 from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
+from steerclear.policies.submissions.made_for import made_for
+from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
 ROOT = Path(__file__).parents[3]
@@ -29,6 +32,10 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     exported = call("export", folder / "model.zip", *files)
     assert exported.exit_code == 0
     assert exported.output.count("for games of preset aamas2024") == 2
+    made = made_for(tmp_path / "solution.zip")
+    assert (made.preset, made.shielded) == ("aamas2024", False)
+    with zipfile.ZipFile(tmp_path / "solution.zip") as packed:
+        assert "It learned in preset aamas2024. There is no shield in it" in packed.read("solution.py").decode()
     for policy in (f"weights:{tmp_path / 'team.npz'}", tmp_path / "solution.zip"):
         played = call("evaluate", policy, "--opponents", "hold", "--games", 1, "--max-time", 3,
                       "--jobs", 1, "--out", tmp_path / Path(str(policy)).stem)  # fmt: skip
@@ -39,6 +46,7 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     ):
         elsewhere = call(*words)
         assert elsewhere.exit_code == 2
+        assert ("learned in preset aamas2024 and plays mctf2026" in elsewhere.output) == (words[0] == "entry")
         assert "take" in elsewhere.output
         assert "--preset aamas2024" in elsewhere.output
 
@@ -126,3 +134,10 @@ def test_the_page_lists_every_option_of_the_environment_with_its_default():
 @pytest.mark.parametrize("command", ["train", "export", "train-study"])
 def test_the_commands_are_there(command):
     assert call(command, "--help").exit_code == 0
+
+
+@pytest.mark.parametrize("shield", ["none", {"separation_m": 3.0}, 1, None])
+def test_a_shield_of_the_id_is_there_or_not(shield):
+    """A name or settings are true: "none" would be a shield, and settings would not be kept."""
+    with pytest.raises(ConfigError, match=r"shield is .*; give True or False, or build one with settings from parts"):
+        make_learners(num_envs=3, shield=shield)

@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.estimator import Estimator
 from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.config import ShieldConfig
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.tracking.tracks import steps_of_delay
 
 DT_S = 0.1
 
@@ -75,6 +77,20 @@ def test_the_wrong_delay_is_seen_as_a_difference():
         step_boat(params, row, 2.0, 90.0 - row[L.HEADING], DT_S)
         estimator.advance((k + 1) * DT_S)
     assert abs(estimator.estimate(1.0).row[L.HEADING] - row[L.HEADING]) > 2.0
+
+
+@pytest.mark.parametrize(("delay_s", "steps"), [(0.04, 1), (0.1, 1), (0.14, 2), (0.3, 3), (0.31, 4)])
+def test_a_delay_between_steps_is_counted_up_as_the_shield_counts_it(delay_s, steps):
+    """Else the boat would have carried out a command that the shield has on its way yet, and carries out again."""
+    assert steps == steps_of_delay(ShieldConfig(delay_s=delay_s, dt_s=DT_S))
+    estimator = Estimator(get_platform("heron"), DT_S, delay_s)
+    estimator.correct(reading(fresh_state(0.0, 0.0, 0.0, 1.0), 50.0))
+    turned = []
+    for k in range(6):
+        estimator.sent(50.0 + k * DT_S, math.radians(90.0), 2.0)
+        estimator.advance(50.0 + (k + 1) * DT_S)
+        turned.append(estimator.estimate(50.0 + (k + 1) * DT_S).row[L.HEADING] != 0.0)
+    assert turned == [k >= steps for k in range(6)]
 
 
 def test_noise_is_smoothed_and_memory_stays_the_boats():

@@ -68,6 +68,16 @@ def test_the_decisions_are_those_of_a_shielded_env():
     assert (env.view().position[0] != start[0]).any()
 
 
+def test_what_is_wrapped_says_what_its_shield_keeps():
+    kept = "Shield(separation_m=4, profile='rammers', dt_s=0.1)"
+    settings = {"separation_m": 4.0, "profile": "rammers"}
+    assert repr(Shield(**settings).wrap(policies.make("medium"))) == f"<shielded medium: {kept}>"
+    assert repr(Shield(**settings).wrap(crowd, read=straight)) == f"<shielded crowd: {kept}>"
+    env = repr(ShieldedParallelEnv(crowd()[0], Shield(**settings), team="red"))
+    assert env.startswith("<ShieldedParallelEnv of red in ")
+    assert env.endswith(f": {kept}>")
+
+
 def test_attributes_of_the_policy_are_within_reach_and_it_can_be_copied():
     team = policies.make("medium")
     shielded = Shield().wrap(team)

@@ -1,0 +1,114 @@
+"""What an entry that steerclear wrote says of itself: the game it is for, and the shield in it."""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
+
+from steerclear.env.config import GameConfig
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.words import plain_text
+
+ABOUT_FILE = "steerclear_entry.json"
+"""Lies beside ``solution.py``."""
+MAX_BYTES = 1 << 20
+
+
+class MadeFor(NamedTuple):
+    """What an entry is for.
+
+    Attributes:
+        preset: rules of the game.
+        decision_s: time from decision to decision there, s.
+        platforms: names of the boats there, in order; empty: not said.
+        separation_m: distance that the shield in it keeps, m; NaN: there is none in it.
+        shield: all settings of that shield, empty without one.
+    """
+
+    preset: str
+    decision_s: float
+    platforms: tuple[str, ...] = ()
+    separation_m: float = math.nan
+    shield: Mapping[str, Any] = {}
+
+    @property
+    def shielded(self) -> bool:
+        """Whether a shield is in it."""
+        return not math.isnan(self.separation_m)
+
+    def to_bytes(self) -> bytes:
+        """Content of `ABOUT_FILE`."""
+        told = {**self._asdict(), "separation_m": self.separation_m if self.shielded else None}
+        return json.dumps(told, indent=1).encode()
+
+
+def made_for(source: str | Path) -> MadeFor | None:
+    """What the entry at a path says of itself; None: nothing that can be read, as others' do.
+
+    Args:
+        source: folder, zip or ``solution.py`` of an entry.
+    """
+    try:
+        told = json.loads(_content(Path(source).expanduser()))
+        separation_m = math.nan if told["separation_m"] is None else float(told["separation_m"])
+        platforms = tuple(plain_text(name, 40) for name in told["platforms"])
+        preset, decision_s = plain_text(told["preset"], 40), float(told["decision_s"])
+        return MadeFor(preset, decision_s, platforms, separation_m, dict(told["shield"]))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile, NotImplementedError):
+        return None
+
+
+def _content(source: Path) -> bytes:
+    """Bytes of the file, empty where there is none of its size.
+
+    Raises:
+        OSError, zipfile.BadZipFile, NotImplementedError: it cannot be read.
+    """
+    if source.is_dir() or source.suffix == ".py":
+        path = (source if source.is_dir() else source.parent) / ABOUT_FILE
+        return path.read_bytes() if path.is_file() and path.stat().st_size <= MAX_BYTES else b""
+    with zipfile.ZipFile(source) as packed:
+        for info in packed.infolist():
+            if PurePosixPath(info.filename).name == ABOUT_FILE and info.file_size <= MAX_BYTES:
+                return packed.read(info)
+    return b""
+
+
+def check_game(made: MadeFor, game: GameConfig, source: object) -> None:
+    """Refuse a game that the shield in an entry does not foresee: of another length of a decision, or other boats.
+
+    Raises:
+        PolicyError: it is one.
+    """
+    if not made.shielded:
+        return
+    names, other = platform_names(game), ""
+    if not math.isclose(made.decision_s, game.decision_s, rel_tol=1e-9):
+        other = f"for decisions of {made.decision_s:g} s, but this game's last {game.decision_s:g} s"
+    elif made.platforms and made.platforms != names:
+        other = f"for boats {', '.join(made.platforms)}, but this game has {', '.join(names)}"
+    if other:
+        raise PolicyError(
+            f"the shield in {source} is {other}; play it by preset {made.preset}, or the bare entry with --shield"
+        )
+
+
+def platform_names(game: GameConfig) -> tuple[str, ...]:
+    """Names of a game's boats, in order."""
+    return tuple(get_platform(boat).name for boat in game.platforms)  # type: ignore[union-attr]  # a tuple once built
+
+
+def words_of_less(made: MadeFor, game: GameConfig, source: object) -> str:
+    """What to say of a shield in an entry that keeps less than the distance at which a game counts; else nothing."""
+    counted_m = 2.0 * max(game.agent_radius_m)  # type: ignore[arg-type]  # a tuple once built
+    if not made.shielded or made.separation_m >= counted_m - 1e-9:
+        return ""
+    return (
+        f"the shield in {source} keeps {made.separation_m:g} m (separation_m), but this game counts collisions at "
+        f"{counted_m:g} m: such hits it does not prevent; wrap the bare entry with --separation {counted_m:g}"
+    )
