@@ -34,6 +34,9 @@ UNTAG_AT = ("own_flag", "own_corners")
 MOST_STEPS = 1000
 """Steps of a decision at most; a slip of the pen would make one last for hours."""
 
+MOST_BOATS = 1000
+"""Boats of a team at most."""
+
 _NOT_NEGATIVE = (
     "flag_keepout_m",
     "flag_radius_m",
@@ -148,7 +151,8 @@ class GameConfig:
     preset_name: str = "custom"
 
     def __post_init__(self) -> None:
-        check_count("team_size", self.team_size, low=1)
+        if check_count("team_size", self.team_size, low=1) > MOST_BOATS:
+            raise ConfigError(f"team_size is {self.team_size}; give at most {MOST_BOATS} boats")
         check_count("max_score", self.max_score, low=1)
         if check_count("decision_steps", self.decision_steps, low=1) > MOST_STEPS:
             raise ConfigError(f"decision_steps is {self.decision_steps}; give at most {MOST_STEPS}")

@@ -201,7 +201,10 @@ def make_batch(name: str, **options: Any) -> BatchPolicy:
     if found is not None:
         return _call(found[0], name, options, *found[1])
     if name in entrants() or name == KEYBOARD or name.startswith(SB3_PREFIX) or looks_like_path(name):
-        raise PolicyError(f"{name!r} plays single games only; batches take {', '.join(ENTRIES)} and learned teams")
+        others = [each for each, entrant in entrants().items() if entrant.batch is not None]
+        raise PolicyError(
+            f"{name!r} plays single games only; batches take {', '.join([*ENTRIES, *others])} and learned teams"
+        )
     raise unknown_policy(name)
 
 

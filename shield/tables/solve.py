@@ -174,7 +174,9 @@ def _resume(problem: Problem, path: Path | None) -> Progress | None:
             values, hints, active, levels = (file[name] for name in ("values", "hints", "active", "levels"))
             state = Progress(values, hints, active, int(file["iterations"]), float(file["residual_m"]), levels)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise TableError(f"checkpoint {path} cannot be read ({error}); delete it to start afresh") from error
+        raise TableError(
+            f"checkpoint {path} cannot be read ({error}); name another with --checkpoint, or delete it to start afresh"
+        ) from error
     if not same:
         raise TableError(f"checkpoint {path} belongs to another problem; delete it or name another with --checkpoint")
     return state
