@@ -59,8 +59,8 @@ def test_boats_head_on_are_saved_until_the_table_says_that_nobody_can(heron):
 
 
 def test_a_shield_that_fears_nobody_loses_more(heron):
-    state = meeting((0.0, 8.0), (2.0, 7.0))
-    assert games_lost(heron, ShieldConfig(profile="hold-course"), state, RADIUS_M, 8.0).any()
+    state = meeting((1.0, 6.0), (2.0, 5.0))
+    assert games_lost(heron, ShieldConfig(profile="hold-course"), state, RADIUS_M, 8.0).all()
     assert not games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).any()
 
 

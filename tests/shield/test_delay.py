@@ -97,7 +97,7 @@ def test_reset_forgets_what_was_on_its_way():
 
 @pytest.mark.parametrize("nonsense", [(2.0, np.nan), (np.inf, 0.0), (2.0, 1e300)])
 def test_what_others_told_a_boat_before_it_was_ours_may_be_nonsense(nonsense):
-    fleet = head_on(gap_m=6.0)
+    fleet = head_on(gap_m=4.0)
     shield = Shield(delay_s=0.1)
     taken = Fleet(fleet.state, fleet.team, fleet.platforms, np.array([False, False]), fleet.names)
     shield.decide(taken, Commands.relative_deg([nonsense, (2.0, 0.0)]))
