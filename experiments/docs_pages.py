@@ -18,7 +18,7 @@ from .docs_plots import plot_off_on
 from .keys import KEYS
 from .markdown import MADE, bars_table, line, table
 from .played_sets_page import played_page
-from .price_page import is_dial, price_page
+from .price_page import is_dial, is_shielded, price_page
 from .reach_show import tables_page
 from .settings_page import settings_page
 from .tables import interval_text
@@ -109,7 +109,8 @@ def _pages_of(results: Sequence[Mapping[str, Any]], folder: Path) -> tuple[dict[
     if len(dials) == 1:  # one point is no trade: an ablation like any other
         dials = []
     if dials:
-        name, text, picture = price_page(dials, folder)
+        by_default = [content for content in results if is_shielded(content) and content not in dials]
+        name, text, picture = price_page([*dials, *by_default], folder)
         pages[name] = text
         pictures += picture
     for content in (one for one in results if one.get("command") not in POOLED and one not in dials):

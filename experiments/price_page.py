@@ -30,10 +30,14 @@ _HEADS = (
 )
 
 
+def is_shielded(content: Mapping[str, Any]) -> bool:
+    """Whether results are of an ablation with a shield; one that was told no time has that of the default profile."""
+    return content.get("command") == "ablate" and isinstance(content.get("settings", {}).get("shield"), Mapping)
+
+
 def is_dial(content: Mapping[str, Any]) -> bool:
     """Whether results are of an ablation that was told how long opponents are feared for."""
-    shield = content.get("settings", {}).get("shield") or {}
-    return content.get("command") == "ablate" and bool(set(_DIALS) & set(shield))
+    return is_shielded(content) and bool(set(_DIALS) & set(content["settings"]["shield"]))
 
 
 ADVICE = (
@@ -49,7 +53,7 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
     """Name and text of the page, and its pictures.
 
     Args:
-        found: results of ablations, see `is_dial`.
+        found: results of ablations, see `is_shielded`.
         folder: where the pictures go.
     """
     groups = _groups(found)
@@ -58,7 +62,7 @@ def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, s
         "Hits are entries into the distance kept, per game; differences are paired, shield on less off, same seeds; "
         "95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is "
         "for those on our side of the field (`visitor_s`), which can tag nobody there. Each row is of the version that "
-        "measured it: from 0.5.0 on boats that are slow fear for longer."
+        "measured it. Boats that are slow fear for longer than that."
     )
     lines = ["# Safety and its price", "", MADE, "", words, "", ADVICE, ""]
     picture = folder / f"{STEM}.png"

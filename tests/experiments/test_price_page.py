@@ -8,7 +8,7 @@ from steerclear.experiments import docs_pages
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.campaign import Played
 from steerclear.experiments.docs_pages import write_pages
-from steerclear.experiments.price_page import is_dial
+from steerclear.experiments.price_page import is_dial, is_shielded, price_page
 from steerclear.experiments.results import results_of
 from steerclear.experiments.store import finite
 from steerclear.shield.exceptions import ConfigError
@@ -73,6 +73,14 @@ def test_other_ablations_keep_their_own_page():
     assert not is_dial(ablation({}, 1.0, 0.0))
     assert not is_dial(ablation(None, 1.0, 0.0))
     assert is_dial(ablation({"profile": "players"}, 1.0, 0.0))
+
+
+def test_an_ablation_that_was_told_no_time_has_that_of_the_default(tmp_path):
+    plain = ablation({}, 7.75, 0.25)
+    assert is_shielded(plain)
+    assert not is_shielded(ablation(None, 1.0, 0.0))
+    _, text, _ = price_page([ablation({"adversary_s": 0.0}, 2.0, 1.0), plain], tmp_path)
+    assert [row.split("|")[1].strip() for row in text.splitlines() if row.endswith("1.2.3 |")] == ["0", "12 / 7"]
 
 
 def test_results_cut_short_are_refused(tmp_path):
