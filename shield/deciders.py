@@ -227,7 +227,7 @@ class Deciders:
 
     def forget(self, which: slice | BoolArray) -> None:
         """Forget the backups of some deciders, and the commands on their way."""
-        self.memory.under_way[which] = False
+        self.memory.has_backup[which] = False
         self.memory.backing_up[which] = False
         self.pending[which] = np.nan
 

@@ -14,7 +14,7 @@ class Memory(NamedTuple):
     """Backup manoeuvre each boat holds between decisions (n boats).
 
     Attributes:
-        under_way: whether the boat has one.
+        has_backup: whether the boat has one.
         side: 1 clockwise, -1 the other way.
         target_deg: heading it ends on, deg clockwise from north; NaN when there is no turn left to make.
         speed_mps: speed it commands.
@@ -32,7 +32,7 @@ class Memory(NamedTuple):
         gives_way: side to which the boat turns to give way to it, as in ``side``; 0: it does not.
     """
 
-    under_way: BoolArray
+    has_backup: BoolArray
     side: Array
     target_deg: Array
     speed_mps: Array
@@ -53,7 +53,7 @@ def new_memory(*shape: int) -> Memory:
     """Memory of boats that hold no manoeuvre yet; ``shape`` is (n,) or (deciders, n)."""
     return share(
         Memory(
-            under_way=np.zeros(shape, np.bool_),
+            has_backup=np.zeros(shape, np.bool_),
             side=np.ones(shape),
             target_deg=np.zeros(shape),
             speed_mps=np.zeros(shape),
@@ -80,7 +80,7 @@ def part_of(memory: Memory, which: int) -> Memory:
 @kernel
 def take_memory(all_memory: Memory, which: int, own: Memory) -> None:
     """Copy the memory of one of many deciders."""
-    own.under_way[:] = all_memory.under_way[which]
+    own.has_backup[:] = all_memory.has_backup[which]
     own.side[:] = all_memory.side[which]
     own.target_deg[:] = all_memory.target_deg[which]
     own.speed_mps[:] = all_memory.speed_mps[which]
@@ -100,7 +100,7 @@ def take_memory(all_memory: Memory, which: int, own: Memory) -> None:
 @kernel
 def put_memory(own: Memory, which: int, all_memory: Memory) -> None:
     """Copy the memory of one decider back to its place among many."""
-    all_memory.under_way[which] = own.under_way
+    all_memory.has_backup[which] = own.has_backup
     all_memory.side[which] = own.side
     all_memory.target_deg[which] = own.target_deg
     all_memory.speed_mps[which] = own.speed_mps

@@ -88,7 +88,9 @@ def refresh(i: int, scene: Scene) -> None:
 @lean_kernel
 def settled(i: int, sweep: int, done: int, memory: Memory, work: Work) -> bool:
     """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
-    was_short = memory.under_way[i] and memory.backing_up[i] and (memory.margin_m[i] < 0.0 or work.kept[i] >= OPPONENTS)
+    was_short = (
+        memory.has_backup[i] and memory.backing_up[i] and (memory.margin_m[i] < 0.0 or work.kept[i] >= OPPONENTS)
+    )
     if work.kept[i] == ALL or (sweep > 0 and work.kept[i] >= OBSTACLES):
         return True
     return done == 1 and was_short

@@ -45,7 +45,7 @@ def remembered(i: int, done: int, heading_deg: float, memory: Memory) -> bool:
     A boat told to turn away from it for long is offered another in good time: once committed to, a manoeuvre must not
     run over the angle at which it would be taken for done, not even by the way a boat still spins.
     """
-    return memory.under_way[i] and (done == 0 or kept_turn(i, heading_deg, memory) <= FURTHEST_DEG)
+    return memory.has_backup[i] and (done == 0 or kept_turn(i, heading_deg, memory) <= FURTHEST_DEG)
 
 
 @lean_kernel

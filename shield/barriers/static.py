@@ -134,28 +134,15 @@ def _clearance(
 
 
 @lean_kernel
-def _way_back(
-    o: int,
-    now_m: float,
-    here: Array,
-    path: Array,
-    sampling: Sampling,
-    static: Static,
-    registered: Registered,
-    out: Array,
-) -> bool:
-    """Lower a clearance row of a boat beyond constraint number o to what its path is worth; whether it was lower."""
+def _way_back(o: int, now_m: float, path: Array, sampling: Sampling, static: Static, registered: Registered) -> float:
+    """What a path is worth, m, to a boat that is beyond constraint number o, see `way_back`."""
     last, first_s, least_m = sampling.last, sampling.first_s, FAR
     for k in range(last + 1):
         at_s = first_s + k * sampling.sample_s
         least_m = min(least_m, margin_at(o, path[k, 0], path[k, 1], at_s, static, registered)[0])
     x, y = straight_on(path, last, sampling.sample_s)
     end_m = margin_at(o, x, y, first_s + last * sampling.sample_s + RETURN_S, static, registered)[0]
-    worth_m = worth_of_way_back(now_m, least_m, end_m)
-    lowered = worth_m < out[MARGIN]
-    _, nx, ny = margin_at(o, here[0], here[1], 0.0, static, registered)
-    lower(out, worth_m, last, nx, ny)
-    return lowered
+    return worth_of_way_back(now_m, least_m, end_m)
 
 
 @lean_kernel
@@ -165,25 +152,34 @@ def clear_of_constraints(
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
     The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
-    boat that is beyond a constraint has to come back, see `way_back`; those near in time only ask that it comes no
-    nearer. Paths say nothing of a barrier of which nothing is known where the boat is, see `registered.unknown_at`.
+    boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told, less what
+    it would break of the rest, which else counted for nothing beside how far the boat is beyond. Paths say nothing of a
+    barrier of which nothing is known where the boat is, see `registered.unknown_at`.
 
     Returns:
         What the least is from: `STATIC`, or below it the barrier, see `about`.
     """
-    binds, total = -1, count_all(static, registered)
-    for o in range(count_obstacles(static, registered) if near_only else total):
+    binds, beyond, back_m = -1, -1, 0.0
+    obstacles, total = count_obstacles(static, registered), count_all(static, registered)
+    for o in range(obstacles if near_only else total):
         now_m = margin_at(o, here[0], here[1], 0.0, static, registered)[0]
         barrier = registered_number(o, static, registered)
         if barrier >= 0 and now_m <= LOST_M:
             continue
-        if now_m < 0.0 and not near_only:
-            lowered = _way_back(o, now_m, here, path, sampling, static, registered, out)
-        else:
-            last = sampling.near if near_only or o >= total - SIDES else sampling.last
-            lowered = _clearance(o, now_m, last, here, path, sampling, static, registered, out)
-        if lowered:
+        if o >= obstacles and now_m < 0.0:
+            worth_m = _way_back(o, now_m, path, sampling, static, registered)
+            if worth_m < back_m:
+                beyond, back_m = o, worth_m
+            continue
+        last = sampling.near if near_only or o >= total - SIDES else sampling.last
+        if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
+    if beyond >= 0:
+        broken_m = min(0.0, out[MARGIN])
+        _, nx, ny = margin_at(beyond, here[0], here[1], 0.0, static, registered)
+        out[MARGIN] = FAR
+        lower(out, broken_m + back_m, sampling.last, nx, ny)
+        binds = -1
     return about(binds)
 
 

@@ -1,8 +1,8 @@
-"""The way back of a boat that is beyond a static constraint: it has to come back, and is led back at once.
+"""The way back of a boat that is beyond something kept by rule: the field's edge, or a keep-out circle's.
 
-However a path leads, such a boat does not keep the constraint. What the path leads to tells paths apart: they are
-followed straight on from their end, and those that lead back are worth most, even if they lead farther out at first,
-since lying still outside is none. Of those, the one that goes out least.
+However a path leads, such a boat does not keep the rule. What the path leads to tells paths apart: they are followed
+straight on from their end, and those that lead back are worth most, even if they lead farther out at first, since lying
+still outside is none. Of those, the one that goes out least.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ FARTHEST_M = 100.0
 """Boats farther outside are looked at as if they were that far, m: what tells their paths apart is the same."""
 
 RETURN_WORTH = 0.01
-"""What a metre of a path outside counts beside a metre that the boat is outside now."""
+"""What a metre that a path ends short of home counts beside a metre that the boat is outside now."""
+
+DIP_WORTH = 0.0005
+"""What a metre counts by which it leads farther out at first: by 20 m, as far as boats get, less than `HOME_M` does."""
 
 
 @lean_kernel
@@ -41,4 +44,4 @@ def worth_of_way_back(now_m: float, least_m: float, end_m: float) -> float:
     """
     farther_m = max(0.0, -now_m - FARTHEST_M)
     short_m = max(0.0, HOME_M - end_m - farther_m)
-    return now_m + farther_m - RETURN_WORTH * (short_m + max(0.0, now_m - least_m))
+    return now_m + farther_m - RETURN_WORTH * short_m - DIP_WORTH * max(0.0, now_m - least_m)

@@ -65,11 +65,11 @@ def commit(scene: Scene) -> None:
     ours, boats, memory, work = scene.ours, scene.boats, scene.memory, scene.work
     for i in range(ours.shape[0]):
         if not ours[i]:
-            memory.under_way[i] = False
+            memory.has_backup[i] = False
             memory.backing_up[i] = False
             forget_pressing(i, memory)
             continue
-        memory.under_way[i] = True
+        memory.has_backup[i] = True
         memory.side[i] = work.plan[i, 0]
         memory.target_deg[i] = np.nan
         if work.plan[i, 1] > LEAST_TURN_DEG:

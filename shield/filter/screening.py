@@ -51,7 +51,7 @@ def set_targets(scene: Scene) -> None:
         work.threat_target_m[i, :] = 0.0
         work.joint_target_m[i] = 0.0
         work.static_target_m[i] = 0.0
-        if ours[i] and memory.under_way[i]:
+        if ours[i] and memory.has_backup[i]:
             least_m = max(0.0, memory.margin_m[i])
             work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
             work.mate_target_m[i] = boats.decay[i] * min(least_m, tuning.mate_cap_m, boats.cap_m[i])

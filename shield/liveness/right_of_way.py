@@ -88,7 +88,7 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
     """Boat that still keeps boat i from turning as it wants; -1 for none."""
     state, memory = scene.state, scene.memory
-    if not memory.under_way[i] or memory.pressed_s[i] <= 0.0 or memory.free_s[i] > FREE_S:
+    if not memory.has_backup[i] or memory.pressed_s[i] <= 0.0 or memory.free_s[i] > FREE_S:
         return -1
     turned_deg = wrap_degrees(state[i, L.HEADING] - memory.pressed_deg[i])
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
@@ -101,7 +101,7 @@ def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
     """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
     state, ours, memory, work = scene.state, scene.ours, scene.memory, scene.work
     j = memory.blocked_by[i]
-    if j < 0 or not ours[j] or not work.near[i, j] or not memory.under_way[i]:
+    if j < 0 or not ours[j] or not work.near[i, j] or not memory.has_backup[i]:
         return False
     if speed_mps <= STILL_MPS or memory.pressed_s[i] >= LONGEST_S:
         return False

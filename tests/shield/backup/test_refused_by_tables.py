@@ -26,7 +26,7 @@ def scenes(count):
         state = np.array(rows)
         state[:, L.THRUST] = 100.0
         at = stages_of(ShieldConfig(), state, ["surveyor"] * 4, [0, 1, 1, 1])
-        at.memory.under_way[0], at.memory.threat_m[0] = True, random.uniform(-1.0, 2.0, 4)
+        at.memory.has_backup[0], at.memory.threat_m[0] = True, random.uniform(-1.0, 2.0, 4)
         screened(at, np.array([[3.0, random.uniform(-60.0, 60.0)]] * 4))
         yield at, random
 

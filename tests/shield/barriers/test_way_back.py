@@ -1,74 +1,70 @@
-"""A boat that is beyond a static constraint is led back, whatever is wanted of it."""
-
-import math
+"""A boat that is beyond something kept by rule is led back, whatever is wanted of it, and breaks nothing else."""
 
 import numpy as np
 import pytest
 from shield_loops import sail_games
 from steerclear.shield import ShieldConfig, Surroundings
-from steerclear.shield.barriers import Barrier, register_barrier, registry
 from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
 
-RADIUS_M, START_M = 8.0, 5.0
-OFF_OUTWARDS_DEG = np.linspace(-180.0, 150.0, 12)
+RADIUS_M = 8.0
+BOWS_DEG = np.linspace(-180.0, 120.0, 6)
+DEPTHS_M = (0.01, 0.1, 1.0, 3.0)
+PLATFORMS = ("heron", "surveyor", "otter", "blueboat")
+LONG_S = 60
 
 
-def disc(x_m, y_m, ahead_s, values):
-    return math.hypot(x_m, y_m) - values[0]
+def lying(x_m, y_m, bow_deg):
+    return fresh_state(x_m, y_m, bow_deg, 0.0)[None]
 
 
-@pytest.fixture(autouse=True)
-def nothing_stays_registered(monkeypatch):
-    monkeypatch.setattr(registry, "BARRIERS", {})
-
-
-def depths(platform, wanted_share, hull_m=0.0, barriers=(), **around):
-    """How far out of the disc boats are, m, (T, games), that lie in it with their bows all ways and want to stay."""
-    state = np.stack([fresh_state(START_M, 0.0, 90.0 + off, 0.0) for off in OFF_OUTWARDS_DEG])[:, None]
+def sailed(platform, state, wanted_share, wanted_deg, seconds=LONG_S, **around):
+    """Where boats get, (T, games, 2) m, that want a course at a share of top speed."""
     speed = wanted_share * get_platform(platform).max_speed_mps
 
-    def inwards(step, state):
-        off = np.degrees(np.arctan2(-state[..., 0], -state[..., 1])) - state[..., 2]
+    def wanted(step, state):
+        off = wanted_deg - state[..., L.HEADING]
         return np.stack([np.full(off.shape, speed), (off + 180.0) % 360.0 - 180.0], axis=-1)
 
-    config = ShieldConfig(hull_m=hull_m, barriers=barriers)
-    run = sail_games(config, state, [platform], [0], inwards, 400, surroundings=Surroundings(**around))
-    return np.linalg.norm(run.position[:, :, 0], axis=-1) - RADIUS_M
+    around = Surroundings(**around)
+    return sail_games(
+        ShieldConfig(hull_m=0.0), state, [platform], [0], wanted, 10 * seconds, surroundings=around
+    ).position[:, :, 0]
 
 
 @pytest.mark.parametrize("wanted_share", [0.0, 1.0])
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_over_the_edge_and_back(platform, wanted_share):
+    """Boats that lie beyond the eastern edge, their bows all ways, and want to stay, or to go on eastwards."""
+    state = np.stack([lying(50.0 + depth, 0.0, bow) for depth in DEPTHS_M for bow in BOWS_DEG])
+    place = sailed(platform, state, wanted_share, 90.0, field=(-50.0, -50.0, 50.0, 50.0))
+    assert (place[:, :, 0].min(axis=0) <= 50.0).all()
+
+
+@pytest.mark.parametrize("wanted_share", [0.0, 1.0])
+@pytest.mark.parametrize("platform", PLATFORMS)
 def test_out_of_a_keep_out_circle(platform, wanted_share):
-    out_m = depths(platform, wanted_share, keep_out=[(0.0, 0.0, RADIUS_M)])
-    assert (out_m.max(axis=0) > -0.1).all()
-    assert (out_m[-1] > -0.1).all(), "and they stay out"
+    state = np.stack([lying(RADIUS_M - depth, 0.0, bow) for depth in DEPTHS_M for bow in BOWS_DEG])
+    place = sailed(platform, state, wanted_share, 270.0, keep_out=[(0.0, 0.0, RADIUS_M)])
+    assert (np.linalg.norm(place, axis=-1).max(axis=0) >= RADIUS_M).all()
 
 
+@pytest.mark.parametrize("platform", ["heron", "surveyor"])
+def test_who_can_get_out_only_over_the_edge_stays_in_the_field(platform):
+    """A keep-out circle about the whole field, and one beside an edge."""
+    state = np.stack([lying(x, 0.0, bow) for x in (20.0, 40.0) for bow in BOWS_DEG])
+    field = (-50.0, -50.0, 50.0, 50.0)
+    for circle in ((0.0, 0.0, 400.0), (40.0, 0.0, 30.0)):
+        place = sailed(platform, state, 0.0, 90.0, seconds=40, field=field, keep_out=[circle])
+        assert np.abs(place).max() <= 50.0
+
+
+@pytest.mark.parametrize("kind", ["circles", "stops"])
 @pytest.mark.parametrize("wanted_share", [0.0, 1.0])
-@pytest.mark.parametrize("kind", ["circles", "registered"])
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
-def test_out_of_what_stops_boats_where_the_way_leads_no_deeper(platform, kind, wanted_share):
-    if kind == "circles":
-        out_m = depths(platform, wanted_share, circles=[(0.0, 0.0, RADIUS_M)])
-    else:
-        register_barrier(Barrier("disc", disc, values=(RADIUS_M,)))
-        out_m = depths(platform, wanted_share, barriers=("disc",))
-    outwards = np.abs(OFF_OUTWARDS_DEG) < 80.0
-    assert (out_m[-1, outwards] > -0.1).all()
-    assert out_m.min() > START_M - RADIUS_M - 0.1, "nobody goes deeper"
-
-
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
-def test_off_a_wall(platform):
-    """Boats that lie 1 m off a wall, of which 3 m are to be kept, their bows off it, and want to stay."""
-    state = np.stack([fresh_state(1.0, 0.0, 90.0 + off, 0.0) for off in (-80.0, -40.0, 0.0, 60.0)])[:, None]
-    wall = ((0.0, -90.0), (0.0, 90.0), (-0.5, 0.0))
-
-    def still(step, state):
-        return np.zeros((*state.shape[:-1], 2))
-
-    config = ShieldConfig(hull_m=3.0)
-    run = sail_games(config, state, [platform], [0], still, 400, surroundings=Surroundings(polygons=[wall]))
-    assert (run.position[-1, :, 0, 0] > 2.9).all()
-    assert run.position[..., 0].min() > 0.9
+def test_in_an_obstacle_nobody_goes_deeper_and_who_wants_out_may(kind, wanted_share):
+    state = np.stack([lying(5.0, 0.0, bow) for bow in BOWS_DEG])
+    inwards = sailed("heron", state, wanted_share, 270.0, **{kind: [(0.0, 0.0, RADIUS_M)]})
+    assert np.linalg.norm(inwards, axis=-1).min() > 4.9
+    outwards = sailed("heron", state[np.abs(BOWS_DEG - 90.0) < 80.0], 1.0, 90.0, **{kind: [(0.0, 0.0, RADIUS_M)]})
+    assert (np.linalg.norm(outwards[-1], axis=-1) > RADIUS_M).all()

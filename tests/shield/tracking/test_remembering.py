@@ -90,10 +90,10 @@ def test_boats_are_told_by_name_platform_and_team():
 
 def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin():
     old, new = new_memory(2), new_memory(3)
-    old.under_way[:], old.side[:], old.target_deg[:] = True, (-1.0, 1.0), (30.0, 60.0)
+    old.has_backup[:], old.side[:], old.target_deg[:] = True, (-1.0, 1.0), (30.0, 60.0)
     old.margin_m[:], old.threat_m[:] = (1.5, -0.5), [[0.0, 1.0], [0.5, 0.0]]
     carry_over(old, new, Stayed(np.array([2, 0]), np.array([0, 1])), np.array([True, True, False]))
-    assert new.under_way.tolist() == [True, False, True]
+    assert new.has_backup.tolist() == [True, False, True]
     assert new.side[[2, 0]].tolist() == [-1.0, 1.0]
     assert new.target_deg[[2, 0]].tolist() == [30.0, 60.0]
     assert new.margin_m.tolist() == [-0.5, 0.0, 1.5]
