@@ -23,10 +23,10 @@ from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Registered, Scene, Static
 from .clearance import FAR, MARGIN, lower
-from .constraints import SIDES, count_all, count_obstacles, margin_at, registered_number, wall_number
+from .constraints import count_all, count_obstacles, margin_at, registered_number, wall_number
 from .registered import LOST_M
 from .walls import goes_through
-from .way_back import RETURN_S, straight_on, worth_of_way_back
+from .way_back import PARTS, RETURN_S, straight_on, worth_of_way_back
 
 STATIC = -2
 """In the place of the neighbour that binds: an obstacle, an edge or a circle does; below, registered barriers."""
@@ -140,9 +140,13 @@ def _way_back(o: int, now_m: float, path: Array, sampling: Sampling, static: Sta
     for k in range(last + 1):
         at_s = first_s + k * sampling.sample_s
         least_m = min(least_m, margin_at(o, path[k, 0], path[k, 1], at_s, static, registered)[0])
-    x, y = straight_on(path, last, sampling.sample_s)
-    end_m = margin_at(o, x, y, first_s + last * sampling.sample_s + RETURN_S, static, registered)[0]
-    return worth_of_way_back(now_m, least_m, end_m)
+    most_m = -FAR
+    for part in range(PARTS + 1):
+        on_s = RETURN_S * part / PARTS
+        x, y = straight_on(path, last, sampling.sample_s, on_s)
+        at_s = first_s + last * sampling.sample_s + on_s
+        most_m = max(most_m, margin_at(o, x, y, at_s, static, registered)[0])
+    return worth_of_way_back(now_m, least_m, most_m)
 
 
 @lean_kernel
@@ -151,7 +155,7 @@ def clear_of_constraints(
 ) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
-    The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
+    The field's edge is looked at only until a half turn could be over, since every straight run ends beyond. A
     boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told, less what
     it would break of the rest, which else counted for nothing beside how far the boat is beyond. Paths say nothing of a
     barrier of which nothing is known where the boat is, see `registered.unknown_at`.
@@ -171,7 +175,7 @@ def clear_of_constraints(
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only or o >= total - SIDES else sampling.last
+        last = sampling.near if near_only or o == total - 1 else sampling.last
         if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
     if beyond >= 0:

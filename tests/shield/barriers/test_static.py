@@ -80,9 +80,9 @@ def left_of(path, here, wall, hull_m, side_m, grace):
 
 def worth_of(margins, path, circle):
     """What a path is worth to a boat in a circle, m: depth, how far it ends short of home, and a trifle for a dip."""
-    end = path[-1] + 20 * (path[-1] - path[-2])  # 10 s of samples of 0.5 s
-    short = max(0.0, 1.0 - np.linalg.norm(end - circle[:2]) + circle[2])
-    return margins[0] - 0.01 * short - 0.0005 * (margins[0] - margins.min())
+    on = path[-1] + np.arange(0, 21, 4)[:, None] * (path[-1] - path[-2])  # 10 s of samples of 0.5 s
+    short = max(0.0, 1.0 + circle[2] - np.linalg.norm(on - circle[:2], axis=1).max())
+    return margins[0] - 0.01 * short - 0.002 * (margins[0] - margins.min())
 
 
 @settings(max_examples=150, deadline=None)
