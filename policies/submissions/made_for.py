@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
@@ -59,19 +60,21 @@ def made_for(source: str | Path) -> MadeFor | None:
         platforms = tuple(plain_text(name, 40) for name in told["platforms"])
         preset, decision_s = plain_text(told["preset"], 40), float(told["decision_s"])
         return MadeFor(preset, decision_s, platforms, separation_m, dict(told["shield"]))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile, NotImplementedError):
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 
 
 def _content(source: Path) -> bytes:
-    """Bytes of the file, empty where there is none of its size.
+    """Bytes of the file, empty where there is none of its size, or where the entry is a pipe, which is not waited for.
 
     Raises:
-        OSError, zipfile.BadZipFile, NotImplementedError: it cannot be read.
+        OSError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error: it cannot be read.
     """
     if source.is_dir() or source.suffix == ".py":
         path = (source if source.is_dir() else source.parent) / ABOUT_FILE
         return path.read_bytes() if path.is_file() and path.stat().st_size <= MAX_BYTES else b""
+    if not source.is_file():
+        return b""
     with zipfile.ZipFile(source) as packed:
         for info in packed.infolist():
             if PurePosixPath(info.filename).name == ABOUT_FILE and info.file_size <= MAX_BYTES:

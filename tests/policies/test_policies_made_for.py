@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 import textwrap
 import zipfile
 
@@ -53,6 +54,28 @@ def test_it_is_read_from_zips_and_folders_as_it_was_written(tmp_path):
 )
 def test_what_others_put_there_says_nothing(about, tmp_path):
     assert made_for(write_zip(tmp_path / "a.zip", about)) is None
+
+
+@pytest.mark.parametrize("name", ["entry.zip", "entry.py", "entry"])
+def test_a_pipe_says_nothing_and_is_not_waited_for(name, tmp_path):
+    os.mkfifo(tmp_path / name)
+    assert made_for(tmp_path / name) is None
+
+
+@pytest.mark.parametrize("offset", [6, 30])
+def test_an_encrypted_or_garbled_file_in_a_zip_says_nothing(offset, tmp_path):
+    """Byte 6 of a file's header says whether it is encrypted; what is garbled shows in its sum."""
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr(ABOUT_FILE, MADE.to_bytes())
+    content = bytearray(path.read_bytes())
+    if offset == 6:
+        content[6] |= 1
+        content[content.index(b"PK\x01\x02") + 8] |= 1
+    else:
+        content[30 + len(ABOUT_FILE) + 2] ^= 0xFF
+    path.write_bytes(content)
+    assert made_for(path) is None
 
 
 @pytest.mark.parametrize("name", ["none.zip", "damaged.zip", ""])
