@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.game_facts import facts_of_games
 from steerclear.shield.shared import share
 from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
@@ -19,13 +20,13 @@ from .seldom_asked import SeldomAsked
 from .settings import Stage, TrainingSettings
 
 
-def core_of(settings: TrainingSettings, games: int, seed: int) -> BatchedMctf:
-    """So many games by a config's rules, starts drawn from the seed.
+def core_of(settings: TrainingSettings, games: int, seed: int, stage: Stage | None = None) -> BatchedMctf:
+    """So many games by a config's rules, a stage's or those of evaluations, starts drawn from the seed.
 
     Raises:
         ConfigError: the rules cannot be.
     """
-    return BatchedMctf(settings.game(), n_games=games, seed=seed)
+    return BatchedMctf(settings.game(stage), n_games=games, seed=seed)
 
 
 def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue") -> Any:
@@ -34,12 +35,13 @@ def shield_of(settings: TrainingSettings, core: BatchedMctf, team: str = "blue")
     return games_shield(core, config, team=team)
 
 
-def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
-    """The learners, blue, in games against an opponent.
+def learners_of(settings: TrainingSettings, opponent: Any, stage: Stage | None = None) -> TeamBatch:
+    """The learners, blue, in games of a stage, the first where none is named, against an opponent.
 
     A shield that only evaluations ask is built here, too: what is wrong with it is found before the first rollout.
     """
-    core = core_of(settings, settings.games, settings.seed)
+    stage = settings.stages[0] if stage is None else stage
+    core = core_of(settings, settings.games, settings.seed, stage)
     shield = shield_of(settings, core) if settings.shield != "none" else None
     batch = TeamBatch(
         core,
@@ -49,7 +51,7 @@ def learners_of(settings: TrainingSettings, opponent: Any) -> TeamBatch:
         actions=settings.actions,
         seed=settings.seed,
         interval=settings.interval,
-        reward=WeightedSum(settings.reward_weights(settings.stages[0])),
+        reward=WeightedSum(settings.reward_weights(stage)),
     )
     if settings.shielded_training and settings.shield_every > 1:
         SeldomAsked(batch, settings.shield_every)
@@ -71,6 +73,21 @@ def set_stage(batch: TeamBatch, settings: TrainingSettings, stage: Stage, guard:
     batch.shield, batch._filter = guard if stage.shielded else (None, None)
     batch.reward = WeightedSum(settings.reward_weights(stage))
     batch.reward.begin(batch, np.ones(core.n_games, np.bool_))
+
+
+def check_sight(settings: TrainingSettings) -> None:
+    """Refuse stages by whose rules boats see other numbers than in evaluations.
+
+    Raises:
+        ConfigError: there is one.
+    """
+    wanted = core_of(settings, 1, 0).observation_high
+    for stage in settings.stages:
+        if stage.rules and not np.array_equal(core_of(settings, 1, 0, stage).observation_high, wanted):
+            raise ConfigError(
+                f"rules {dict(stage.rules)!r} of a stage change what boats see or its bounds (field, teams, obstacles, "
+                "top speed of the fastest boat, scores, cool-down); leave those as in the training's rules"
+            )
 
 
 def stagger(batch: TeamBatch, seed: int) -> None:

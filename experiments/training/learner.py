@@ -42,11 +42,8 @@ class Learner:
 
     def __init__(self, settings: TrainingSettings, batch: TeamBatch, card: dict[str, Any]) -> None:
         self.settings, self.card = settings, card
-        self.core = batch.core
         self.first = first_of(settings, batch.core)
-        if self.first is not None:
-            batch.step = FirstPart(batch, self.first)
-        self.env = MctfVecEnv(batch) if settings.net.roles == "shared" else PlacedVecEnv(batch)
+        self._enter(batch)
         ppo = settings.ppo
         self.model = PPO(
             BoatPolicy,
@@ -77,6 +74,18 @@ class Learner:
         for name, parameter in self.model.policy.named_parameters():
             if "policy" in name or name.startswith(("action_net", "log_std")):
                 parameter.register_hook(self._held_back)
+
+    def _enter(self, batch: TeamBatch) -> None:
+        self.core = batch.core
+        if self.first is not None:
+            batch.step = FirstPart(batch, self.first)
+        self.env = MctfVecEnv(batch) if self.settings.net.roles == "shared" else PlacedVecEnv(batch)
+
+    def play_in(self, batch: TeamBatch) -> None:
+        """Go on in the games of another batch, as many as before; `begin` starts them."""
+        self._enter(batch)
+        self.model.set_env(self.env, force_reset=False)
+        self.model._last_episode_starts[:] = True
 
     def _policy(self, batch: TeamBatch) -> dict[str, Any]:
         net = self.settings.net

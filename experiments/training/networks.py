@@ -137,7 +137,9 @@ def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
 
 
 def load_actor(policy: Any, network: Network) -> None:
-    """Put the weights of a network for all boats into a policy's actor of the same shape.
+    """Put the weights of a network for all boats into a policy's actor, whose hidden layers may be wider.
+
+    What is wider adds units that nothing listens to yet, so that the actor does exactly what the network does.
 
     Raises:
         ValueError: of another shape.
@@ -150,10 +152,21 @@ def load_actor(policy: Any, network: Network) -> None:
     if len(layers) != len(given):
         raise ValueError(f"{len(given)} layers, wanted {len(layers)}")
     for key, (weight, bias) in zip(layers, given, strict=True):
-        if values[f"{key}.weight"].shape != weight.T.shape:
-            raise ValueError(f"a layer of shape {weight.T.shape}, wanted {tuple(values[f'{key}.weight'].shape)}")
-        values[f"{key}.weight"].copy_(torch.as_tensor(weight.T))
-        values[f"{key}.bias"].copy_(torch.as_tensor(bias))
+        _put_layer(values[f"{key}.weight"], values[f"{key}.bias"], weight, bias, (key == layers[0], key == layers[-1]))
+
+
+def _put_layer(weight: torch.Tensor, bias: torch.Tensor, given_w: Any, given_b: Any, ends: tuple[bool, bool]) -> None:
+    """Put a layer (in, out) into one (out, in) that is as wide or wider; not wider where it ``ends`` the network.
+
+    Raises:
+        ValueError: it does not fit.
+    """
+    (n_in, n_out), (rows, columns) = given_w.shape, weight.shape
+    if columns < n_in or rows < n_out or (ends[0] and columns > n_in) or (ends[1] and rows > n_out):
+        raise ValueError(f"a layer of shape {given_w.shape}, wanted {(columns, rows)}")
+    weight[:n_out, :n_in].copy_(torch.as_tensor(given_w.T))
+    weight[:n_out, n_in:] = 0.0
+    bias[:n_out].copy_(torch.as_tensor(given_b))
 
 
 def _one_network(network: Network, places: int) -> list[tuple[Any, Any]]:

@@ -44,6 +44,8 @@ class Stage:
             between them. None: as in the rules.
         rewards: weights of reward terms that replace the training's in this stage; what is not named stays.
         shielded: with a shield in training, whether it stands in the games of this stage.
+        rules: settings of the game that replace the training's in this stage, such as slower boats for opponents; what
+            boats see must keep its size and bounds. Evaluations are always by the training's rules.
     """
 
     opponents: tuple[str, ...] = ("medium",)
@@ -54,6 +56,7 @@ class Stage:
     cooldown_s: Span | None = None
     rewards: Mapping[str, float] = field(default_factory=dict)
     shielded: bool = True
+    rules: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
@@ -70,6 +73,8 @@ class Stage:
             number(f"rewards.{name}", weight, -1000.0, 1000.0)
         if not isinstance(self.shielded, bool):
             raise ConfigError(f"shielded is {self.shielded!r}; give true or false")
+        if not isinstance(self.rules, Mapping):
+            raise ConfigError(f"rules is {self.rules!r}; give settings of the game, such as {{max_time_s: 120}}")
 
 
 @dataclass(frozen=True)
@@ -241,22 +246,22 @@ class TrainingSettings:
             raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")
         for name, weight in self.rewards.items():
             number(f"rewards.{name}", weight, -1000.0, 1000.0)
-        self._check_shield()
+        for stage in (None, *(stage for stage in self.stages if stage.rules)):
+            self._check_shield(self.game(stage))
 
-    def game(self) -> GameConfig:
-        """The rules of its games.
+    def game(self, stage: Stage | None = None) -> GameConfig:
+        """The rules of its games, in a stage or in evaluations.
 
         Raises:
             ConfigError: they cannot be.
         """
-        rules: dict[str, Any] = {"default_start": False, **self.rules}
+        rules: dict[str, Any] = {"default_start": False, **self.rules, **(stage.rules if stage else {})}
         if self.platform:
             rules["platforms"] = self.platform
         return GameConfig.preset(self.preset, **rules)
 
-    def _check_shield(self) -> None:
+    def _check_shield(self, game: GameConfig) -> None:
         """Whatever the shield mode: a shield of these settings must fit the game before it is trained for."""
-        game = self.game()
         try:
             check_shield(self.shield_settings, game)
         except ConfigError as error:

@@ -18,7 +18,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
-from .games import Timed, learners_of, set_stage, stagger
+from .games import Timed, check_sight, learners_of, set_stage, stagger
 from .learner import Learner
 from .playing import play_games, summary_of
 from .pool import SELF, Pool
@@ -55,6 +55,7 @@ class Training:
         self._best, self._wall_s = -np.inf, 0.0
         self._recent: deque[float] = deque(maxlen=settings.stages[0].games)
         self._checked_opponents()
+        check_sight(settings)
         self.batch = learners_of(settings, self._pool())
         self.learner = Learner(settings, self.batch, self._card())
         self._time_parts()
@@ -131,10 +132,20 @@ class Training:
         if full or 0 < stage.most <= self.decisions - self.stage_began:
             self.stage, self.stage_began = self.stage + 1, self.decisions
             self._recent = deque(maxlen=self.settings.stages[self.stage].games)
-            self.batch.opponent = self._pool()
+            self._enter_stage()
             if self.batch.opponent.learns:
                 self._add_snapshot()
             self._begin_games(self.decisions)
+
+    def _enter_stage(self) -> None:
+        """Play against a stage's opponents, in games of its own where its rules are others."""
+        stage, pool = self.settings.stages[self.stage], self._pool()
+        if self.settings.game(stage) == self.batch.core.config:
+            self.batch.opponent = pool
+            return
+        self.batch = learners_of(self.settings, pool, stage)
+        self.learner.play_in(self.batch)
+        self._time_parts()
 
     def _league(self) -> None:
         if self.batch.opponent.learns and self.rollouts % self.settings.league.every == 0:
@@ -237,16 +248,15 @@ class Training:
         self._best = -np.inf if facts["best"] is None else facts["best"]
         self._wall_s = facts["wall_s"]
         self._recent = deque(facts["recent"], maxlen=self.settings.stages[self.stage].games)
+        self._enter_stage()
         self._set_stage()
-        pool = self._pool()
+        pool = self.batch.opponent
         pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
         for name in facts["pool"]["members"]:
             if name not in pool.members:
                 number = int(name.removeprefix(f"{SELF}_"))
                 pool.add_snapshot(read_weights(self.folder / SNAPSHOTS / f"{name}.npz"), number)
-        self.batch.opponent = pool
-        pool.reset(self.batch.core, 1 - self.batch.team, facts["seed"])
-        self.batch._seed = facts["seed"]
+        self.batch.reset(facts["seed"])
         put_pool(pool, facts["pool"])
         self.learner.put(arrays)
         put_arrays(self.batch, arrays)

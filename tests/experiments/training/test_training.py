@@ -99,6 +99,29 @@ def test_a_stage_may_have_rewards_of_its_own_and_no_shield_and_resumes_bit_for_b
     assert (min(shield_s) == 0.0, shield_s[-1] > 0.0) == (True, True)
 
 
+def test_a_stage_may_have_rules_of_its_own_and_resumes_bit_for_bit(tiny, tmp_path):
+    alone = {"opponents": ["medium"], "games": 2, "net": -5, "rules": {"catch_radius_m": 5.0, "max_time_s": 9.0}}
+    config = tiny(stages=[alone, {"opponents": ["medium"]}], shield="training", shield_every=5)
+    reference = Training(read_config(config), tmp_path / "whole")
+    assert (reference.batch.core.config.catch_radius_m, reference.batch.core.config.max_time_s) == (5.0, 9.0)
+    reference.run()
+    assert (reference.batch.core.config.catch_radius_m, reference.batch.core.config.max_time_s) == (10.0, 6.0)
+    assert {row["stage"] for row in reference.curve} == {0, 1}
+    for stop in (36, 108):
+        with pytest.raises(KeyboardInterrupt):
+            Training(read_config(config), tmp_path / "half", resume=True).run(stop_at(stop))
+    again = trained(config, tmp_path / "half", resume=True)
+    assert without_time(again.curve) == without_time(reference.curve)
+    assert changes_of(again.learner.network(), reference.learner.network()) == 0.0
+
+
+@pytest.mark.parametrize("rules", [{"team_size": 2}, {"env_bounds_m": [60.0, 40.0]}, {"platforms": "surveyor"}])
+def test_rules_of_a_stage_by_which_boats_see_otherwise_are_refused(tiny, tmp_path, rules):
+    config = tiny(stages=[{"opponents": ["hold"], "games": 2}, {"opponents": ["hold"], "rules": rules}])
+    with pytest.raises(ConfigError, match="change what boats see"):
+        Training(read_config(config), tmp_path / "run")
+
+
 def test_a_resumed_training_knows_how_long_the_opponents_of_each_game_wait(tiny, tmp_path):
     config = tiny(stages=[{"opponents": ["medium"], "cooldown_s": [10, 40]}])
     begun = Training(read_config(config), tmp_path / "run")
@@ -287,6 +310,27 @@ def test_a_network_told_its_place_plays_as_it_learned_and_begins_another_trainin
     assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
     again = Training(read_config(tiny(net=net, start=str(tmp_path / "placed" / "final.npz"))), tmp_path / "again")
     assert np.abs(again.learner.network().outputs(seen, roles) - ours).max() < 1e-5
+
+
+@pytest.mark.parametrize("roles", ["shared", "placed"])
+def test_a_wider_network_begins_exactly_as_the_one_it_starts_with_and_then_learns_with_all_of_it(tiny, tmp_path, roles):
+    trained(tiny(net={"hidden": [16, 8], "roles": roles}, decisions=36), tmp_path / "narrow")
+    path = tmp_path / "narrow" / "final.npz"
+    narrow = read_weights(path)
+    wide = Training(read_config(tiny(net={"hidden": [24, 20], "roles": roles}, start=str(path))), tmp_path / "wide")
+    seen = np.random.default_rng(0).uniform(-1, 1, (300, narrow.n_obs)).astype(np.float32)
+    before = wide.learner.network()
+    assert before.weights[1].shape[1:] == (24, 20)
+    np.testing.assert_allclose(
+        before.outputs(seen, np.arange(300) % 3), narrow.outputs(seen, np.arange(300) % 3), atol=1e-5
+    )
+    wide.run()
+    after = wide.learner.network()
+    assert (after.weights[1][:, 16:, :8] != 0.0).all()
+    assert (after.weights[2][:, 8:] != 0.0).all()
+    again = tiny(net={"hidden": [16, 8], "roles": roles}, start=str(tmp_path / "wide" / "final.npz"))
+    with pytest.raises(ConfigError, match="does not fit this network: a layer of shape"):
+        Training(read_config(again), tmp_path / "again")
 
 
 @pytest.mark.study
