@@ -10,7 +10,7 @@ where the program asks). `filter.rows` makes of `boats` and `static` the slopes 
     static            the worst of all that stays, and of registered barriers, over a path: each is a number
                       (`constraints`) with a margin and slope by place of its own
     circles, walls    which stop a boat; circles are also kept by rule
-    edge              the field's
+    edge              a side of the field
     registered        other people's, see `register_barrier`
     way_back          what paths are worth to a boat that is beyond one of these
 """

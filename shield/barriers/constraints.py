@@ -1,7 +1,7 @@
 """Static constraints and registered barriers by number, each a margin and a slope by place and time.
 
 First come those that stop a boat: circles, walls, registered barriers; then those kept by rule: keep-out circles, and
-the edge of the field.
+the sides of the field.
 """
 
 from __future__ import annotations
@@ -9,9 +9,12 @@ from __future__ import annotations
 from ..jit import lean_kernel
 from ..scene import Registered, Static
 from .circles import to_circle
-from .edge import to_edge
+from .edge import to_side
 from .registered import margin_of
 from .walls import to_wall
+
+SIDES = 4
+"""Sides of a field: the last numbers."""
 
 
 @lean_kernel
@@ -29,7 +32,7 @@ def count_obstacles(static: Static, registered: Registered) -> int:
 @lean_kernel
 def count_all(static: Static, registered: Registered) -> int:
     """How many there are."""
-    return count_obstacles(static, registered) + static.keep_out.shape[0] + 1
+    return count_obstacles(static, registered) + static.keep_out.shape[0] + SIDES
 
 
 @lean_kernel
@@ -64,4 +67,4 @@ def margin_at(
     rule = o - count_obstacles(static, registered)
     if rule < static.keep_out.shape[0]:
         return to_circle(x, y, static.keep_out[rule])
-    return to_edge(x, y, static.field)
+    return to_side(x, y, rule - static.keep_out.shape[0], static.field)

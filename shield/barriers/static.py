@@ -23,7 +23,7 @@ from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Registered, Scene, Static
 from .clearance import FAR, MARGIN, lower
-from .constraints import count_all, count_obstacles, margin_at, registered_number, wall_number
+from .constraints import SIDES, count_all, count_obstacles, margin_at, registered_number, wall_number
 from .registered import LOST_M
 from .walls import goes_through
 from .way_back import PARTS, RETURN_S, straight_on, worth_of_way_back
@@ -155,10 +155,11 @@ def clear_of_constraints(
 ) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
-    The field's edge is looked at only until a half turn could be over, since every straight run ends beyond. A
-    boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told, less what
-    it would break of the rest, which else counted for nothing beside how far the boat is beyond. Paths say nothing of a
-    barrier of which nothing is known where the boat is, see `registered.unknown_at`.
+    The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
+    boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told. Of a
+    keep-out circle that is less what the path would break of the rest, which else counted for nothing beside how deep
+    the boat is in it. Paths say nothing of a barrier of which nothing is known where the boat is, see
+    `registered.unknown_at`.
 
     Returns:
         What the least is from: `STATIC`, or below it the barrier, see `about`.
@@ -175,15 +176,16 @@ def clear_of_constraints(
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only or o == total - 1 else sampling.last
+        last = sampling.near if near_only or o >= total - SIDES else sampling.last
         if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
     if beyond >= 0:
-        broken_m = min(0.0, out[MARGIN])
-        _, nx, ny = margin_at(beyond, here[0], here[1], 0.0, static, registered)
-        out[MARGIN] = FAR
-        lower(out, broken_m + back_m, sampling.last, nx, ny)
-        binds = -1
+        if beyond < total - SIDES:
+            back_m += min(0.0, out[MARGIN])
+        if back_m < out[MARGIN]:
+            _, nx, ny = margin_at(beyond, here[0], here[1], 0.0, static, registered)
+            lower(out, back_m, sampling.last, nx, ny)
+            binds = -1
     return about(binds)
 
 
