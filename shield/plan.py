@@ -20,8 +20,8 @@ class Plan(NamedTuple):
 
     ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
     ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
-    of, as in ``Work.bound``, -1 for nothing. ``eased`` holds of each backup the turn, deg, the speed, m/s, and the
-    worth, m, see `easing`. ``screened`` are the commands that screening looked at: wanted ones, but for boats that
+    of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of each boat the turn of this
+    step, deg, the command, and the rank, see `easing.note_verified`. ``screened`` are the commands that screening looked at: wanted ones, but for boats that
     hold or give way.
     """
 
@@ -30,7 +30,7 @@ class Plan(NamedTuple):
     wanted_turn: Array
     held: Array
     cause: IntArray
-    eased: Array
+    verified: Array
     movers: IntArray
     place: IntArray
     moving: BoolArray
@@ -54,7 +54,7 @@ def new_plan(boats: int, rows: int) -> Plan:
             wanted_turn=np.zeros(boats),
             held=np.zeros((boats, 3)),
             cause=np.full(boats, -1, np.int64),
-            eased=np.zeros((boats, 3)),
+            verified=np.zeros((boats, 5)),
             movers=np.zeros(boats, np.int64),
             place=np.full(boats, -1, np.int64),
             moving=np.zeros(boats, np.bool_),

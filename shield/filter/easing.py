@@ -7,7 +7,7 @@ the program, which are linear, then find no answer, and a boat that wants throug
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..backup.rank import ALL, SAME_M, all_keep
+from ..backup.rank import ALL, Rank, better, rank_of
 from ..jit import lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -20,6 +20,31 @@ from .screening import set_targets
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
 
+TURN, SPEED, HEADING, KEPT, WORTH = range(5)
+"""Columns of ``Plan.verified``."""
+
+
+@lean_kernel
+def note_verified(scene: Scene) -> None:
+    """Note the commands that have just been checked, and the ranks of the backups after them."""
+    state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
+    for i in range(ours.shape[0]):
+        if ours[i]:
+            plan.verified[i, TURN] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
+            plan.verified[i, SPEED], plan.verified[i, HEADING] = plan.commands[i, 0], plan.commands[i, 1]
+            plan.verified[i, KEPT], plan.verified[i, WORTH] = work.kept[i], work.worth_m[i]
+
+
+@lean_kernel
+def no_worse(scene: Scene) -> bool:
+    """Whether no boat of ours has less than after the commands noted."""
+    ours, work, noted = scene.ours, scene.work, scene.plan.verified
+    worse = False
+    for i in range(ours.shape[0]):
+        if ours[i]:
+            worse = worse or better(Rank(int(noted[i, KEPT]), noted[i, WORTH]), rank_of(i, work))
+    return not worse
+
 
 @lean_kernel
 def _mildest_turn(i: int, plan: Plan) -> float:
@@ -27,7 +52,7 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 
     As much against it as is allowed in this step would have to be taken back in the next.
     """
-    wanted, backup = plan.wanted_turn[i], plan.eased[i, 0]
+    wanted, backup = plan.wanted_turn[i], plan.verified[i, TURN]
     if wanted * backup <= 0.0:
         return 0.0
     return wanted if abs(wanted) < abs(backup) else backup
@@ -35,36 +60,26 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 
 @lean_kernel
 def _go_back(share: float, i: int, scene: Scene) -> None:
-    """Command of boat i that share of the way back from its backup, ``plan.eased``."""
+    """Command of boat i that share of the way back from its backup."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
-    turn = plan.eased[i, 0] + share * (_mildest_turn(i, plan) - plan.eased[i, 0])
-    speed = plan.eased[i, 1] + share * (plan.screened[i, 0] - plan.eased[i, 1])
+    backup = plan.verified[i]
+    turn = backup[TURN] + share * (_mildest_turn(i, plan) - backup[TURN])
+    speed = backup[SPEED] + share * (plan.screened[i, 0] - backup[SPEED])
     speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
     plan.commands[i, 0] = speed
     plan.commands[i, 1] = command_for_turn(boats.params[i], state[i], speed, turn, tuning.dt_s)
 
 
 @lean_kernel
-def _no_worse(scene: Scene) -> bool:
-    """Whether no boat of ours has less than with all backups."""
-    ours, work, plan = scene.ours, scene.work, scene.plan
-    worse = not all_keep(ALL, ours, work)
-    for i in range(ours.shape[0]):
-        worse = worse or (ours[i] and not work.worth_m[i] >= plan.eased[i, 2] - SAME_M)
-    return not worse
-
-
-@lean_kernel
 def _ease_one(i: int, count: int, scene: Scene) -> None:
     """Bring boat i's command as near to the wanted one as is no worse for any boat of ours."""
     plan = scene.plan
-    speed, heading = plan.commands[i, 0], plan.commands[i, 1]
     kept, too_far, at = 0.0, 2.0, 0.0
     for _ in range(TRIALS):
         at = 0.5 * (kept + too_far)
         _go_back(at, i, scene)
         check(count, scene)
-        if _no_worse(scene):
+        if no_worse(scene):
             kept = at
         else:
             too_far = at
@@ -74,29 +89,26 @@ def _ease_one(i: int, count: int, scene: Scene) -> None:
         return
     _go_back(kept, i, scene)
     if kept == 0.0:
-        plan.commands[i, 0], plan.commands[i, 1] = speed, heading
+        plan.commands[i, 0], plan.commands[i, 1] = plan.verified[i, SPEED], plan.verified[i, HEADING]
     check(count, scene)
 
 
 @lean_kernel
 def ease(count: int, scene: Scene) -> None:
-    """Take back of the movers' backups, boat by boat, what is not needed to keep what they keep.
+    """Take back of backups, boat by boat, what is not needed to keep what they keep.
 
-    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
-    keep them are carried out as they are. Of static constraints only their distance is asked for.
+    Of boats that static constraints alone are in the way of, or nothing but their team-mates' backups. Margins from
+    boats are those that have to be kept, as when the wanted commands were screened; of static constraints only their
+    distance is asked for.
     """
-    state, ours, tuning, work, plan = scene.state, scene.ours, scene.tuning, scene.work, scene.plan
+    tuning, work, plan = scene.tuning, scene.work, scene.plan
     set_targets(scene)
     work.static_target_m[:] = 0.0
     check(count, scene)
-    if not all_keep(ALL, ours, work):
-        return
-    for i in range(ours.shape[0]):
-        plan.eased[i, 2] = work.worth_m[i]
+    note_verified(scene)
     for m in range(count):
         if all_spent(tuning, work):
             return
         i = plan.movers[m]
-        plan.eased[i, 0] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
-        plan.eased[i, 1] = plan.commands[i, 0]
-        _ease_one(i, count, scene)
+        if plan.cause[i] < 0 and int(plan.verified[i, KEPT]) == ALL:
+            _ease_one(i, count, scene)

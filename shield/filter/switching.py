@@ -18,7 +18,7 @@ from ..backup.assign import assign_plans
 from ..backup.candidates import IN_MEMORY, candidate, remembered
 from ..backup.effort import all_spent
 from ..backup.laying import lay_path
-from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_of, rank_path
+from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, rank_of, rank_path
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
@@ -46,15 +46,6 @@ def among_mates(ours: BoolArray, plan: Plan) -> bool:
             mates = mates or ours[plan.cause[i]]
             opponents = opponents or not ours[plan.cause[i]]
     return mates and not opponents
-
-
-@lean_kernel
-def _alone(ours: BoolArray, plan: Plan) -> bool:
-    """Whether static constraints are all that any boat's wanted command is short of."""
-    found = True
-    for i in range(ours.shape[0]):
-        found = found and plan.cause[i] < 0
-    return found
 
 
 @lean_kernel
@@ -194,6 +185,15 @@ def _find_backups(count: int, scene: Scene) -> int:
 
 
 @lean_kernel
+def _some_eased(count: int, plan: Plan) -> bool:
+    """Whether boats are in the way of none of some mover's wanted command."""
+    found = False
+    for m in range(count):
+        found = found or plan.cause[plan.movers[m]] < 0
+    return found
+
+
+@lean_kernel
 def back_up(count: int, scene: Scene) -> None:
     """Send the backups where neither the wanted commands nor an answer of the program keeps everything.
 
@@ -207,5 +207,5 @@ def back_up(count: int, scene: Scene) -> None:
         if ours[i] and (plan.moving[i] or not keeps):
             plan.reason[i] = BACKUP if keeps else BEST_EFFORT
             plan.slack_m[i] = _given_up(i, scene)
-    if _alone(ours, plan) and all_keep(ALL, ours, work) and not all_spent(tuning, work):
+    if _some_eased(count, plan) and not all_spent(tuning, work):
         ease(count, scene)
