@@ -13,7 +13,8 @@ from .barriers.boats import reported_margin
 from .barriers.foreseen import note_foreseen
 from .barriers.static import STATIC
 from .config import ShieldConfig
-from .filter.flow import PASSES, ROUNDS, TO_SOLVE, accept, begin, decide_scene, finish, linearise
+from .filter.flow import PASSES, begin, decide_scene, finish
+from .filter.least_change import ROUNDS, accept, linearise
 from .filter.program import Program, Solver
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .memory import Memory, new_memory, put_memory, take_memory
@@ -248,12 +249,11 @@ class Deciders:
 
 def _decide_with(solver: Solver, scene: Scene) -> None:
     """`decide_scene` with another solver of its programs."""
-    todo, safe, count, plan = begin(scene), False, 0, scene.plan
-    if todo == PASSES:
+    count, safe, plan = begin(scene), False, scene.plan
+    if count == PASSES:
         return
-    for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-        count, rows = linearise(scene)
-        n = 2 * count
+    for _ in range(ROUNDS if count > 0 else 0):
+        rows, n = linearise(count, scene), 2 * count
         z = solver(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n])) if rows >= 0 else None
         if z is None:
             break

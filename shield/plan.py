@@ -20,9 +20,10 @@ class Plan(NamedTuple):
 
     ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
     ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
-    of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of each boat the turn of this
-    step, deg, the command, and the rank, see `easing.note_verified`. ``screened`` are the commands that screening looked at: wanted ones, but for boats that
-    hold or give way.
+    of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of each
+    boat the turn of this step, deg, the command, and the rank, see `filter.verified`. ``screened`` are the commands
+    that screening looked at, wanted ones but for boats that hold or give way, and ``screened_reason`` is ``reason`` as
+    it left it.
     """
 
     commands: Array
@@ -43,6 +44,7 @@ class Plan(NamedTuple):
     label: IntArray
     slack_m: Array
     reason: IntArray
+    screened_reason: IntArray
 
 
 def new_plan(boats: int, rows: int) -> Plan:
@@ -67,6 +69,7 @@ def new_plan(boats: int, rows: int) -> Plan:
             label=np.zeros((rows, 2), np.int64),
             slack_m=np.zeros(boats),
             reason=np.zeros(boats, np.int64),
+            screened_reason=np.zeros(boats, np.int64),
         )
     )
 

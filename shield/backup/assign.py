@@ -105,17 +105,34 @@ def hold(i: int, held: Array, work: Work) -> None:
 
 
 @lean_kernel
-def recheck(scene: Scene) -> bool:
-    """Whether all boats of ours keep clear when movers carry out ``plan.held`` from newly predicted states."""
-    ours, work, plan = scene.ours, scene.work, scene.plan
+def _go_on(i: int, scene: Scene) -> None:
+    """Lay the path of boat i on the manoeuvre in ``plan.held`` from its predicted state."""
+    held = scene.plan.held
+    togo = found_turn(i, scene.work.next_state[i, L.HEADING], held)
+    lay_path(i, i, held[i, 0], togo, held[i, 2], 1, scene)
+
+
+@lean_kernel
+def recheck(scene: Scene) -> None:
+    """Rate all boats of ours when movers carry out ``plan.held`` from newly predicted states."""
+    ours, plan = scene.ours, scene.plan
     for i in range(ours.shape[0]):
         if plan.moving[i]:
-            togo = found_turn(i, work.next_state[i, L.HEADING], plan.held)
-            lay_path(i, i, plan.held[i, 0], togo, plan.held[i, 2], 1, scene)
+            _go_on(i, scene)
     for i in range(ours.shape[0]):
         if ours[i]:
             refresh(i, scene)
-    return all_keep(ALL, ours, work)
+
+
+@lean_kernel
+def recheck_one(i: int, scene: Scene) -> None:
+    """The same where nothing but the predicted state of boat i has changed since: it, and whom it may meet."""
+    ours, work = scene.ours, scene.work
+    _go_on(i, scene)
+    refresh(i, scene)
+    for j in range(ours.shape[0]):
+        if ours[j] and work.near[i, j]:
+            refresh(j, scene)
 
 
 @lean_kernel

@@ -1,4 +1,4 @@
-"""Between a backup and the wanted commands: no more of the backup than static constraints ask for.
+"""Between a backup and the wanted commands: no more of the backup than it takes.
 
 Along an edge or a wall what is left of the distance to it falls with the square of the angle towards it. The rows of
 the program, which are linear, then find no answer, and a boat that wants through would steer full rudder out and in.
@@ -7,43 +7,18 @@ the program, which are linear, then find no answer, and a boat that wants throug
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..backup.rank import ALL, Rank, better, rank_of
+from ..backup.rank import ALL
 from ..jit import lean_kernel
-from ..plan import Plan
+from ..plan import BACKUP, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
-from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .linearised import check
+from .linearised import check, check_one, list_movers
 from .screening import set_targets
+from .verified import KEPT, SPEED, TURN, costs_nothing, go_back, note_verified
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
-
-TURN, SPEED, HEADING, KEPT, WORTH = range(5)
-"""Columns of ``Plan.verified``."""
-
-
-@lean_kernel
-def note_verified(scene: Scene) -> None:
-    """Note the commands that have just been checked, and the ranks of the backups after them."""
-    state, ours, work, plan = scene.state, scene.ours, scene.work, scene.plan
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            plan.verified[i, TURN] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
-            plan.verified[i, SPEED], plan.verified[i, HEADING] = plan.commands[i, 0], plan.commands[i, 1]
-            plan.verified[i, KEPT], plan.verified[i, WORTH] = work.kept[i], work.worth_m[i]
-
-
-@lean_kernel
-def no_worse(scene: Scene) -> bool:
-    """Whether no boat of ours has less than after the commands noted."""
-    ours, work, noted = scene.ours, scene.work, scene.plan.verified
-    worse = False
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            worse = worse or better(Rank(int(noted[i, KEPT]), noted[i, WORTH]), rank_of(i, work))
-    return not worse
 
 
 @lean_kernel
@@ -59,8 +34,8 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 
 
 @lean_kernel
-def _go_back(share: float, i: int, scene: Scene) -> None:
-    """Command of boat i that share of the way back from its backup."""
+def _give_back(share: float, i: int, scene: Scene) -> None:
+    """Command of boat i that share of the way from its backup to the wanted one."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     backup = plan.verified[i]
     turn = backup[TURN] + share * (_mildest_turn(i, plan) - backup[TURN])
@@ -71,15 +46,14 @@ def _go_back(share: float, i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _ease_one(i: int, count: int, scene: Scene) -> None:
-    """Bring boat i's command as near to the wanted one as is no worse for any boat of ours."""
-    plan = scene.plan
+def _ease_one(i: int, scene: Scene) -> None:
+    """Bring boat i's command as near to the wanted one as costs no boat of ours anything."""
     kept, too_far, at = 0.0, 2.0, 0.0
     for _ in range(TRIALS):
         at = 0.5 * (kept + too_far)
-        _go_back(at, i, scene)
-        check(count, scene)
-        if no_worse(scene):
+        _give_back(at, i, scene)
+        check_one(i, scene)
+        if costs_nothing(scene):
             kept = at
         else:
             too_far = at
@@ -87,21 +61,39 @@ def _ease_one(i: int, count: int, scene: Scene) -> None:
             return
     if at == kept:
         return
-    _go_back(kept, i, scene)
+    _give_back(kept, i, scene)
     if kept == 0.0:
-        plan.commands[i, 0], plan.commands[i, 1] = plan.verified[i, SPEED], plan.verified[i, HEADING]
-    check(count, scene)
+        go_back(i, scene)
+    check_one(i, scene)
 
 
 @lean_kernel
-def ease(count: int, scene: Scene) -> None:
+def _may_be_eased(i: int, scene: Scene) -> bool:
+    """Whether boat i backs up before no opponent: of these too little is known, see `switching`."""
+    cause, reason = scene.plan.cause[i], scene.plan.reason[i]
+    return reason == BACKUP and (cause < 0 or scene.ours[cause])
+
+
+@lean_kernel
+def _list_eased(scene: Scene) -> int:
+    """Make movers of the boats whose backups may be eased; returns how many they are."""
+    plan = scene.plan
+    for i in range(scene.ours.shape[0]):
+        plan.moving[i] = _may_be_eased(i, scene)
+    return list_movers(plan)
+
+
+@lean_kernel
+def ease(scene: Scene) -> None:
     """Take back of backups, boat by boat, what is not needed to keep what they keep.
 
-    Of boats that static constraints alone are in the way of, or nothing but their team-mates' backups. Margins from
-    boats are those that have to be kept, as when the wanted commands were screened; of static constraints only their
-    distance is asked for.
+    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
+    keep them are carried out as they are. Of static constraints only their distance is asked for.
     """
     tuning, work, plan = scene.tuning, scene.work, scene.plan
+    count = _list_eased(scene)
+    if count == 0 or all_spent(tuning, work):
+        return
     set_targets(scene)
     work.static_target_m[:] = 0.0
     check(count, scene)
@@ -110,5 +102,5 @@ def ease(count: int, scene: Scene) -> None:
         if all_spent(tuning, work):
             return
         i = plan.movers[m]
-        if plan.cause[i] < 0 and int(plan.verified[i, KEPT]) == ALL:
-            _ease_one(i, count, scene)
+        if int(plan.verified[i, KEPT]) == ALL:
+            _ease_one(i, scene)

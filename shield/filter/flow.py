@@ -1,4 +1,4 @@
-"""One decision, in compiled stages: screen, build rows, check an answer, back up, commit.
+"""One decision, in compiled stages: screen, back up, solve for a least change, ease, commit.
 
 `decide_scene` chains them, with the compiled projection between. With a QP backend `deciders.Deciders` calls the same
 stages.
@@ -11,29 +11,27 @@ import math
 import numpy as np
 
 from ..backup.assign import hold
-from ..backup.effort import all_spent
 from ..backup.rank import ALL, OBSTACLES, OPPONENTS
 from ..barriers.clearance import MARGIN
 from ..barriers.registered import unknown_at
 from ..barriers.static import STATIC, about
-from ..jit import Array, copy_row, lean_kernel
+from ..jit import copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
-from ..plan import BACKUP, BEST_EFFORT, HELD, QP, unchanged
+from ..plan import BACKUP, BEST_EFFORT, HELD, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .linearised import build, check, pick_movers, solve_compiled, take_answer
+from .easing import ease
+from .least_change import ROUNDS, accept, begin_program, end_program, linearise
+from .linearised import solve_compiled
 from .screening import screen
-from .switching import among_mates, back_up, mark_answer
+from .switching import back_up
 
-PASSES, TO_SOLVE, TO_BACK_UP = range(3)
-"""What is left to do once the wanted commands are screened: nothing, the program, or the backups at once."""
+PASSES = -1
+"""Nothing is left to do once the wanted commands are screened."""
 
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
-
-ROUNDS = 2
-"""Times the program is linearised and solved anew before the backups take over."""
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
@@ -115,62 +113,43 @@ def _name_static(scene: Scene) -> None:
 
 @lean_kernel
 def finish(scene: Scene, safe: bool, count: int) -> None:
-    """Name the reasons of a checked answer, or send the backups without one; then remember the backups."""
-    if safe:
-        mark_answer(count, QP, scene.plan)
-    else:
-        count = pick_movers(scene)
-        back_up(count, scene)
+    """End the program of so many boats, ease the other backups; then remember all."""
+    end_program(scene, safe, count)
+    ease(scene)
     _name_static(scene)
     commit(scene)
 
 
 @lean_kernel
 def after_screening(scene: Scene) -> int:
-    """Note what wanted commands are short of and the manoeuvres found for them; returns `TO_SOLVE` or `TO_BACK_UP`."""
+    """Back up, and set up the program; returns how many boats take part in that."""
     _note_causes(scene)
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
             hold(i, scene.plan.held, scene.work)
-    return TO_SOLVE if among_mates(scene.ours, scene.plan) else TO_BACK_UP
+    back_up(scene)
+    return begin_program(scene)
 
 
 @lean_kernel
 def begin(scene: Scene) -> int:
-    """Screen the wanted commands, and finish where they pass; returns `PASSES`, `TO_SOLVE` or `TO_BACK_UP`."""
+    """Screen the wanted commands, and finish where they pass; returns how many boats a program is to be solved for."""
     if screen(scene):
         scene.plan.cause[:] = -1
-        finish(scene, True, 0)
+        _name_static(scene)
+        commit(scene)
         return PASSES
     return after_screening(scene)
 
 
 @lean_kernel
-def linearise(scene: Scene) -> tuple[int, int]:
-    """Rows about the candidate commands: how many boats take part, and how many rows.
-
-    -1 when there are too many, or the decision has cost its limit.
-    """
-    if all_spent(scene.tuning, scene.work):
-        return 0, -1
-    count = pick_movers(scene)
-    return count, build(count, scene)
-
-
-@lean_kernel
-def accept(scene: Scene, z: Array, count: int) -> bool:
-    """Take an answer of the program; whether it passes the exact check."""
-    return take_answer(z, count, scene) and check(count, scene)
-
-
-@lean_kernel
 def decide_scene(scene: Scene) -> None:
     """The whole decision; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
-    todo, safe, count = begin(scene), False, 0
-    if todo == PASSES:
+    count, safe = begin(scene), False
+    if count == PASSES:
         return
-    for _ in range(ROUNDS if todo == TO_SOLVE else 0):
-        count, rows = linearise(scene)
+    for _ in range(ROUNDS if count > 0 else 0):
+        rows = linearise(count, scene)
         if rows < 0 or not solve_compiled(count, rows, scene.plan):
             break
         safe = accept(scene, scene.plan.z, count)

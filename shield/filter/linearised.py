@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..backup.assign import recheck
+from ..backup.assign import recheck, recheck_one
 from ..backup.effort import ROW_COST
 from ..backup.rank import ALL
 from ..jit import Array, copy_row, lean_kernel
@@ -93,9 +93,16 @@ def take_answer(z: Array, count: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def check(count: int, scene: Scene) -> bool:
-    """Exact re-check of candidate commands: full model one step on, then the backups the rows were about."""
+def check(count: int, scene: Scene) -> None:
+    """Exact check of candidate commands: full model one step on, then what is kept by the backups rows were about."""
     plan = scene.plan
     for m in range(count):
         predict(plan.movers[m], plan.commands, scene)
-    return recheck(scene)
+    recheck(scene)
+
+
+@lean_kernel
+def check_one(i: int, scene: Scene) -> None:
+    """The same where nothing but the command of boat i has changed since."""
+    predict(i, scene.plan.commands, scene)
+    recheck_one(i, scene)

@@ -7,7 +7,8 @@ boat's path from its next position to there,
 
     dh/dpsi = n . (r_y, -r_x)   (psi clockwise),     dh/dv = n . r / v,
 
-and the row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command:
+and the row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command, where the target
+is what the class-K rate asks for, or what the backups keep if that is more:
 
     h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') >= target,
 
@@ -29,12 +30,10 @@ from ..platforms.actuator import full_turn
 from ..platforms.step import step_boat
 from ..scene import Scene, Tuning
 from ..work import Work
-
-AIM_M = 0.02
-"""Rows aim this much beyond the target so that the exact check after the solve does not fail by rounding."""
+from .verified import WORTH
 
 STATIC_AIM_M = 1e-3
-"""The same of static constraints: a boat along an edge is not to be sent away from it for more."""
+"""Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
 
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
@@ -122,16 +121,24 @@ def inputs_of(count: int, scene: Scene) -> None:
 
 
 @lean_kernel
+def _backups_keep(i: int, j: int, scene: Scene) -> float:
+    """Margin, m, that the backups of boats i and j keep from each other, or boat i's from all if j is not ours."""
+    ours, work, verified = scene.ours, scene.work, scene.plan.verified
+    kept_m = max(must_keep(i, j, ours, work), verified[i, WORTH])
+    return max(kept_m, verified[j, WORTH]) if ours[j] else kept_m
+
+
+@lean_kernel
 def _pair_row(r: int, m: int, j: int, count: int, scene: Scene) -> bool:
     """Row of mover m against boat j; False when neither input has any effect on it."""
-    ours, work, plan = scene.ours, scene.work, scene.plan
+    work, plan = scene.work, scene.plan
     i = plan.movers[m]
     clear_of_boat(i, j, work.path[i], scene, -FAR, FAR)
     plan.C[r, :] = 0.0
     _add_effect(r, i, m, 1.0, work, plan)
     if plan.place[j] >= 0:
         _add_effect(r, j, plan.place[j], -1.0, work, plan)
-    return _close_row(r, count, must_keep(i, j, ours, work) + AIM_M - work.out[MARGIN], scene.tuning, plan)
+    return _close_row(r, count, _backups_keep(i, j, scene) - work.out[MARGIN], scene.tuning, plan)
 
 
 @lean_kernel

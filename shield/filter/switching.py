@@ -1,9 +1,13 @@
-"""What is sent when the wanted commands do not keep everything, and no answer of the program does: the backups.
+"""Where the wanted commands do not keep everything: the backups, a joint plan for all boats of ours.
 
 A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
-everything from the state one step after it. When neither the wanted commands nor a least change of them have one, the
-plan of the last decision is gone on with, or a better one. So a verified plan, once there, is there at every step,
-unless an opponent does what none was asked to keep clear of.
+everything from the state one step after it. When the wanted commands have none, the plan of the last decision is gone
+on with, or a better one. So a verified plan, once there, is there at every step, unless an opponent does what none was
+asked to keep clear of.
+
+Before opponents backups are carried out in full: of those who do not decide with us too little is known. One that is
+only just kept off is so again in the next step, and a boat that gives way as little as it may in each gives way for
+longer. Of other backups as little is carried out as will do, see `least_change` and `easing`.
 
 That is the switching of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
 """
@@ -23,38 +27,12 @@ from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
-from ..jit import BoolArray, lean_kernel
-from ..plan import BACKUP, BEST_EFFORT, Plan, unchanged
+from ..jit import lean_kernel
+from ..plan import BACKUP, BEST_EFFORT
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..scene import Scene
-from .easing import ease
-from .linearised import check, list_movers
-
-
-@lean_kernel
-def among_mates(ours: BoolArray, plan: Plan) -> bool:
-    """Whether team-mates are among what wanted commands are short of, and no opponents.
-
-    Least changes are for those who decide with us. An opponent that is only just kept off is so again in the next
-    step, and a boat that gives way as little as it may in each gives way for longer. Of static constraints linear rows
-    say too little, see `easing`.
-    """
-    mates, opponents = False, False
-    for i in range(ours.shape[0]):
-        if plan.cause[i] >= 0:
-            mates = mates or ours[plan.cause[i]]
-            opponents = opponents or not ours[plan.cause[i]]
-    return mates and not opponents
-
-
-@lean_kernel
-def mark_answer(count: int, reason: int, plan: Plan) -> None:
-    """Give the reason to the movers whose command changed."""
-    for m in range(count):
-        i = plan.movers[m]
-        if not unchanged(i, plan):
-            plan.reason[i] = reason
+from .linearised import check, list_movers, pick_movers
 
 
 @lean_kernel
@@ -162,8 +140,8 @@ def _assign_backups(count: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def _find_backups(count: int, scene: Scene) -> int:
-    """Make the candidate of all movers' backups and check it; returns how many movers there are.
+def _find_backups(count: int, scene: Scene) -> None:
+    """Make the candidate of all movers' backups and check it.
 
     All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
     fit what boats have whose wanted commands passed: where these are in the way, or are themselves too near them, they
@@ -181,31 +159,19 @@ def _find_backups(count: int, scene: Scene) -> int:
     for m in range(count):
         set_off(plan.movers[m], scene)
     check(count, scene)
-    return count
 
 
 @lean_kernel
-def _some_eased(count: int, plan: Plan) -> bool:
-    """Whether boats are in the way of none of some mover's wanted command."""
-    found = False
-    for m in range(count):
-        found = found or plan.cause[plan.movers[m]] < 0
-    return found
+def back_up(scene: Scene) -> None:
+    """Make backups the commands of the boats that are short of something, and of those in whose way these are.
 
-
-@lean_kernel
-def back_up(count: int, scene: Scene) -> None:
-    """Send the backups where neither the wanted commands nor an answer of the program keeps everything.
-
-    Where static constraints are all that is in the way, as little of them as keeps off these. The reason is BACKUP, of
-    boats that are short of something all the same BEST_EFFORT: avoidance does not switch itself off.
+    The reason is BACKUP, of boats that are short of something all the same BEST_EFFORT: avoidance does not switch
+    itself off.
     """
-    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
-    count = _find_backups(count, scene)
+    ours, work, plan = scene.ours, scene.work, scene.plan
+    _find_backups(pick_movers(scene), scene)
     for i in range(ours.shape[0]):
         keeps = work.kept[i] >= OPPONENTS
         if ours[i] and (plan.moving[i] or not keeps):
             plan.reason[i] = BACKUP if keeps else BEST_EFFORT
             plan.slack_m[i] = _given_up(i, scene)
-    if _some_eased(count, plan) and not all_spent(tuning, work):
-        ease(count, scene)

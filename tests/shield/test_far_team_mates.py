@@ -92,5 +92,6 @@ def test_boats_do_what_they_do_alone_whatever_befalls_team_mates_far_away(subjec
     away = {"outside": outside, "chased": pressing, "meeting": meeting, "pressing": pressing}[company](500.0)
     alone, together = run_of([subject(100.0)]), run_of([subject(100.0), away], opponent)
     own = alone.position.shape[1]
-    assert (alone.reason > 0).any() and (together.reason[:, own:-1 if opponent else None] > 0).any()
+    assert (alone.reason > 0).any()
+    assert (together.reason[:, own : -1 if opponent else None] > 0).any()
     np.testing.assert_allclose(together.position[:, :own], alone.position, atol=1e-6)

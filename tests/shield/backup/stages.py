@@ -6,7 +6,7 @@ import numpy as np
 from steerclear.shield import Surroundings, plan
 from steerclear.shield.backup.assign import assign_plans
 from steerclear.shield.barriers.neighbours import find_neighbours
-from steerclear.shield.filter import flow, linearised, screening
+from steerclear.shield.filter import flow, least_change, linearised, screening
 from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.kept_barriers import KeptBarriers
 from steerclear.shield.memory import new_memory
@@ -90,18 +90,20 @@ def checked(at, count):
 
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
-    return flow.linearise(at.scene)
+    count = linearised.pick_movers(at.scene)
+    return count, least_change.linearise(count, at.scene)
 
 
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
-    count, todo = 0, flow.PASSES if safe else flow.after_screening(at.scene)
-    for _ in range(flow.ROUNDS if todo == flow.TO_SOLVE else 0):
-        count, rows = built(at)
-        z = _answer(at, count, rows, solver)
+    if safe:
+        return at.plan.commands.copy(), at.plan.reason.copy()
+    count, safe = flow.after_screening(at.scene), False
+    for _ in range(least_change.ROUNDS if count > 0 else 0):
+        z = _answer(at, count, least_change.linearise(count, at.scene), solver)
         if z is None:
             break
-        safe = flow.accept(at.scene, z, count)
+        safe = least_change.accept(at.scene, z, count)
         if safe:
             break
     flow.finish(at.scene, safe, count)

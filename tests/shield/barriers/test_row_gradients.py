@@ -71,7 +71,7 @@ class Linearised:
         at, r, n = self.at, self.row, 2 * self.count
         C, d = at.plan.C[r, :n].copy(), at.plan.d[r]
         target = at.work.target[at.plan.label[r, 0]] if at.plan.label[r, 1] != rows.ALL_STATIC else 0.0
-        aim_m = rows.AIM_M if at.plan.label[r, 1] >= 0 else rows.STATIC_AIM_M
+        aim_m = 0.0 if at.plan.label[r, 1] >= 0 else rows.STATIC_AIM_M
         lack = target + aim_m - self.margin(self.z)
         scale = lack / (d - C @ self.z)
         steps = STEP * np.eye(n)
