@@ -15,7 +15,7 @@ from ..platforms.actuator import command_for_turn
 from ..scene import Scene
 from .linearised import check, check_one, list_movers
 from .screening import set_targets
-from .verified import KEPT, SPEED, TURN, costs_nothing, go_back, note_verified
+from .verified import KEPT, SPEED, TURN, costs_at_most, go_back, note_verified
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
@@ -53,7 +53,7 @@ def _ease_one(i: int, scene: Scene) -> None:
         at = 0.5 * (kept + too_far)
         _give_back(at, i, scene)
         check_one(i, scene)
-        if costs_nothing(scene):
+        if costs_at_most(0.0, scene):
             kept = at
         else:
             too_far = at

@@ -112,12 +112,18 @@ def _name_static(scene: Scene) -> None:
 
 
 @lean_kernel
-def finish(scene: Scene, safe: bool, count: int) -> None:
-    """End the program of so many boats, ease the other backups; then remember all."""
-    end_program(scene, safe, count)
-    ease(scene)
+def end(scene: Scene) -> None:
+    """Say what binds, and remember what was decided."""
     _name_static(scene)
     commit(scene)
+
+
+@lean_kernel
+def finish(scene: Scene, safe: bool, count: int) -> None:
+    """End the program of so many boats, and ease the other backups."""
+    end_program(scene, safe, count)
+    ease(scene)
+    end(scene)
 
 
 @lean_kernel
@@ -136,8 +142,7 @@ def begin(scene: Scene) -> int:
     """Screen the wanted commands, and finish where they pass; returns how many boats a program is to be solved for."""
     if screen(scene):
         scene.plan.cause[:] = -1
-        _name_static(scene)
-        commit(scene)
+        end(scene)
         return PASSES
     return after_screening(scene)
 

@@ -16,8 +16,8 @@ from ..scene import Scene
 TURN, SPEED, HEADING, KEPT, WORTH = range(5)
 """Columns of ``Plan.verified``."""
 
-NOTHING_M = 0.005
-"""What costs a boat less, m, costs it nothing: rows of the program are linear."""
+LITTLE_M = 0.005
+"""What an answer of the program may cost a boat in a step, m: its rows are linear, and none costs nothing at all."""
 
 
 @lean_kernel
@@ -39,12 +39,12 @@ def go_back(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def costs_nothing(scene: Scene) -> bool:
-    """Whether no boat of ours has less after the commands just checked than after the verified ones."""
+def costs_at_most(most_m: float, scene: Scene) -> bool:
+    """Whether no boat of ours keeps less by more than that after the commands just checked than after the verified."""
     ours, work, verified = scene.ours, scene.work, scene.plan.verified
-    nothing = True
+    within = True
     for i in range(ours.shape[0]):
         if ours[i]:
-            had = Rank(int(verified[i, KEPT]), verified[i, WORTH] - NOTHING_M)
-            nothing = nothing and not better(had, rank_of(i, work))
-    return nothing
+            had = Rank(int(verified[i, KEPT]), verified[i, WORTH] - most_m)
+            within = within and not better(had, rank_of(i, work))
+    return within

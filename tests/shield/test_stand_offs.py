@@ -64,11 +64,12 @@ def test_margins_from_team_mates_shrink_freely_until_they_are_small():
     """Two boats head on pass as they want until little is left; a far larger margin is asked for without that."""
     top, closest, changed = 2.0, [], []
     for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        fleet = fleet_of([(0.0, 0.0, 0.0, top), (1.0, 40.0, 180.0, top)], [0, 0], "heron")
+        fleet = fleet_of([(0.0, 0.0, 0.0, top), (2.4, 40.0, 180.0, top)], [0, 0], "heron")
         run = sail(Shield(ShieldConfig(mate_cap_m=cap_m)), fleet, lambda step, state: np.tile([top, 0.0], (2, 1)), 220)
         closest.append(run.closest(np.ones(2, bool)))
         changed.append((run.reason != Reason.PASSED).sum())
     assert closest[0] >= 2.5
+    assert closest[1] > closest[0] + 0.5
     assert changed[0] < changed[1]
 
 

@@ -97,6 +97,7 @@ def built(at):
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
     if safe:
+        flow.end(at.scene)
         return at.plan.commands.copy(), at.plan.reason.copy()
     count, safe = flow.after_screening(at.scene), False
     for _ in range(least_change.ROUNDS if count > 0 else 0):

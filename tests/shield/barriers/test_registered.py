@@ -142,13 +142,13 @@ def test_its_own_slope_is_taken():
     asked = []
     register_barrier(Barrier("shore", lambda x, y, ahead, values: 12.0 - y + 0.0 * len(asked), slope))
     fleet = Fleet.of(
-        position_m=[[0.0, 0.0], [8.0, 0.0]],
+        position_m=[[0.0, 8.0], [8.0, 8.0]],
         heading_rad=[0.5 * math.pi, -0.5 * math.pi],
-        speed_mps=[1.5, 1.5],
+        speed_mps=[2.0, 2.0],
         team=[0, 0],
         platforms="heron",
     )
-    ahead = lambda step, state: np.array([[1.5, 0.0], [1.5, 0.0]])  # noqa: E731
+    ahead = lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]])  # noqa: E731
     run = sail(Shield(barriers=("shore",)), fleet, ahead, 60)
     assert asked
     assert (run.reason == Reason.QP).any()

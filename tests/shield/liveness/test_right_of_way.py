@@ -48,7 +48,8 @@ def on_a_circle(boats, turned_rad):
 
 
 def test_boats_that_cross_in_the_middle_all_arrive():
-    angle = on_a_circle(3, [0.0, 1.0])
+    random = np.random.default_rng(0)
+    angle = on_a_circle(3, random.uniform(0.0, 6.0, 6)) + random.normal(size=(6, 3)) / 80.0
     never, _ = to_the_other_side("surveyor", angle, 80.0, 1200, give_way_after_s=np.inf)
     assert np.isinf(never[..., 0]).any(), "without right of way two sail on side by side: or this test shows nothing"
     at, run = to_the_other_side("surveyor", angle, 80.0, 1200)
