@@ -13,7 +13,7 @@ from .barriers.boats import reported_margin
 from .barriers.foreseen import note_foreseen
 from .barriers.static import STATIC
 from .config import ShieldConfig
-from .filter.flow import PASSES, begin, decide_scene, finish
+from .filter.flow import begin, begin_group, decide_scene, end, end_group
 from .filter.least_change import ROUNDS, accept, linearise
 from .filter.program import Program, Solver
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
@@ -249,15 +249,16 @@ class Deciders:
 
 def _decide_with(solver: Solver, scene: Scene) -> None:
     """`decide_scene` with another solver of its programs."""
-    count, safe, plan = begin(scene), False, scene.plan
-    if count == PASSES:
-        return
-    for _ in range(ROUNDS if count > 0 else 0):
-        rows, n = linearise(count, scene), 2 * count
-        z = solver(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n])) if rows >= 0 else None
-        if z is None:
-            break
-        safe = accept(scene, z, count)
-        if safe:
-            break
-    finish(scene, safe, count)
+    plan = scene.plan
+    for group in range(begin(scene)):
+        count, safe = begin_group(group, scene), False
+        for _ in range(ROUNDS if count > 0 else 0):
+            rows, n = linearise(count, scene), 2 * count
+            z = solver(Program(plan.C[:rows, :n], plan.d[:rows], plan.z0[:n])) if rows >= 0 else None
+            if z is None:
+                break
+            safe = accept(scene, z, count)
+            if safe:
+                break
+        end_group(scene, safe, count)
+    end(scene)

@@ -20,10 +20,11 @@ class Plan(NamedTuple):
 
     ``held`` is the manoeuvre of each boat that is gone on with from other states than it was found in: side, heading it
     ends on, deg (NaN: no turn), and speed, m/s, see `assign.hold`. ``cause`` is what a boat's wanted command is short
-    of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of each
-    boat the turn of this step, deg, the command, and the rank, see `filter.verified`. ``screened`` are the commands
-    that screening looked at, wanted ones but for boats that hold or give way, and ``screened_reason`` is ``reason`` as
-    it left it.
+    of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of
+    each boat the turn of this step, deg, the command, and the rank, see `filter.verified`. ``screened`` are the
+    commands that screening looked at, wanted ones but for boats that hold or give way, ``screened_reason`` is
+    ``reason`` as it left it. ``decided`` are all boats of ours, and ``group`` says of which group each is, see
+    `filter.groups`.
     """
 
     commands: Array
@@ -45,6 +46,8 @@ class Plan(NamedTuple):
     slack_m: Array
     reason: IntArray
     screened_reason: IntArray
+    decided: BoolArray
+    group: IntArray
 
 
 def new_plan(boats: int, rows: int) -> Plan:
@@ -70,6 +73,8 @@ def new_plan(boats: int, rows: int) -> Plan:
             slack_m=np.zeros(boats),
             reason=np.zeros(boats, np.int64),
             screened_reason=np.zeros(boats, np.int64),
+            decided=np.zeros(boats, np.bool_),
+            group=np.zeros(boats, np.int64),
         )
     )
 

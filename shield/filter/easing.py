@@ -7,15 +7,14 @@ the program, which are linear, then find no answer, and a boat that wants throug
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..backup.rank import ALL
 from ..jit import lean_kernel
-from ..plan import BACKUP, Plan
+from ..plan import BACKUP, Plan, unchanged
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
-from .linearised import check, check_one, list_movers
-from .screening import set_targets
-from .verified import KEPT, SPEED, TURN, costs_at_most, go_back, note_verified
+from .exact_check import check_one
+from .least_change import before_opponent
+from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
@@ -61,46 +60,28 @@ def _ease_one(i: int, scene: Scene) -> None:
             return
     if at == kept:
         return
-    _give_back(kept, i, scene)
     if kept == 0.0:
         go_back(i, scene)
+    else:
+        _give_back(kept, i, scene)
     check_one(i, scene)
-
-
-@lean_kernel
-def _may_be_eased(i: int, scene: Scene) -> bool:
-    """Whether boat i backs up before no opponent: of these too little is known, see `switching`."""
-    cause, reason = scene.plan.cause[i], scene.plan.reason[i]
-    return reason == BACKUP and (cause < 0 or scene.ours[cause])
-
-
-@lean_kernel
-def _list_eased(scene: Scene) -> int:
-    """Make movers of the boats whose backups may be eased; returns how many they are."""
-    plan = scene.plan
-    for i in range(scene.ours.shape[0]):
-        plan.moving[i] = _may_be_eased(i, scene)
-    return list_movers(plan)
 
 
 @lean_kernel
 def ease(scene: Scene) -> None:
     """Take back of backups, boat by boat, what is not needed to keep what they keep.
 
-    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
-    keep them are carried out as they are. Of static constraints only their distance is asked for.
+    Backups that are short of what must be kept are carried out as they are.
     """
     tuning, work, plan = scene.tuning, scene.work, scene.plan
-    count = _list_eased(scene)
-    if count == 0 or all_spent(tuning, work):
-        return
-    set_targets(scene)
-    work.static_target_m[:] = 0.0
-    check(count, scene)
-    note_verified(scene)
-    for m in range(count):
-        if all_spent(tuning, work):
-            return
-        i = plan.movers[m]
-        if int(plan.verified[i, KEPT]) == ALL:
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i] and may_be_eased(i, scene) and keeps_all(i, scene) and not all_spent(tuning, work):
             _ease_one(i, scene)
+            if unchanged(i, plan):
+                plan.reason[i] = plan.screened_reason[i]
+
+
+@lean_kernel
+def may_be_eased(i: int, scene: Scene) -> bool:
+    """Whether boat i backs up before no opponent: of these too little is known, see `switching`."""
+    return scene.plan.reason[i] == BACKUP and not before_opponent(i, scene)

@@ -1,4 +1,4 @@
-"""One decision, in compiled stages: screen, back up, solve for a least change, ease, commit.
+"""One decision, in compiled stages: screen; group by group back up, solve for a least change, ease; commit.
 
 `decide_scene` chains them, with the compiled projection between. With a QP backend `deciders.Deciders` calls the same
 stages.
@@ -21,14 +21,13 @@ from ..plan import BACKUP, BEST_EFFORT, HELD, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .easing import ease
+from .easing import ease, may_be_eased
+from .groups import close_groups, make_groups, open_group
 from .least_change import ROUNDS, accept, begin_program, end_program, linearise
-from .linearised import solve_compiled
+from .linearised import list_movers, solve_compiled
 from .screening import screen
 from .switching import back_up
-
-PASSES = -1
-"""Nothing is left to do once the wanted commands are screened."""
+from .verified import verify
 
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
@@ -92,7 +91,7 @@ def _note_causes(scene: Scene) -> None:
     ours, work, plan = scene.ours, scene.work, scene.plan
     for i in range(ours.shape[0]):
         plan.cause[i] = work.bound[i] if ours[i] and work.kept[i] < ALL else -1
-        threatened = work.kept[i] == OBSTACLES and work.fails[i] and not work.short[i]
+        threatened = work.kept[i] == OBSTACLES and work.fails[i]
         if ours[i] and threatened and work.threat_by[i] >= 0:
             plan.cause[i] = work.threat_by[i]
 
@@ -114,50 +113,60 @@ def _name_static(scene: Scene) -> None:
 @lean_kernel
 def end(scene: Scene) -> None:
     """Say what binds, and remember what was decided."""
+    close_groups(scene)
     _name_static(scene)
     commit(scene)
 
 
 @lean_kernel
-def finish(scene: Scene, safe: bool, count: int) -> None:
-    """End the program of so many boats, and ease the other backups."""
-    end_program(scene, safe, count)
-    ease(scene)
-    end(scene)
-
-
-@lean_kernel
-def after_screening(scene: Scene) -> int:
-    """Back up, and set up the program; returns how many boats take part in that."""
+def groups_left(scene: Scene) -> int:
+    """Note what wanted commands are short of and the manoeuvres found for them; returns how many groups are left."""
     _note_causes(scene)
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
             hold(i, scene.plan.held, scene.work)
-    back_up(scene)
-    return begin_program(scene)
+    return make_groups(scene)
 
 
 @lean_kernel
 def begin(scene: Scene) -> int:
-    """Screen the wanted commands, and finish where they pass; returns how many boats a program is to be solved for."""
+    """Screen the wanted commands; returns how many groups of boats they are not sent to as they are."""
     if screen(scene):
         scene.plan.cause[:] = -1
-        end(scene)
-        return PASSES
-    return after_screening(scene)
+        return 0
+    return groups_left(scene)
+
+
+@lean_kernel
+def begin_group(group: int, scene: Scene) -> int:
+    """Make backups the commands of a group, and set up its program; returns how many boats take part in that."""
+    open_group(group, scene)
+    back_up(scene)
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i] and may_be_eased(i, scene):
+            verify(list_movers(scene.plan), scene)
+            return begin_program(scene)
+    return 0
+
+
+@lean_kernel
+def end_group(scene: Scene, safe: bool, count: int) -> None:
+    """End the program of so many boats, and ease the other backups."""
+    end_program(scene, safe, count)
+    ease(scene)
 
 
 @lean_kernel
 def decide_scene(scene: Scene) -> None:
     """The whole decision; sent commands are in ``plan.commands``, reasons in ``plan.reason``."""
-    count, safe = begin(scene), False
-    if count == PASSES:
-        return
-    for _ in range(ROUNDS if count > 0 else 0):
-        rows = linearise(count, scene)
-        if rows < 0 or not solve_compiled(count, rows, scene.plan):
-            break
-        safe = accept(scene, scene.plan.z, count)
-        if safe:
-            break
-    finish(scene, safe, count)
+    for group in range(begin(scene)):
+        count, safe = begin_group(group, scene), False
+        for _ in range(ROUNDS if count > 0 else 0):
+            rows = linearise(count, scene)
+            if rows < 0 or not solve_compiled(count, rows, scene.plan):
+                break
+            safe = accept(scene, scene.plan.z, count)
+            if safe:
+                break
+        end_group(scene, safe, count)
+    end(scene)

@@ -1,66 +1,54 @@
-"""The program between team-mates: of the commands that cost no boat what its backup keeps, those nearest to the wanted.
+"""The program between team-mates: nearest to the wanted commands of those that leave every boat what its backup keeps.
 
-Least changes are for those who decide with us, and of whom nothing else is in the way; see `switching`.
+Least changes are for those who decide with us, and whom no opponent is in the way of; see `switching`.
 """
 
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..backup.rank import ALL
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import QP, unchanged
 from ..scene import Scene
-from .linearised import build, check, list_movers, take_answer
-from .screening import set_targets
-from .verified import LITTLE_M, costs_at_most, go_back, note_verified
+from .exact_check import check
+from .linearised import build, list_movers, take_answer
+from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, note_verified
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups stand."""
 
 
 @lean_kernel
-def _yields(i: int, scene: Scene) -> bool:
-    """Whether boat i's backup keeps everything, and no opponent is in the way of its wanted command."""
+def before_opponent(i: int, scene: Scene) -> bool:
+    """Whether an opponent is in the way of what boat i wants."""
     cause = scene.plan.cause[i]
-    return scene.ours[i] and scene.work.kept[i] == ALL and (cause < 0 or scene.ours[cause])
+    return cause >= 0 and not scene.ours[cause]
 
 
 @lean_kernel
 def _pick_pairs(scene: Scene) -> int:
-    """Make movers of the boats that team-mates are in the way of, and of these; returns how many they are."""
+    """Make movers of the boats that team-mates are in the way of, and of these; returns how many they are.
+
+    None that an opponent is in the way of, or whose backup is short of something: what these do is settled.
+    """
     ours, plan = scene.ours, scene.plan
     plan.moving[:] = False
     for i in range(ours.shape[0]):
         j = plan.cause[i]
-        if j >= 0 and ours[j] and _yields(i, scene):
+        if ours[i] and j >= 0 and ours[j] and keeps_all(i, scene):
             plan.moving[i] = True
-            plan.moving[j] = plan.moving[j] or _yields(j, scene)
+            plan.moving[j] = plan.moving[j] or (keeps_all(j, scene) and not before_opponent(j, scene))
     return list_movers(plan)
 
 
 @lean_kernel
-def _among_mates(scene: Scene) -> bool:
-    """Whether team-mates are in the way of any wanted command."""
-    ours, plan = scene.ours, scene.plan
-    found = False
-    for i in range(ours.shape[0]):
-        found = found or (ours[i] and plan.cause[i] >= 0 and ours[plan.cause[i]])
-    return found
-
-
-@lean_kernel
 def begin_program(scene: Scene) -> int:
-    """Note the backups, and make wanted commands of the boats that take part the candidate; returns how many do."""
+    """Make wanted commands of the boats that take part the candidate; returns how many do."""
     plan = scene.plan
-    if not _among_mates(scene):
-        return 0
-    set_targets(scene)
-    check(list_movers(plan), scene)
-    note_verified(scene)
     count = _pick_pairs(scene)
     for m in range(count):
         copy_row(plan.commands[plan.movers[m]], plan.screened[plan.movers[m]])
-    check(count, scene)
+    if count > 0:
+        check(count, scene)
     return count
 
 
@@ -72,7 +60,7 @@ def linearise(count: int, scene: Scene) -> int:
 
 @lean_kernel
 def accept(scene: Scene, z: Array, count: int) -> bool:
-    """Take an answer of the program; whether it costs nothing by the exact check."""
+    """Take an answer of the program; whether it costs no boat more than a little by the exact check."""
     if not take_answer(z, count, scene):
         return False
     check(count, scene)
@@ -90,5 +78,7 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
             plan.reason[i] = plan.screened_reason[i] if unchanged(i, plan) else QP
         else:
             go_back(i, scene)
-    if count > 0 and not safe:
+    if safe:
+        note_verified(scene)
+    elif count > 0:
         check(count, scene)

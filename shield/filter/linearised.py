@@ -1,10 +1,9 @@
-"""The quadratic program about candidate commands: who takes part, its rows, its answer, and the exact check of that."""
+"""The quadratic program about candidate commands: who takes part, its rows, its answer."""
 
 from __future__ import annotations
 
 import math
 
-from ..backup.assign import recheck, recheck_one
 from ..backup.effort import ROW_COST
 from ..backup.rank import ALL
 from ..jit import Array, copy_row, lean_kernel
@@ -14,7 +13,6 @@ from ..platforms.actuator import command_for_turn
 from ..scene import Scene
 from .active_set import OPTIMAL, project
 from .rows import build_rows, inputs_of
-from .screening import predict
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
@@ -90,19 +88,3 @@ def take_answer(z: Array, count: int, scene: Scene) -> bool:
             boats.params[i], state[i], speed, z[2 * m] * plan.gain[i, 2], tuning.dt_s
         )
     return True
-
-
-@lean_kernel
-def check(count: int, scene: Scene) -> None:
-    """Exact check of candidate commands: full model one step on, then what is kept by the backups rows were about."""
-    plan = scene.plan
-    for m in range(count):
-        predict(plan.movers[m], plan.commands, scene)
-    recheck(scene)
-
-
-@lean_kernel
-def check_one(i: int, scene: Scene) -> None:
-    """The same where nothing but the command of boat i has changed since."""
-    predict(i, scene.plan.commands, scene)
-    recheck_one(i, scene)

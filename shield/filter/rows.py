@@ -30,7 +30,7 @@ from ..platforms.actuator import full_turn
 from ..platforms.step import step_boat
 from ..scene import Scene, Tuning
 from ..work import Work
-from .verified import WORTH
+from .verified import WORTH, keeps_all
 
 STATIC_AIM_M = 1e-3
 """Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
@@ -122,10 +122,11 @@ def inputs_of(count: int, scene: Scene) -> None:
 
 @lean_kernel
 def _backups_keep(i: int, j: int, scene: Scene) -> float:
-    """Margin, m, that the backups of boats i and j keep from each other, or boat i's from all if j is not ours."""
-    ours, work, verified = scene.ours, scene.work, scene.plan.verified
-    kept_m = max(must_keep(i, j, ours, work), verified[i, WORTH])
-    return max(kept_m, verified[j, WORTH]) if ours[j] else kept_m
+    """Margin, m, that boat i, and boat j if it keeps everything and is ours, keep from all boats on their backups."""
+    kept_m = max(must_keep(i, j, scene.ours, scene.work), scene.plan.verified[i, WORTH])
+    if scene.ours[j] and keeps_all(j, scene):
+        kept_m = max(kept_m, scene.plan.verified[j, WORTH])
+    return kept_m
 
 
 @lean_kernel

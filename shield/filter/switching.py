@@ -32,7 +32,8 @@ from ..plan import BACKUP, BEST_EFFORT
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..scene import Scene
-from .linearised import check, list_movers, pick_movers
+from .exact_check import check
+from .linearised import list_movers, pick_movers
 
 
 @lean_kernel
@@ -149,10 +150,10 @@ def _find_backups(count: int, scene: Scene) -> None:
     """
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     for _ in range(ours.shape[0]):
-        movers = count
-        if not _assign_backups(count, scene):
-            movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
-        if movers == count or all_spent(tuning, work):
+        if _assign_backups(count, scene) or all_spent(tuning, work):
+            break
+        movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
+        if movers == count:
             break
         count = movers
     run_opponents(1, scene)

@@ -1,23 +1,25 @@
-"""What the backups come to, verified by the full model: nothing else is sent that has less.
+"""What the backups come to, verified by the full model, and what an answer may cost of that.
 
-Backups are a joint plan for all boats of ours, see `switching`. From it on whatever is nearer to the wanted commands is
-taken, an answer of the program or a part of a backup, that costs no boat of ours anything of what it then keeps. Who
-uses up its margin to give way as little as may be gives way for longer.
+Backups are a joint plan, see `switching`. From it on what is nearer to the wanted commands is taken, an answer of the
+program or a part of a backup, if no boat then keeps less than after its backup. Who uses up its margin to give way as
+little as may be gives way for longer.
 """
 
 from __future__ import annotations
 
-from ..backup.rank import Rank, better, rank_of
+from ..backup.rank import ALL, SAME_M
 from ..jit import lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
+from .exact_check import check
+from .screening import set_targets
 
 TURN, SPEED, HEADING, KEPT, WORTH = range(5)
 """Columns of ``Plan.verified``."""
 
-LITTLE_M = 0.005
-"""What an answer of the program may cost a boat in a step, m: its rows are linear, and none costs nothing at all."""
+LITTLE_M = 0.001
+"""What an answer of the program may cost a boat in a step, m: its rows are linear, and hardly one costs nothing."""
 
 
 @lean_kernel
@@ -32,6 +34,24 @@ def note_verified(scene: Scene) -> None:
 
 
 @lean_kernel
+def verify(count: int, scene: Scene) -> None:
+    """Check the movers' backups by what must be kept from boats when commands are screened, and note their ranks.
+
+    Of static constraints only their distance is asked for: a boat along an edge would else be sent away from it.
+    """
+    set_targets(scene)
+    scene.work.static_target_m[:] = 0.0
+    check(count, scene)
+    note_verified(scene)
+
+
+@lean_kernel
+def keeps_all(i: int, scene: Scene) -> bool:
+    """Whether boat i's backup keeps everything."""
+    return int(scene.plan.verified[i, KEPT]) == ALL
+
+
+@lean_kernel
 def go_back(i: int, scene: Scene) -> None:
     """Make boat i's command the verified one again."""
     plan = scene.plan
@@ -40,11 +60,12 @@ def go_back(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def costs_at_most(most_m: float, scene: Scene) -> bool:
-    """Whether no boat of ours keeps less by more than that after the commands just checked than after the verified."""
+    """Whether no boat keeps less after the commands just checked, or, of those that keep everything, less by that."""
     ours, work, verified = scene.ours, scene.work, scene.plan.verified
     within = True
     for i in range(ours.shape[0]):
         if ours[i]:
-            had = Rank(int(verified[i, KEPT]), verified[i, WORTH] - most_m)
-            within = within and not better(had, rank_of(i, work))
+            had = int(verified[i, KEPT])
+            least_m = verified[i, WORTH] - SAME_M - (most_m if had == ALL else 0.0)
+            within = within and (work.kept[i] > had or (work.kept[i] == had and work.worth_m[i] >= least_m))
     return within

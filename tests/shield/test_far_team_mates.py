@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import sail
 from shield_scenes import fleet_of
-from steerclear.shield import Shield, ShieldConfig, Surroundings
+from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.platforms import layout as L
 
 FIELD = (0.0, 0.0, 900.0, 80.0)
@@ -95,3 +95,60 @@ def test_boats_do_what_they_do_alone_whatever_befalls_team_mates_far_away(subjec
     assert (alone.reason > 0).any()
     assert (together.reason[:, own : -1 if opponent else None] > 0).any()
     np.testing.assert_allclose(together.position[:, :own], alone.position, atol=1e-6)
+
+
+def crowded_edge(random, x_m):
+    """A few boats anyhow at the upper edge, with an opponent or without: rows, teams, courses."""
+    own, opponents = int(random.integers(2, 6)), int(random.integers(0, 2))
+    rows = [
+        (x_m + random.uniform(-9.0, 9.0), random.uniform(62.0, 79.9), random.uniform(-180, 180), random.uniform(0, 2))
+        for _ in range(own + opponents)
+    ]
+    return rows, [0] * own + [1] * opponents, list(random.uniform(-180.0, 180.0, own + opponents))
+
+
+def remembered(shield):
+    """What a shield keeps of each boat from one decision to the next."""
+    return [np.asarray(field)[0] for field in shield._deciders.memory]
+
+
+def sailed(groups, **settings):
+    """Run of those groups, and the shield afterwards."""
+    rows, team, courses = ([one for group in groups for one in group[k]] for k in range(3))
+    fleet = fleet_of(rows, team, "heron")
+    fleet.state[:, L.THRUST] = 100.0
+    shield = Shield(ShieldConfig(edge_m=0.2, **settings), Surroundings(field=FIELD))
+
+    def wanted(step, state):
+        error = (np.array(courses) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+        return np.stack([np.full(len(state), 2.0), error], axis=-1)
+
+    return sail(shield, fleet, wanted, 100), shield
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_groups_that_cannot_meet_are_decided_for_as_if_each_were_alone(seed):
+    """And what is remembered of them is the same as well."""
+    random = np.random.default_rng(seed)
+    near, far = crowded_edge(random, 100.0), crowded_edge(random, 600.0)
+    (alone, one), (together, both) = sailed([near]), sailed([near, far])
+    n = len(near[0])
+    np.testing.assert_allclose(together.position[:, :n], alone.position, atol=1e-6)
+    np.testing.assert_array_equal(together.reason[:, :n], alone.reason)
+    np.testing.assert_allclose(together.certificate_m[:, :n], alone.certificate_m, atol=1e-6)
+    for mine, ours in zip(remembered(one), remembered(both), strict=True):
+        kept = ours[:n, :n] if ours.ndim == 2 else ours[:n]
+        np.testing.assert_allclose(kept, mine, atol=1e-6)
+
+
+@pytest.mark.parametrize("search_limit", [1000.0, 200_000.0])
+def test_who_backs_up_is_not_sent_what_it_wanted(search_limit):
+    """Also where the search is over before all who take part have a manoeuvre."""
+    backed_up = 0
+    for seed in range(25):
+        random = np.random.default_rng(seed)
+        run, _ = sailed([crowded_edge(random, 100.0), crowded_edge(random, 112.0)], search_limit=search_limit)
+        backs_up = run.reason == Reason.BACKUP
+        backed_up += backs_up.sum()
+        assert run.intervened[backs_up].all()
+    assert backed_up > 100

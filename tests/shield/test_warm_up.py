@@ -21,7 +21,7 @@ def head_on(platform="heron", speed_mps=2.0):
     return fleet, Commands.relative_deg(np.array([[speed_mps, 0.0]] * 2))
 
 
-STAGES = "begin", "linearise", "accept", "finish"
+STAGES = "begin", "begin_group", "linearise", "accept", "end_group", "end"
 
 
 @pytest.fixture

@@ -83,11 +83,6 @@ def screened_with_all_pairs(at, wanted):
     return safe, int(left_out.sum()) // 2
 
 
-def checked(at, count):
-    """The exact check of the candidate commands."""
-    return linearised.check(count, at.scene)
-
-
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
     count = linearised.pick_movers(at.scene)
@@ -96,18 +91,17 @@ def built(at):
 
 def decided(at, safe, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
-    if safe:
-        flow.end(at.scene)
-        return at.plan.commands.copy(), at.plan.reason.copy()
-    count, safe = flow.after_screening(at.scene), False
-    for _ in range(least_change.ROUNDS if count > 0 else 0):
-        z = _answer(at, count, least_change.linearise(count, at.scene), solver)
-        if z is None:
-            break
-        safe = least_change.accept(at.scene, z, count)
-        if safe:
-            break
-    flow.finish(at.scene, safe, count)
+    for group in range(0 if safe else flow.groups_left(at.scene)):
+        count, found = flow.begin_group(group, at.scene), False
+        for _ in range(least_change.ROUNDS if count > 0 else 0):
+            z = _answer(at, count, least_change.linearise(count, at.scene), solver)
+            if z is None:
+                break
+            found = least_change.accept(at.scene, z, count)
+            if found:
+                break
+        flow.end_group(at.scene, found, count)
+    flow.end(at.scene)
     return at.plan.commands.copy(), at.plan.reason.copy()
 
 

@@ -1,0 +1,64 @@
+"""Groups of boats of ours that can matter to each other: what is not passed is decided group by group.
+
+Two boats are of one group if they could meet, or both could meet boats of it (`barriers.neighbours`). A decision for
+one group does not hang on others: what befalls a team-mate far away changes nothing, and many boats are many small
+problems.
+"""
+
+from __future__ import annotations
+
+from ..backup.rank import ALL
+from ..jit import lean_kernel
+from ..scene import Scene
+
+PASSED, NOT_YET = -1, -2
+"""No group: not ours, or of boats whose wanted commands keep everything; and not looked at yet."""
+
+
+@lean_kernel
+def _gather(first: int, group: int, scene: Scene) -> bool:
+    """Give a number to boat ``first`` and to all who are of its group; whether any of them is short of something."""
+    ours, work, groups, queue = scene.ours, scene.work, scene.plan.group, scene.plan.movers
+    groups[first], queue[0] = group, first
+    done, found, short = 0, 1, False
+    while done < found:
+        i = queue[done]
+        done += 1
+        short = short or work.kept[i] < ALL
+        for j in range(ours.shape[0]):
+            if groups[j] == NOT_YET and work.near[i, j]:
+                groups[j], queue[found] = group, j
+                found += 1
+    if not short:
+        for k in range(found):
+            groups[queue[k]] = PASSED
+    return short
+
+
+@lean_kernel
+def make_groups(scene: Scene) -> int:
+    """Number, in ``plan.group``, the groups in which a wanted command is short of something; returns how many."""
+    ours, groups = scene.ours, scene.plan.group
+    for i in range(ours.shape[0]):
+        groups[i] = NOT_YET if ours[i] else PASSED
+    count = 0
+    for i in range(ours.shape[0]):
+        if groups[i] == NOT_YET and _gather(i, count, scene):
+            count += 1
+    return count
+
+
+@lean_kernel
+def open_group(group: int, scene: Scene) -> None:
+    """Make the boats of one group those that are decided for."""
+    ours, groups = scene.ours, scene.plan.group
+    for i in range(ours.shape[0]):
+        ours[i] = groups[i] == group
+        scene.plan.moving[i] = False
+
+
+@lean_kernel
+def close_groups(scene: Scene) -> None:
+    """Make all boats of ours those that are decided for again."""
+    for i in range(scene.ours.shape[0]):
+        scene.ours[i] = scene.plan.decided[i]
