@@ -165,11 +165,11 @@ def duels_lost(values: ValueTable, start: Array, radius_m: float, run_s: float) 
     tables, steps = stack_tables([values]), round(run_s / SUB_STEP_S)
     params = np.stack([get_platform(name).pack() for name in (values.card.own, values.card.other)])
     table_steps = sub_steps(values.card.dt_s)
-    lost = [
-        any(duel(tables, 0, params, *one.copy(), manner, False, table_steps, steps) < radius_m for manner in MANNERS)
-        for one in start
-    ]
-    return np.array(lost, dtype=np.bool_)
+
+    def lost(own: Array, other: Array, manner: int) -> bool:
+        return bool(duel(tables, 0, params, own.copy(), other.copy(), manner, False, table_steps, steps) < radius_m)
+
+    return np.array([any(lost(one[0], one[1], manner) for manner in MANNERS) for one in start], dtype=np.bool_)
 
 
 @kernel

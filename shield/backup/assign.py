@@ -113,15 +113,20 @@ def _go_on(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
+def rate(scene: Scene) -> None:
+    """Rate the plans of all boats of ours again."""
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i]:
+            refresh(i, scene)
+
+
+@lean_kernel
 def recheck(scene: Scene) -> None:
     """Rate all boats of ours when movers carry out ``plan.held`` from newly predicted states."""
-    ours, plan = scene.ours, scene.plan
-    for i in range(ours.shape[0]):
-        if plan.moving[i]:
+    for i in range(scene.ours.shape[0]):
+        if scene.plan.moving[i]:
             _go_on(i, scene)
-    for i in range(ours.shape[0]):
-        if ours[i]:
-            refresh(i, scene)
+    rate(scene)
 
 
 @lean_kernel

@@ -176,7 +176,7 @@ def clear_of_constraints(
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only or o >= total - SIDES else sampling.last
+        last = sampling.near if near_only else sampling.last
         if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
     if beyond >= 0:

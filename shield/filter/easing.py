@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from ..backup.effort import all_spent
 from ..jit import lean_kernel
-from ..plan import BACKUP, Plan, unchanged
+from ..plan import BACKUP, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
 from .exact_check import check_one
-from .least_change import before_opponent
-from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all
+from .least_change import among_mates, before_opponent
+from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all, verify
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
@@ -36,8 +36,8 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 def _give_back(share: float, i: int, scene: Scene) -> None:
     """Command of boat i that share of the way from its backup to the wanted one."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
-    backup = plan.verified[i]
-    turn = backup[TURN] + share * (_mildest_turn(i, plan) - backup[TURN])
+    backup, mildest = plan.verified[i], _mildest_turn(i, plan)
+    turn = backup[TURN] + share * (mildest - backup[TURN])
     speed = backup[SPEED] + share * (plan.screened[i, 0] - backup[SPEED])
     speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
     plan.commands[i, 0] = speed
@@ -68,20 +68,32 @@ def _ease_one(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def ease(scene: Scene) -> None:
-    """Take back of backups, boat by boat, what is not needed to keep what they keep.
-
-    Backups that are short of what must be kept are carried out as they are.
-    """
-    tuning, work, plan = scene.tuning, scene.work, scene.plan
-    for i in range(scene.ours.shape[0]):
-        if scene.ours[i] and may_be_eased(i, scene) and keeps_all(i, scene) and not all_spent(tuning, work):
-            _ease_one(i, scene)
-            if unchanged(i, plan):
-                plan.reason[i] = plan.screened_reason[i]
+def _may_be_eased(i: int, scene: Scene) -> bool:
+    """Whether boat i backs up before no opponent: of these too little is known, see `switching`."""
+    return scene.ours[i] and scene.plan.reason[i] == BACKUP and not before_opponent(i, scene)
 
 
 @lean_kernel
-def may_be_eased(i: int, scene: Scene) -> bool:
-    """Whether boat i backs up before no opponent: of these too little is known, see `switching`."""
-    return scene.plan.reason[i] == BACKUP and not before_opponent(i, scene)
+def _any_may_be_eased(scene: Scene) -> bool:
+    """Whether some boat may be."""
+    found = False
+    for i in range(scene.ours.shape[0]):
+        found = found or _may_be_eased(i, scene)
+    return found
+
+
+@lean_kernel
+def ease(scene: Scene) -> None:
+    """Take back of backups, boat by boat, what is not needed to keep what they keep.
+
+    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
+    keep them are carried out as they are. Of static constraints only their distance is asked for, but of boats between
+    these and team-mates: who uses up its room there has none left to make for others.
+    """
+    tuning, work = scene.tuning, scene.work
+    if not _any_may_be_eased(scene) or all_spent(tuning, work):
+        return
+    verify(among_mates(scene), scene)
+    for i in range(scene.ours.shape[0]):
+        if _may_be_eased(i, scene) and keeps_all(i, scene) and not all_spent(tuning, work):
+            _ease_one(i, scene)

@@ -11,7 +11,7 @@ from ..plan import QP, unchanged
 from ..scene import Scene
 from .exact_check import check
 from .linearised import build, list_movers, take_answer
-from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, note_verified
+from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, verify
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups stand."""
@@ -41,9 +41,22 @@ def _pick_pairs(scene: Scene) -> int:
 
 
 @lean_kernel
+def among_mates(scene: Scene) -> bool:
+    """Whether team-mates are in the way of any wanted command."""
+    ours, cause = scene.ours, scene.plan.cause
+    found = False
+    for i in range(ours.shape[0]):
+        found = found or (ours[i] and cause[i] >= 0 and ours[cause[i]])
+    return found
+
+
+@lean_kernel
 def begin_program(scene: Scene) -> int:
     """Make wanted commands of the boats that take part the candidate; returns how many do."""
     plan = scene.plan
+    if not among_mates(scene):
+        return 0
+    verify(True, scene)
     count = _pick_pairs(scene)
     for m in range(count):
         copy_row(plan.commands[plan.movers[m]], plan.screened[plan.movers[m]])
@@ -78,7 +91,5 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
             plan.reason[i] = plan.screened_reason[i] if unchanged(i, plan) else QP
         else:
             go_back(i, scene)
-    if safe:
-        note_verified(scene)
-    elif count > 0:
+    if count > 0 and not safe:
         check(count, scene)

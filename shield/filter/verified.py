@@ -7,12 +7,12 @@ little as may be gives way for longer.
 
 from __future__ import annotations
 
+from ..backup.assign import rate
 from ..backup.rank import ALL, SAME_M
 from ..jit import lean_kernel
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .exact_check import check
 from .screening import set_targets
 
 TURN, SPEED, HEADING, KEPT, WORTH = range(5)
@@ -34,14 +34,15 @@ def note_verified(scene: Scene) -> None:
 
 
 @lean_kernel
-def verify(count: int, scene: Scene) -> None:
-    """Check the movers' backups by what must be kept from boats when commands are screened, and note their ranks.
+def verify(static_rate: bool, scene: Scene) -> None:
+    """Rate what has been checked by what must be kept when commands are screened, and note it.
 
-    Of static constraints only their distance is asked for: a boat along an edge would else be sent away from it.
+    Without ``static_rate`` of static constraints only their distance is asked for.
     """
     set_targets(scene)
-    scene.work.static_target_m[:] = 0.0
-    check(count, scene)
+    if not static_rate:
+        scene.work.static_target_m[:] = 0.0
+    rate(scene)
     note_verified(scene)
 
 

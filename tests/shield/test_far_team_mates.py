@@ -141,13 +141,12 @@ def test_groups_that_cannot_meet_are_decided_for_as_if_each_were_alone(seed):
         np.testing.assert_allclose(kept, mine, atol=1e-6)
 
 
-@pytest.mark.parametrize("search_limit", [1000.0, 200_000.0])
-def test_who_backs_up_is_not_sent_what_it_wanted(search_limit):
-    """Also where the search is over before all who take part have a manoeuvre."""
+def test_who_backs_up_before_the_search_is_over_is_not_sent_what_it_wanted():
+    """Though not all who take part have a manoeuvre yet."""
     backed_up = 0
     for seed in range(25):
         random = np.random.default_rng(seed)
-        run, _ = sailed([crowded_edge(random, 100.0), crowded_edge(random, 112.0)], search_limit=search_limit)
+        run, _ = sailed([crowded_edge(random, 100.0), crowded_edge(random, 112.0)], search_limit=1000.0)
         backs_up = run.reason == Reason.BACKUP
         backed_up += backs_up.sum()
         assert run.intervened[backs_up].all()

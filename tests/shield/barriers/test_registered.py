@@ -151,7 +151,7 @@ def test_its_own_slope_is_taken():
     ahead = lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]])  # noqa: E731
     run = sail(Shield(barriers=("shore",)), fleet, ahead, 60)
     assert asked
-    assert (run.reason == Reason.QP).any()
+    assert (run.reason == Reason.BACKUP).any()
     assert run.position[..., 1].max() < 12.01
 
 

@@ -175,12 +175,11 @@ def test_outside_the_field_the_way_back_is_worth_most_even_if_it_leads_farther_o
     assert straight_in < 0.0
 
 
-def test_the_edge_counts_only_as_long_as_it_is_looked_at():
+def test_the_edge_counts_to_the_end_of_the_path():
     path, field = np.column_stack([np.zeros(20), np.arange(20.0)]), things(field=FIELD)
     out = clear_of_all(path, field, near=5)
-    assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
-    assert clear_of_all(path, field)[MARGIN] == -9.0
-    out = clear_of_all(path, field, near=5, drift_m=0.5)
+    assert (out[MARGIN], out[NORMAL_Y]) == (-9.0, -1.0)
+    out = clear_of_all(path[:6], field, near=3, drift_m=0.5)
     assert (out[MARGIN], out[SAMPLE]) == (2.5, 5.0)
 
 
