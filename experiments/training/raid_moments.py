@@ -120,7 +120,7 @@ class _Drawn:
 
 def recorded(settings: TrainingSettings, spread: float, seed: int) -> list[Moment]:
     """Moments of as many games as a training plays at once, with its rules and shield, against its first opponent."""
-    core = core_of(settings, settings.games, seed)
+    core = core_of(settings, settings.games, seed, settings.stages[0])
     core.reset(seed=seed)
     recorder, foe = Recorder(settings.interval, spread, seed), opponent_of(settings.stages[0].opponents[0])
     recorder.reset(core, 0, seed)

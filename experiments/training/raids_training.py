@@ -151,8 +151,8 @@ class RaidsTraining:
         for _ in range(self.settings.interval):
             commands = np.where(over[:, None, None], 0.0, self.team.steered())
             out = self.batch.step(commands.reshape(-1, 2))
-            earned += np.where(over, 0.0, self._of_games(out.rewards))
-            fresh = self._of_games(out.terminated | out.truncated) & ~over
+            earned += np.where(over, 0.0, out.rewards.reshape(over.size, -1).mean(axis=1))
+            fresh = (out.terminated | out.truncated)[::BOATS] & ~over
             ended += self._totals(out.episodes, fresh)
             over |= fresh
         self.decisions += self._all.size
@@ -185,10 +185,6 @@ class RaidsTraining:
         self.team.restart(over, 0)
         for game in np.flatnonzero(over):
             self._begun.remind(self.team.raids[game], int(game))
-
-    def _of_games(self, of_learners: Any) -> Any:
-        """(B,) of what is the same for all boats of a team (L,)."""
-        return of_learners.reshape(self._all.size, -1)[:, 0]
 
     def _totals(self, episodes: Any, over: BoolArray) -> list[dict[str, float]]:
         counts = {name: np.reshape(episodes[name], (over.size, -1)) for name in COUNTS}
@@ -227,8 +223,8 @@ def _checked(settings: TrainingSettings, resume: bool) -> dict[str, Any]:
     for name in settings.options:
         if name not in DEFAULTS:
             raise ConfigError(f"unknown option {name!r} of raids; {near(str(name), DEFAULTS)}")
-    if resume or len(settings.stages) > 1 or settings.net.roles != "shared":
-        raise ConfigError("raids begin anew (no --resume), in one stage, with net.roles: shared")
+    if resume or len(settings.stages) > 1 or settings.net.roles != "shared" or settings.shield_every > 1:
+        raise ConfigError("raids begin anew (no --resume), in one stage, with net.roles: shared and shield_every: 1")
     if settings.game(settings.stages[0]).team_size != BOATS:
         raise ConfigError(f"raids are for teams of {BOATS} boats; leave out team_size")
     found = {**DEFAULTS, **settings.options}

@@ -181,6 +181,7 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
         ({"options": {"shares": [0, 0, 0, 0]}}, "give one above 0"),
         ({"stages": [{"opponents": ["hold"]}, {"opponents": ["medium"]}]}, "one stage"),
         ({"net": {"hidden": [16], "roles": "each"}}, "roles: shared"),
+        ({"shield": "training", "shield_every": 10}, "shield_every: 1"),
         ({"rules": {"team_size": 2}}, "teams of 3 boats"),
     ],
 )
