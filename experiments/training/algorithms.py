@@ -26,6 +26,10 @@ def training_of(settings: TrainingSettings, folder: Path, resume: bool) -> Any:
         from .cloning import CloningTraining
 
         return CloningTraining(settings, folder, resume)
+    if settings.algorithm == "raids":
+        from .raids_training import RaidsTraining
+
+        return RaidsTraining(settings, folder, resume)
     from .training import Training
 
     return Training(settings, folder, resume)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from steerclear.policies.entrants.learned import LearnedBatch
+from steerclear.policies.entrants.learned import batch_of
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
@@ -35,7 +35,7 @@ def play_games(
     core = core_of(settings, games, seed)
     team = 0 if side == "blue" else 1
     core.reset(seed=seed)
-    ours = LearnedBatch(own) if isinstance(own, Network) else opponent_of(own) if isinstance(own, str) else own
+    ours = batch_of(own) if isinstance(own, Network) else opponent_of(own) if isinstance(own, str) else own
     foe = opponent_of(opponent)
     ours.reset(core, team, seed)
     foe.reset(core, 1 - team, seed + 1)

@@ -14,7 +14,7 @@ from ..spec import near
 from .checks import choice, count, number, span, texts
 
 SHIELDS = ("none", "deployment", "training", "training+intervention")
-ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning")
+ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning", "raids")
 DEVICES = ("auto", "cpu", "cuda")
 INTERVENTION_WEIGHT = 0.02
 """Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""

@@ -22,9 +22,11 @@ def write_submission(network: Network, path: Path) -> Path:
     """Write the zip, whole or not at all.
 
     Raises:
-        ConfigError: entries send numbers of actions; this network sends speeds and headings.
+        ConfigError: entries send numbers of actions; this network sends speeds and headings, or numbers of raids.
         PolicyError: it cannot be written.
     """
+    if network.kind == "raids":
+        raise ConfigError("raids look at the whole game, which no entry is told; play them here, as weights:FILE")
     if network.kind != "discrete":
         raise ConfigError("an entry for the competition sends action numbers; train with actions: discrete")
     content = io.BytesIO()

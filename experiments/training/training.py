@@ -57,7 +57,7 @@ class Training:
         self._checked_opponents()
         check_sight(settings)
         self.batch = learners_of(settings, self._pool())
-        self.learner = Learner(settings, self.batch, self._card())
+        self.learner = Learner(settings, self.batch, card_of(self.settings))
         self._time_parts()
         self._begin_games()
         if resume:
@@ -81,7 +81,7 @@ class Training:
         if not (self.folder / BEST).exists():
             write_weights(self.learner.network(), self.folder / BEST)
         self.learner.model.save(self.folder / MODEL)
-        add_card(self.folder / MODEL, {**self._card(), TAKES_OVER: self.learner.first is not None})
+        add_card(self.folder / MODEL, {**card_of(self.settings), TAKES_OVER: self.learner.first is not None})
 
     def _iterate(self) -> None:
         began = time.perf_counter()
@@ -271,16 +271,6 @@ class Training:
                     "name another --out"
                 )
 
-    def _card(self) -> dict[str, Any]:
-        return {
-            "trained_with": "steerclear train",
-            "preset": self.settings.preset,
-            "platform": self.settings.platform,
-            "shield": self.settings.shield,
-            "seed": self.settings.seed,
-            "versions": {name: versions()[name] for name in ("steerclear", "python") if name in versions()},
-        }
-
     def _words(self) -> str:
         """What the progress says: means of the games that ended in the last rollout, and its rate."""
         row = self.curve[-1]
@@ -294,6 +284,18 @@ class Training:
             return f"{stage}, {rate:,.0f} decisions/s"
         counts = f"captures {row['captures']:.1f}, against {row['captures_against']:.1f}, hits {row['hits']:.1f}"
         return f"{stage}, {counts} a game, {rate:,.0f} decisions/s"
+
+
+def card_of(settings: TrainingSettings) -> dict[str, Any]:
+    """Where the networks of a training come from, for people."""
+    return {
+        "trained_with": "steerclear train",
+        "preset": settings.preset,
+        "platform": settings.platform,
+        "shield": settings.shield,
+        "seed": settings.seed,
+        "versions": {name: versions()[name] for name in ("steerclear", "python") if name in versions()},
+    }
 
 
 def _not_ours(path: Path, error: Exception) -> str:

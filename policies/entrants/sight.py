@@ -81,17 +81,17 @@ def is_turned(core: BatchedMctf, team: int) -> bool:
     return bool(core.flag_home[team, 0] > 0.5 * core.config.env_bounds_m[0])
 
 
-def look(core: BatchedMctf, team: int) -> Sight:
-    """What a team sees of the (first) game."""
+def look(core: BatchedMctf, team: int, game: int = 0) -> Sight:
+    """What a team sees of a game."""
     turned, (width, height) = is_turned(core, team), core.config.env_bounds_m
 
     def place(point: list[float]) -> Point:
         return (width - point[0], height - point[1]) if turned else (point[0], point[1])
 
-    boats = _boats(core, place, math.pi if turned else 0.0)
+    boats = _boats(core, game, place, math.pi if turned else 0.0)
     size = core.config.team_size
     sides = tuple(boats[:size]), tuple(boats[size:])
-    homes, flags = core.flag_home.tolist(), core.flag_position[0].tolist()
+    homes, flags = core.flag_home.tolist(), core.flag_position[game].tolist()
     return Sight(
         own=sides[team],
         foes=sides[1 - team],
@@ -100,11 +100,11 @@ def look(core: BatchedMctf, team: int) -> Sight:
         goal=place(flags[1 - team]),
         base=place(homes[1 - team]),
         flag=place(flags[team]),
-        taken=bool(core.flag_taken[0, team]),
+        taken=bool(core.flag_taken[game, team]),
         reach=core.config.catch_radius_m,
         keepout=core.config.flag_keepout_m,
         line=0.5 * (place(homes[0])[0] + place(homes[1])[0]),
-        time=float(core.time_s[0]),
+        time=float(core.time_s[game]),
         docks=tuple(place(dock) for dock in docks_of(core, team)),
     )
 
@@ -118,10 +118,10 @@ def docks_of(core: BatchedMctf, team: int) -> list[list[float]]:
     return [list(dock) for dock in found.tolist()]
 
 
-def _boats(core: BatchedMctf, place: object, turn: float) -> list[Boat]:
-    rows, tops = core.state[0].tolist(), core.max_speed_mps.tolist()
-    tagged, carries, on_side = (flags[0].tolist() for flags in (core.is_tagged, core.has_flag, core.on_side))
-    charge, full = core.tagging_cooldown_s[0].tolist(), core.config.tagging_cooldown_s
+def _boats(core: BatchedMctf, game: int, place: object, turn: float) -> list[Boat]:
+    rows, tops = core.state[game].tolist(), core.max_speed_mps.tolist()
+    tagged, carries, on_side = (flags[game].tolist() for flags in (core.is_tagged, core.has_flag, core.on_side))
+    charge, full = core.tagging_cooldown_s[game].tolist(), core.config.tagging_cooldown_s
     radii = core.config.agent_radius_m
     return [
         Boat(

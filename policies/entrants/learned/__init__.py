@@ -6,8 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from .kinds import batch_of as batch_of
+from .kinds import team_of as team_of
 from .network import preset_in
 from .play import LearnedBatch, LearnedTeam
+from .raids import RaidsBatch, RaidsTeam
 from .weights_file import read_weights
 
 WEIGHTS, SB3 = "weights:", "sb3:"
@@ -22,7 +25,7 @@ class Builder(NamedTuple):
     first: tuple[Any, ...]
 
 
-def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam:
+def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam | RaidsTeam:
     """An exported network as a team policy.
 
     Args:
@@ -32,12 +35,12 @@ def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam:
     Raises:
         PolicyError: no such file, or none of ours.
     """
-    return LearnedTeam(read_weights(path), Path(path).stem, sample)
+    return team_of(read_weights(path), Path(path).stem, sample)
 
 
-def load_weights_batch(path: str | Path, sample: bool = False) -> LearnedBatch:
+def load_weights_batch(path: str | Path, sample: bool = False) -> LearnedBatch | RaidsBatch:
     """The same for a batch of games."""
-    return LearnedBatch(read_weights(path), Path(path).stem, sample)
+    return batch_of(read_weights(path), Path(path).stem, sample)
 
 
 def load_sb3_batch(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedBatch:

@@ -12,7 +12,9 @@ from ..catalogue import entrant
 from ..demonstrator import row_of
 from ..sight import Sight
 from .chooser import OPTION_NAMES, read_chooser
+from .kinds import team_of
 from .play import LearnedTeam
+from .raids import RaidsTeam
 from .teacher import OptionPlayer
 from .weights_file import read_weights
 
@@ -24,18 +26,19 @@ ABOUT = {
     "richley": ("QMIX, and PPO once the flag is held (Richley-NIWC-ATL)", "Richley-NIWC-ATL"),
     "swell": ("PPO by the rules of aamas2024 against medium alone, begun with jin", ""),
     "surge": ("PPO in the game of 2025 against medium alone, begun with jin", ""),
+    "riptide": ("undertow's raids, their numbers given by a network: for play with a shield", ""),
     "ours": ("PPO in the game of 2025, begun with surge: the team to start from, with the shield", ""),
 }
 FILES = {name: TEAMS / f"{name}.npz" for name in ABOUT if (TEAMS / f"{name}.npz").exists()}
-"""Weights of the teams that are networks from observations to actions."""
+"""Weights of the teams that are networks."""
 
 
 def _enter(name: str) -> None:
     description, team = ABOUT[name]
 
     @entrant(name, description, team)
-    def build(sample: bool = False) -> LearnedTeam:
-        return LearnedTeam(read_weights(FILES[name]), name, sample)
+    def build(sample: bool = False) -> LearnedTeam | RaidsTeam:
+        return team_of(read_weights(FILES[name]), name, sample)
 
     build.__qualname__ = name
 

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.actions import DISCRETE
 
+from ..undertow.shape import NAMES
+
 Floats = NDArray[np.float32]
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
-KINDS = ("discrete", "normalised")
-"""17 action values, or the mean of (speed, relative heading) scaled to [-1, 1]."""
+KINDS = {"discrete": 17, "normalised": 2, "raids": len(NAMES)}
+"""Outputs by kind: action values; the mean of (speed, relative heading) scaled to [-1, 1]; the numbers of a raid, see
+`raids`."""
 
 
 @dataclass(frozen=True)

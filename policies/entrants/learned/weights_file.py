@@ -164,5 +164,5 @@ def _check_shapes(network: Network) -> None:
         if weight.shape[:2] != (roles, size) or bias.shape != (roles, weight.shape[2]):
             raise ValueError(f"a layer has shape {weight.shape}, expected ({roles}, {size}, ...)")
         size = weight.shape[2]
-    if size != (17 if network.kind == "discrete" else 2):
+    if size != KINDS[network.kind]:
         raise ValueError(f"{size} outputs are no {network.kind} actions")

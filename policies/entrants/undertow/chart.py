@@ -7,11 +7,7 @@ from dataclasses import dataclass
 
 from ..plane import clip
 from ..sight import Point, Sight
-
-BAIT_M, DRAG_M = 4.0, 3.0
-"""How far from its edge the bait stands, and the second boat sails, m."""
-CLEAR_M = 11.0
-"""Distance from the ways of a raid that all opponents but the guard keep when it begins, m."""
+from .shape import SCRIPTED, Shape
 
 
 @dataclass(frozen=True)
@@ -21,10 +17,12 @@ class Chart:
     Attributes:
         sight: the moment.
         upper: whether the bait is at the edge of large y; else everything is mirrored.
+        shape: its numbers.
     """
 
     sight: Sight
     upper: bool
+    shape: Shape = SCRIPTED
 
     def at(self, x: float, y: float) -> Point:
         """A point given with the bait at the upper edge, m."""
@@ -37,50 +35,52 @@ class Chart:
     @property
     def posts(self) -> list[Point]:
         """Where bait, second and third boat gather."""
-        line, top = self.sight.line, self.sight.size[1]
+        line, top, shape = self.sight.line, self.sight.size[1], self.shape
         return [
-            self.at(line - 2.0, top - BAIT_M),
-            self.at(line - 2.0, DRAG_M + 1.0),
-            self.at(line - 5.0, top - 10.0),
+            self.at(line - 2.0, top - shape.bait_m),
+            self.at(line - 2.0, shape.drag_m + 1.0),
+            self.at(line - shape.wait_x_m, top - shape.wait_m),
         ]
 
     @property
     def bait(self) -> Point:
         """Where the bait stands: just far enough beyond the line to be an intruder."""
-        return self.at(self.sight.line + 1.5, self.sight.size[1] - BAIT_M)
+        return self.at(self.sight.line + self.shape.bait_x_m, self.sight.size[1] - self.shape.bait_m)
 
     @property
     def door(self) -> Point:
         """Where the third boat waits for its turn."""
-        return self.at(self.sight.line - 2.0, self.sight.size[1] - 8.0)
+        return self.at(self.sight.line - self.shape.door_x_m, self.sight.size[1] - self.shape.door_m)
 
     def drag(self, at: Point) -> Point:
         """What the second boat steers for: along its edge, round the far corner, then the flag."""
-        base = self.sight.base
-        if at[0] < base[0]:
-            return self.at(at[0] + 12.0, DRAG_M)
-        return self.at(base[0] + 7.0, base[1] - 6.0) if self.height(at) < 10.0 else self.sight.goal
+        base, shape = self.sight.base, self.shape
+        if at[0] < base[0] - shape.corner_x_m:
+            return self.at(at[0] + 12.0, shape.drag_m)
+        if self.height(at) < shape.turned_m:
+            return self.at(base[0] + shape.turn_x_m, base[1] - shape.turn_m)
+        return self.sight.goal
 
     def run(self, at: Point) -> Point:
         """What the third boat steers for: past the flag on the bait's side, to turn home away from the guard."""
-        base = self.sight.base
-        if at[0] < self.sight.line + 4.0:
-            return self.at(at[0] + 8.0, base[1] + 7.0)
-        return self.at(base[0] + 4.0, base[1] + 0.75 * self.sight.reach)
+        base, shape = self.sight.base, self.shape
+        if at[0] < self.sight.line + shape.run_x_m:
+            return self.at(at[0] + 8.0, base[1] + shape.run_m)
+        return self.at(base[0] + shape.past_x_m, base[1] + shape.past_m)
 
     def home(self, at: Point, up: bool) -> Point:
         """What a boat with the flag steers for: its own side, bearing off to the bait's edge or the other."""
-        side = 1.0 if up == self.upper else -1.0
-        return at[0] - 15.0, clip(at[1] + 4.0 * side, 2.5, self.sight.size[1] - 2.5)
+        off_m = self.shape.home_m if up else -self.shape.drag_home_m
+        return at[0] - 15.0, clip(at[1] + (off_m if self.upper else -off_m), 2.5, self.sight.size[1] - 2.5)
 
-    def is_open(self, others: list[Point]) -> bool:
-        """Whether opponents other than the guard are clear of all ways."""
-        line, top, base = self.sight.line, self.sight.size[1], self.sight.base
+    def is_open(self, others: list[Point], clear_m: float) -> bool:
+        """Whether opponents other than the guard are so clear of all ways, m."""
+        line, top, base, shape = self.sight.line, self.sight.size[1], self.sight.base, self.shape
         ways = (
-            (self.at(line + 1.0, DRAG_M), self.at(base[0] + 2.0, DRAG_M)),
-            (self.at(line, top - BAIT_M), self.at(base[0] - 10.0, base[1] + 12.0)),
+            (self.at(line + 1.0, shape.drag_m), self.at(base[0] + 2.0, shape.drag_m)),
+            (self.at(line, top - shape.bait_m), self.at(base[0] - 10.0, base[1] + 12.0)),
         )
-        return all(off(place, *way) > CLEAR_M for place in others for way in ways)
+        return all(off(place, *way) > clear_m for place in others for way in ways)
 
 
 def off(point: Point, a: Point, b: Point) -> float:

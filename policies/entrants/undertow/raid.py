@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 from ..plane import distance
 from ..sight import Boat, Sight
 from .chart import Chart
+from .shape import SCRIPTED
 
 BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
-AT_POST_M = 5.0
-NEAR_M = 17.0
-"""The second boat sets out when the guard is so near to the bait, m."""
-DRAGGED_M, GAP_M = 10.0, 12.0
-"""The third sets out when the second is so far beyond the line and the guard farther than this from the third, m."""
-BAITED_S, LONGEST_S, STALE_S, AGAIN_S = 25.0, 60.0, 30.0, 15.0
-"""Longest time for a bait, for a raid, that a blocked chart is kept, and how much of that a success takes off, s."""
+LONGEST_S, AGAIN_S = 60.0, 15.0
+"""Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
 
 
 class Phase(IntEnum):
@@ -35,18 +32,33 @@ class Raid:
         phase: what it is at.
         upper: see `Chart`.
         bait_taken: whether the bait was tagged since the second boat set out.
+        held: whether the flag was held in this raid.
+        kept_s: since when this chart is kept, s.
+        shape: its numbers.
     """
 
     def __init__(self, sight: Sight) -> None:
+        self.shape = SCRIPTED
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
-        self._since_s, self._kept_s, self._held = sight.time, sight.time, False
+        self._since_s, self.kept_s, self.held = sight.time, sight.time, False
+
+    def memory(self, time_s: float) -> list[float]:
+        """What it remembers but for its shape, as numbers; times count from ``time_s``."""
+        return [self.phase, self.upper, self.bait_taken, self.held, self._since_s - time_s, self.kept_s - time_s]
+
+    def remember(self, memory: Sequence[float], time_s: float, mirrored: bool) -> None:
+        """Go on with what `memory` told, in a game that is the same, or the same in a mirror."""
+        self.phase, self.upper = Phase(int(memory[0])), bool(memory[1]) != mirrored
+        self.bait_taken, self.held = bool(memory[2]), bool(memory[3])
+        self._since_s, self.kept_s = memory[4] + time_s, memory[5] + time_s
 
     def advance(self, sight: Sight) -> Chart:
         """Look at the game, go on to the next phase or give up; where the raid leads."""
-        chart = Chart(sight, self.upper)
+        chart, shape = Chart(sight, self.upper, self.shape), self.shape
         taggers = [foe for foe in sight.foes if may_tag(foe, sight)]
         guard = guard_of(taggers, sight)
-        is_open = chart.is_open([foe.at for foe in taggers if foe is not guard])
+        clear_m = shape.clear_m if self.phase == Phase.GATHER else shape.kept_clear_m
+        is_open = chart.is_open([foe.at for foe in taggers if foe is not guard], clear_m)
         if self.phase == Phase.GATHER:
             self._gathered(sight, chart, guard, is_open)
         elif self._failed(sight, is_open):
@@ -56,15 +68,15 @@ class Raid:
             self._went_on(sight, chart, guard)
         if self.phase >= Phase.DRAG:
             self.bait_taken = self.bait_taken or sight.own[BAIT].tagged
-        return Chart(sight, self.upper)
+        return Chart(sight, self.upper, self.shape)
 
     def _gathered(self, sight: Sight, chart: Chart, guard: Boat | None, is_open: bool) -> None:
-        posts = zip(sight.own, chart.posts, strict=False)
-        ready = all(not boat.tagged and boat.on_side and distance(boat.at, post) < AT_POST_M for boat, post in posts)
+        posts, near_m = zip(sight.own, chart.posts, strict=False), self.shape.post_m
+        ready = all(not boat.tagged and boat.on_side and distance(boat.at, post) < near_m for boat, post in posts)
         if ready and is_open and guard is not None and not sight.taken:
-            self.phase, self._since_s, self._held, self.bait_taken = Phase.BAIT, sight.time, False, False
-        elif not is_open and sight.time - self._kept_s > STALE_S:
-            self.upper, self._kept_s = not self.upper, sight.time
+            self.phase, self._since_s, self.held, self.bait_taken = Phase.BAIT, sight.time, False, False
+        elif not is_open and sight.time - self.kept_s > self.shape.stale_s:
+            self.upper, self.kept_s = not self.upper, sight.time
 
     def _failed(self, sight: Sight, is_open: bool) -> bool:
         bait, drag, run = sight.own[:3]
@@ -72,28 +84,28 @@ class Raid:
         if run.tagged or lasted_s > LONGEST_S:
             return True
         if self.phase == Phase.BAIT:
-            return bait.tagged or drag.tagged or not is_open or lasted_s > BAITED_S
+            return bait.tagged or drag.tagged or not is_open or lasted_s > self.shape.baited_s
         return drag.tagged and (self.phase == Phase.DRAG or (run.on_side and run.x < sight.line - 1.0))
 
     def _brought_home(self, sight: Sight) -> None:
         """End a raid once the flag was held and is no more."""
         if sight.own[DRAG].carries or sight.own[RUN].carries:
-            self._held = True
-        elif self._held and self.phase > Phase.GATHER:
+            self.held = True
+        elif self.held and self.phase > Phase.GATHER:
             self._end(sight.time - AGAIN_S)
 
     def _went_on(self, sight: Sight, chart: Chart, guard: Boat) -> None:
         bait, drag, run = sight.own[:3]
         out = bait.x > sight.line or bait.tagged
-        above = chart.height(guard.at) > 0.5 * sight.size[1] + 1.0
-        if self.phase == Phase.BAIT and out and above and distance(guard.at, bait.at) < NEAR_M:
+        shape, height_m = self.shape, chart.height(guard.at) - 0.5 * sight.size[1]
+        if self.phase == Phase.BAIT and out and height_m > shape.above_m and distance(guard.at, bait.at) < shape.near_m:
             self.phase = Phase.DRAG
-        drawn = drag.x > sight.line + DRAGGED_M and chart.height(guard.at) < 0.5 * sight.size[1] + 6.0
-        if self.phase == Phase.DRAG and drawn and distance(guard.at, run.at) > GAP_M:
+        drawn = drag.x > sight.line + shape.dragged_m and height_m < shape.drawn_m
+        if self.phase == Phase.DRAG and drawn and distance(guard.at, run.at) > shape.gap_m:
             self.phase = Phase.RUN
 
     def _end(self, kept_s: float) -> None:
-        self.phase, self._kept_s = Phase.GATHER, kept_s
+        self.phase, self.kept_s = Phase.GATHER, kept_s
 
 
 def may_tag(foe: Boat, sight: Sight) -> bool:

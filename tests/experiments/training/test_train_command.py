@@ -108,7 +108,8 @@ def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_pa
 
 def test_every_team_has_a_config_that_can_be_read():
     found = sorted((ROOT / "policies/entrants/learned/teams").glob("*.yaml"))
-    assert {path.stem for path in found} == {"crowley", "jin", "leprell", "ours", "richley", "surge", "swell"}
+    names = {"crowley", "jin", "leprell", "ours", "richley", "riptide", "surge", "swell"}
+    assert {path.stem for path in found} == names
     for path in found:
         settings_of(yaml.safe_load(path.read_text()))
         weights = path.with_suffix(".npz")

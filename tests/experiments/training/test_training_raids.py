@@ -1,0 +1,195 @@
+"""Training of raids: moments of raids, answers held for a time, and a training from beginning to end."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from steerclear.experiments.training.algorithms import training_of
+from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.games import core_of
+from steerclear.experiments.training.raid_moments import KINDS, PLACE, BeginInRaids, RaidMoments, Recorder, recorded
+from steerclear.experiments.training.raids_learner import Answer, RaidsLearner
+from steerclear.experiments.training.settings import settings_of
+from steerclear.experiments.training.submission import write_submission
+from steerclear.policies import make_batch
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned.raids import SEEN
+from steerclear.policies.entrants.undertow.raid import Phase
+from steerclear.policies.entrants.undertow.shape import NAMES
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import layout as L
+
+PLACES = [[38.0, 36.0], [38.0, 4.0], [35.0, 30.0], [20.0, 20.0], [22.0, 20.0], [60.0, 20.0]]
+"""Boats of a game in which a raid begins."""
+
+
+def moments_of(core, times_s):
+    """Moments of a game whose boats sail circles, one of each kind, after so many seconds."""
+    places, memory = [], []
+    for step in range(int(10 * max(times_s)) + 1):
+        if step / 10 in times_s:
+            places.append({name: getattr(core.games, name)[0].copy() for name in PLACE})
+            memory.append([Phase.RUN, True, True, False, -12.0, -40.0])
+        core.step(np.tile([1.5, 20.0], (1, core.n_boats, 1)))
+    games = {name: np.array([place[name] for place in places]) for name in PLACE}
+    return RaidMoments(games, np.array(memory, float), np.arange(len(KINDS)))
+
+
+@pytest.fixture
+def some():
+    core = core_of(settings_of({}), 1, 5)
+    core.reset(seed=5)
+    return moments_of(core, (1.0, 2.0, 3.0, 4.0))
+
+
+def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(some):
+    core = core_of(settings_of({}), 200, 1)
+    begun = BeginInRaids(core, some, [0.0, 3.0, 0.0, 1.0], 3)
+    core.reset(seed=1)
+    assert 0.6 < (begun.drawn == 1).mean() < 0.9
+    assert set(begun.drawn) == {1, 3}
+    assert 0.3 < begun.mirrored.mean() < 0.7
+    x = core.games.state[:, 0, L.X]
+    np.testing.assert_array_equal(x, some.games["state"][begun.drawn, 0, L.X])
+    before = begun.drawn.copy()
+    chosen = np.arange(200) < 100
+    core.reset(mask=chosen)
+    assert (begun.drawn[chosen] != before[chosen]).any()
+    np.testing.assert_array_equal(begun.drawn[~chosen], before[~chosen])
+
+
+def test_a_mirrored_game_goes_on_as_the_mirror_of_the_game_and_so_does_its_raid(some):
+    core = core_of(settings_of({}), 2, 1)
+    begun = BeginInRaids(core, some, [1.0, 0.0, 0.0, 0.0], 3)
+    while begun.mirrored.tolist() != [False, True]:
+        core.reset(seed=None)
+    recorder = Recorder(10, 0.0, 1)
+    recorder.reset(core, 0, 1)
+    for game in range(2):
+        begun.remind(recorder.raids[game], game)
+    assert [raid.upper for raid in recorder.raids] == [True, False]
+    assert recorder.raids[0].phase == Phase.RUN
+    np.testing.assert_allclose(*recorder.seen(np.arange(2)), atol=1e-6)
+    for _ in range(30):
+        commands = np.zeros((2, core.n_boats, 2))
+        commands[:, :3] = recorder.act(core, 0)
+        core.step(commands)
+    np.testing.assert_allclose(*recorder.seen(np.arange(2)), atol=1e-5)
+
+
+def test_a_recorder_keeps_the_moment_a_raid_begins():
+    core = core_of(settings_of({}), 1, 1)
+    core.reset(seed=1)
+    for boat, at in enumerate(PLACES):
+        core.games.state[0, boat, [L.X, L.Y]] = at
+    core.games.on_side[:] = True
+    core.observe()
+    recorder = Recorder(10, 0.0, 1)
+    recorder.reset(core, 0, 1)
+    recorder.advance(np.arange(1))
+    assert [(memory[0], KINDS[kind]) for _, memory, kind in recorder.found] == [(Phase.BAIT, "bait")]
+    with pytest.raises(ConfigError, match="no raid came to 'drag'"):
+        RaidMoments.of(recorder.found)
+
+
+def test_games_that_are_too_short_for_raids_are_one_error():
+    settings = settings_of({"games": 1, "rules": {"max_time_s": 1.0}})
+    with pytest.raises(ConfigError, match="no raid came to 'bait'"):
+        RaidMoments.of(recorded(settings, 0.0, 1))
+
+
+def learner(**ppo):
+    given = {"learning_rate": 0.02, "batch": 64, "epochs": 8, **ppo}
+    return RaidsLearner(settings_of({"device": "cpu", "ppo": given, "net": {"hidden": [16]}}), 0.5, 1.0)
+
+
+def test_gains_look_ahead_over_the_time_that_answers_are_held():
+    one = learner(discount=0.5, gae_lambda=1.0)
+    with torch.no_grad():
+        one.critic[-1].weight.zero_()
+        one.critic[-1].bias.fill_(8.0)
+    seen = np.zeros(SEEN, np.float32)
+    first = Answer(seen, np.zeros(len(NAMES), np.float32), 0.0, earned=1.0, decisions=2, after=seen)
+    last = replace(first, earned=4.0, decisions=1, after=None)
+    cut = replace(first, decisions=3)
+    answers = [first, last, cut]
+    gains, values = one._gains([[first, last], [cut]], answers, one._tensor(np.stack([seen] * 3)))
+    np.testing.assert_allclose(values, 8.0)
+    np.testing.assert_allclose(gains, [1.0 + 0.25 * 4.0 - 8.0, 4.0 - 8.0, 1.0 + 0.125 * 8.0 - 8.0])
+
+
+def test_what_earns_more_is_answered_more_but_not_while_the_critic_learns_alone():
+    one, rng = learner(critic_first=2, discount=0.9), np.random.default_rng(1)
+    moved = []
+    for _ in range(12):
+        given = one.answers(rng.normal(size=(256, SEEN)).astype(np.float32))
+        for answer in given:
+            answer.earned, answer.decisions = float(answer.units[3]), 1
+        one.learn([[answer] for answer in given])
+        moved.append(one.network({}).outputs(np.zeros((1, SEEN), np.float32), np.zeros(1, np.int64))[0])
+    assert np.abs(moved[1]).max() < 0.05
+    assert moved[-1][3] > 2.0
+    assert np.abs(np.delete(moved[-1], 3)).max() < 1.0
+
+
+def tiny_raids(tiny, **changes):
+    given = {
+        "algorithm": "raids",
+        "rules": {"max_time_s": 150.0},
+        "games": 8,
+        "decisions": 1400,
+        "ppo": {"steps": 40, "batch": 300, "epochs": 2, "critic_first": 1},
+        "stages": [{"opponents": ["medium"]}],
+        "evaluation": {"every": 20, "games": 2},
+        "options": {"recorded": [0.0, 0.3]},
+        "seed": 1,
+    }
+    return read_config(tiny(**{**given, **changes}))
+
+
+def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny, tmp_path):
+    settings = tiny_raids(tiny)
+    training_of(settings, tmp_path / "run", False).run()
+    rows = json.loads((tmp_path / "run" / "curve.json").read_text())["rows"]
+    assert [row["decisions"] for row in rows] == [320, 640, 960, 1280, 1600]
+    assert rows[0]["games"] > 10  # raids are short
+    assert rows[0]["divergence"] == 0.0 < rows[1]["divergence"]
+    assert rows[-1]["evaluation"]["medium"]["games"] == 2
+    network = read_weights(tmp_path / "run" / "final.npz")
+    assert (network.kind, network.interval, network.preset) == ("raids", 10, "aamas2024")
+    assert make_batch(f"weights:{tmp_path / 'run' / 'best.npz'}").network.kind == "raids"
+    begun = replace(settings, start=str(tmp_path / "run" / "final.npz"), decisions=1)
+    again = training_of(begun, tmp_path / "again", False)
+    for one, two in zip(again.network().weights, network.weights, strict=True):
+        np.testing.assert_array_equal(one, two)
+    with pytest.raises(ConfigError, match="no entry is told"):
+        write_submission(network, tmp_path / "solution.zip")
+    wider = replace(begun, net=replace(settings.net, hidden=(17,)))
+    with pytest.raises(ConfigError, match="start does not fit"):
+        training_of(wider, tmp_path / "wider", False)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"options": {"share": [1]}}, "unknown option 'share'.*shares"),
+        ({"options": {"spread": 0}}, "options.spread is 0"),
+        ({"options": {"recorded": []}}, "options.recorded is"),
+        ({"options": {"shares": [1, 1]}}, "give a list of 4 numbers"),
+        ({"options": {"shares": [0, 0, 0, 0]}}, "give one above 0"),
+        ({"stages": [{"opponents": ["hold"]}, {"opponents": ["medium"]}]}, "one stage"),
+        ({"net": {"hidden": [16], "roles": "each"}}, "roles: shared"),
+        ({"shield": "training", "shield_every": 10}, "shield_every: 1"),
+        ({"rules": {"team_size": 2}}, "teams of 3 boats"),
+    ],
+)
+def test_what_raids_cannot_be_trained_with_is_one_error(tiny, tmp_path, changes, words):
+    with pytest.raises(ConfigError, match=words):
+        training_of(tiny_raids(tiny, **changes), tmp_path / "run", False)
+
+
+def test_raids_do_not_resume(tiny, tmp_path):
+    with pytest.raises(ConfigError, match="no --resume"):
+        training_of(tiny_raids(tiny), tmp_path / "run", True)
