@@ -155,8 +155,7 @@ def clear_of_constraints(
 ) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
-    The sides of the field are looked at only until a half turn could be over, since every straight run ends beyond. A
-    boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told. Of a
+    A boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told. Of a
     keep-out circle that is less what the path would break of the rest, which else counted for nothing beside how deep
     the boat is in it. Paths say nothing of a barrier of which nothing is known where the boat is, see
     `registered.unknown_at`.
