@@ -307,10 +307,12 @@ PLAYED_SETS = {
     "sets[].heading_deg": "heading of the opponent relative to the own one, deg; 180 is head-on",
     "sets[].reach_m2": "positions of the opponent whose value is below the radius, m^2",
     "sets[].lost_m2": "positions of a value up to 1 m above it from which some opponent reached the shielded boat, m^2",
+    "sets[].player_m2": "those from which some opponent reached a boat that the table itself steers, m^2",
     "sets[].played": "how many of those were played",
     "sets[].tried": "positions of higher values that were played",
     "sets[].tried_lost": "those of them from which an opponent reached the boat",
     "sets[].ratio": "reach_m2 and lost_m2 together, times reach_m2",
+    "sets[].player_ratio": "reach_m2 and player_m2 together, times reach_m2",
     **{f"bars[].{k}": v for k, v in _BAR.items()},
 }
 

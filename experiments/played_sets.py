@@ -17,7 +17,7 @@ from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
-from steerclear.shield.tables.duel import GREEDY, LEAD, PURE, best_rudders, chase, steer
+from steerclear.shield.tables.duel import GREEDY, LEAD, PURE, best_rudders, chase, duel, steer
 from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
 from steerclear.shield.tables.lookup import Tables
 from steerclear.shield.tables.margin import full_thrust_state
@@ -58,6 +58,7 @@ class PlayedSet:
         heading_deg: heading of the opponent relative to the own one, deg; 180 is head-on.
         reach_m2: positions of the opponent whose value is below the radius, m^2: all count as lost.
         lost_m2: positions of a value up to `BAND_M` above it from which some opponent reached the shielded boat, m^2.
+        player_m2: those from which some opponent reached a boat that the table itself steers, at top speed, m^2.
         played: how many of those were played, each against every opponent with every want.
         tried: positions of higher values that were played.
         tried_lost: those of them from which an opponent reached the boat.
@@ -68,6 +69,7 @@ class PlayedSet:
     heading_deg: float
     reach_m2: float
     lost_m2: float
+    player_m2: float
     played: int
     tried: int
     tried_lost: int
@@ -76,6 +78,11 @@ class PlayedSet:
     def ratio(self) -> float:
         """The reachability set and what is lost beside it, times the former."""
         return (self.reach_m2 + self.lost_m2) / self.reach_m2
+
+    @property
+    def player_ratio(self) -> float:
+        """The same of the boat that the table steers: what the table promises and cannot keep."""
+        return (self.reach_m2 + self.player_m2) / self.reach_m2
 
 
 @dataclass(frozen=True)
@@ -107,12 +114,14 @@ def play_set(task: Task) -> PlayedSet:
     beside, beyond = np.flatnonzero(band & ~reach), np.flatnonzero(~band)[::BEYOND]
     chosen, run_s = np.concatenate([beside, beyond]), min(LONGEST_S, values.card.horizon_s)
     lost = games_lost(values, config, state[chosen], task.radius_m, run_s)
+    player_lost = duels_lost(values, state[beside], task.radius_m, run_s)
     return PlayedSet(
         own_mps=task.own_mps,
         other_mps=task.other_mps,
         heading_deg=task.heading_deg,
         reach_m2=math.pi * task.radius_m**2 + float(cells_m2[reach].sum()),
         lost_m2=float(cells_m2[beside][lost[: len(beside)]].sum()),
+        player_m2=float(cells_m2[beside][player_lost].sum()),
         played=len(beside),
         tried=len(beyond),
         tried_lost=int(lost[len(beside) :].sum()),
@@ -149,6 +158,18 @@ def games_lost(
             sent = shield.decide(state, wanted, np.stack([~reached, np.zeros_like(reached)], axis=-1))
             move(tables, params, state, sent, manner, sub_steps(values.card.dt_s), radius_m, reached)
     return np.asarray(reached.reshape(len(start), len(kinds)).any(axis=1))
+
+
+def duels_lost(values: ValueTable, start: Array, radius_m: float, run_s: float) -> NDArray[np.bool_]:
+    """From which of these states (k, 2, N_STATE) a first boat that the table steers is reached in some game."""
+    tables, steps = stack_tables([values]), round(run_s / SUB_STEP_S)
+    params = np.stack([get_platform(name).pack() for name in (values.card.own, values.card.other)])
+    table_steps = sub_steps(values.card.dt_s)
+
+    def lost(own: Array, other: Array, manner: int) -> bool:
+        return bool(duel(tables, 0, params, own.copy(), other.copy(), manner, False, table_steps, steps) < radius_m)
+
+    return np.array([any(lost(one[0], one[1], manner) for manner in MANNERS) for one in start], dtype=np.bool_)
 
 
 @kernel

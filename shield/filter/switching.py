@@ -180,10 +180,10 @@ def _find_backups(count: int, scene: Scene) -> int:
     """
     ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
     for _ in range(ours.shape[0]):
-        movers = count
-        if not _assign_backups(count, scene):
-            movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
-        if movers == count or all_spent(tuning, work):
+        if _assign_backups(count, scene) or all_spent(tuning, work):
+            break
+        movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
+        if movers == count:
             break
         count = movers
     run_opponents(1, scene)

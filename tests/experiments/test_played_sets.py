@@ -8,7 +8,7 @@ import pytest
 from steerclear.experiments import cli, played_sets, unsafe_sets
 from steerclear.experiments.docs_pages import write_pages
 from steerclear.experiments.keys import PLAYED_SETS, undocumented
-from steerclear.experiments.played_sets import PlayedSet, games_lost, play_set, tasks_of
+from steerclear.experiments.played_sets import PlayedSet, duels_lost, games_lost, play_set, tasks_of
 from steerclear.experiments.played_sets_page import HEADS, bars_of, rows_of
 from steerclear.experiments.unsafe_sets import RATIO_BAR, values_m
 from steerclear.shield import ShieldConfig
@@ -58,13 +58,26 @@ def test_boats_head_on_are_saved_until_the_table_says_that_nobody_can(heron):
     assert games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).tolist() == [True, True, False]
 
 
+def test_so_is_a_boat_that_the_table_steers(heron):
+    state = meeting((0.0, 3.0), (0.0, 4.0), (0.0, 12.0))
+    start = state.copy()
+    assert duels_lost(heron, state, RADIUS_M, 8.0).tolist() == [True, True, False]
+    np.testing.assert_array_equal(state, start)
+
+
+@pytest.fixture
+def no_duels(monkeypatch):
+    """Nothing lost by the table itself, at once."""
+    monkeypatch.setattr(played_sets, "duels_lost", lambda values, start, *_: np.zeros(len(start), bool))
+
+
 def test_a_shield_that_fears_nobody_loses_more(heron):
     state = meeting((1.0, 6.0), (2.0, 5.0))
     assert games_lost(heron, ShieldConfig(profile="hold-course"), state, RADIUS_M, 8.0).all()
     assert not games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).any()
 
 
-def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, monkeypatch):
+def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, no_duels, monkeypatch):
     monkeypatch.setattr(played_sets, "RINGS", 200)
     monkeypatch.setattr(played_sets, "BEARINGS", 72)
     monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.zeros(len(start), bool))
@@ -74,7 +87,7 @@ def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, monkeypa
 
 
 @pytest.mark.parametrize("sector", range(6))
-def test_positions_beyond_are_tried_on_all_bearings(heron, monkeypatch, sector):
+def test_positions_beyond_are_tried_on_all_bearings(heron, no_duels, monkeypatch, sector):
     """Lost in a sixth of all bearings: about a sixth of those tried must say so."""
 
     def in_sector(values, config, start, *_):
@@ -87,7 +100,7 @@ def test_positions_beyond_are_tried_on_all_bearings(heron, monkeypatch, sector):
     assert one.tried_lost / one.tried == pytest.approx(1.0 / 6.0, abs=0.06)
 
 
-def test_all_that_is_lost_beside_the_reachability_set_counts_by_its_area(heron, few, monkeypatch):
+def test_all_that_is_lost_beside_the_reachability_set_counts_by_its_area(heron, few, no_duels, monkeypatch):
     monkeypatch.setattr(played_sets, "RINGS", 200)
     monkeypatch.setattr(played_sets, "BEARINGS", 72)
     monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.ones(len(start), bool))
@@ -138,10 +151,10 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, arguments, said):
 
 def test_the_worst_row_is_judged():
     fine, large, beyond = (
-        PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
+        PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 3.0, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
     )
     assert [bar["met"] for bar in bars_of([fine])] == [True, True]
     assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
     assert [bar["met"] for bar in bars_of([fine, beyond])] == [True, False]
     row = dict(zip(HEADS, rows_of([large])[0], strict=True))
-    assert (row["ratio"], row["lost beyond"]) == ("1.20", "0 of 50")
+    assert (row["ratio"], row["by table"], row["lost beyond"]) == ("1.20", "1.10", "0 of 50")

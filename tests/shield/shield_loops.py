@@ -12,12 +12,13 @@ from steerclear.shield.platforms import layout as L
 
 
 class Run(NamedTuple):
-    """What happened: positions (T+1, ..., n, 2) m, reasons, sent commands and certificates (T, ..., n)."""
+    """What happened: positions (T+1, ..., n, 2) m; reasons, sent, certificates and what was changed (T, ..., n)."""
 
     position: np.ndarray
     reason: np.ndarray
     sent: np.ndarray
     certificate_m: np.ndarray
+    intervened: np.ndarray | None = None
 
     def closest(self, own):
         """Least distance between a boat of ``own`` (n,) bool and any boat, per game."""
@@ -42,7 +43,7 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
     """Run a single shield on; ``wanted(step, state)`` gives (n, 2) speed m/s and relative heading deg."""
     params, state = packed(fleet.platforms), fleet.state.copy()
     fill(state, params)
-    position, reason, sent, certificate = [state[:, :2].copy()], [], [], []
+    position, reason, sent, certificate, intervened = [state[:, :2].copy()], [], [], [], []
     for step in range(steps):
         now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
         decisions = shield.decide(now, Commands.relative_deg(wanted(step, state)), surroundings)
@@ -51,7 +52,8 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
         reason.append(decisions.reason.copy())
         sent.append(decisions.sent.values.copy())
         certificate.append(decisions.certificate_m.copy())
-    return Run(np.array(position), np.array(reason), np.array(sent), np.array(certificate))
+        intervened.append(decisions.intervened.copy())
+    return Run(*(np.array(kept) for kept in (position, reason, sent, certificate, intervened)))
 
 
 def sail_games(config, state, platforms, team, wanted, steps, ours=None, surroundings=None):
