@@ -123,7 +123,7 @@ def test_who_backs_up_when_the_search_is_over_is_not_sent_what_it_wanted():
 
         config, around = ShieldConfig(search_limit=LEAST, edge_m=0.2), Surroundings(field=(0.0, 0.0, 900.0, 80.0))
         run = sail(Shield(config, around), fleet_of_rows(np.array(rows), team, "heron"), wanted, 100)
-        backs_up = run.reason == Reason.BACKUP
+        backs_up = (run.reason == Reason.BACKUP) & run.cut_short
         backed_up += backs_up.sum()
         assert run.intervened[backs_up].all()
     assert backed_up > 100
