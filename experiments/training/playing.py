@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from steerclear.policies.entrants.learned import batch_of
 from steerclear.policies.entrants.learned.network import Network
+from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
 from ..statistics import mean_interval
@@ -75,3 +77,21 @@ def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     for name, limit in (("net_low", interval.low), ("net_high", interval.high)):
         found[name] = limit if np.isfinite(limit) else None  # none where all games ended alike
     return {"games": len(rows), **found}
+
+
+def evaluation_of(settings: TrainingSettings, network: Network) -> dict[str, Any]:
+    """Summaries by opponent of the games that a training's settings ask for."""
+    wanted, shielded = settings.evaluation, settings.shield != "none"
+    return {
+        name: summary_of(play_games(settings, network, name, wanted.games, wanted.seed, shielded))
+        for name in wanted.opponents
+    }
+
+
+def keep_best(found: Mapping[str, Any], best: float, network: Network, path: Path) -> float:
+    """Write a network whose evaluation is better than the best so far; the mean net captures of the best now."""
+    mean = float(np.mean([one["net"] for one in found.values()]))
+    if mean > best:
+        write_weights(network, path)
+        return mean
+    return best

@@ -18,7 +18,7 @@ from .curve import write_curve
 from .games import learners_of, set_stage, stagger
 from .learner import DivergedError
 from .networks import TeamFeatures, features_of
-from .playing import play_games, summary_of
+from .playing import evaluation_of
 from .pool import Pool
 from .qmix import MonotoneMixer, Qmix, Transitions
 from .settings import TrainingSettings
@@ -111,11 +111,7 @@ class QmixTraining:
         row = {"decisions": self.decisions, "loss": float(np.mean(losses)), "net": float(np.mean(nets))}
         row["wall"] = {"total_s": time.perf_counter() - began}
         if evaluate:
-            wanted, shielded = self.settings.evaluation, self.settings.shield != "none"
-            row["evaluation"] = {
-                name: summary_of(play_games(self.settings, self.network(), name, wanted.games, wanted.seed, shielded))
-                for name in wanted.opponents
-            }
+            row["evaluation"] = evaluation_of(self.settings, self.network())
         self.curve.append(row)
         write_curve(self.folder, self.curve, self.settings)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..spec import near
 from .checks import number
 from .curve import write_curve
 from .games import learners_of, set_stage
-from .playing import play_games, summary_of
+from .playing import evaluation_of, keep_best
 from .pool import Pool
 from .raid_moments import KINDS, BeginInRaids, RaidMoments, recorded
 from .raids_learner import NONE, Answer, RaidsLearner
@@ -35,6 +36,8 @@ DEFAULTS = {
 }
 """Deviations of the numbers in games that moments are recorded from, for each as many as are played at once; how often
 each of `raid_moments.KINDS` comes; deviation of what is drawn at first; see `RaidsLearner`."""
+PASSED_OVER = {name: attrgetter(name)(TrainingSettings()) for name in ("actions", "ppo.value", "net.features")}
+"""Settings of other algorithms that raids have no use for, and how they are when nobody gives them."""
 LONGEST_S = 100.0
 """Time until a game that began in a raid is over, s."""
 RECORDED_SEED = 810_000
@@ -195,17 +198,10 @@ class RaidsTraining:
 
     def _evaluate(self) -> dict[str, Any]:
         """Games against held-out opponents, and the best kept."""
-        wanted, network = self.settings.evaluation, self.network()
+        network = self.network()
         write_weights(network, self.folder / FINAL)
-        shielded = self.settings.shield != "none"
-        found = {
-            name: summary_of(play_games(self.settings, network, name, wanted.games, wanted.seed, shielded))
-            for name in wanted.opponents
-        }
-        mean = float(np.mean([one["net"] for one in found.values()]))
-        if mean > self._best:
-            self._best = mean
-            write_weights(network, self.folder / BEST)
+        found = evaluation_of(self.settings, network)
+        self._best = keep_best(found, self._best, network, self.folder / BEST)
         return found
 
 
@@ -225,6 +221,9 @@ def _checked(settings: TrainingSettings, resume: bool) -> dict[str, Any]:
             raise ConfigError(f"unknown option {name!r} of raids; {near(str(name), DEFAULTS)}")
     if resume or len(settings.stages) > 1 or settings.net.roles != "shared" or settings.shield_every > 1:
         raise ConfigError("raids begin anew (no --resume), in one stage, with net.roles: shared and shield_every: 1")
+    for name, value in PASSED_OVER.items():
+        if attrgetter(name)(settings) != value:
+            raise ConfigError(f"raids have no use for {name}; leave it out")
     if settings.game(settings.stages[0]).team_size != BOATS:
         raise ConfigError(f"raids are for teams of {BOATS} boats; leave out team_size")
     found = {**DEFAULTS, **settings.options}

@@ -20,7 +20,7 @@ from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
 from .games import Timed, check_sight, learners_of, set_stage, stagger
 from .learner import Learner
-from .playing import play_games, summary_of
+from .playing import evaluation_of, keep_best
 from .pool import SELF, Pool
 from .rewards import WeightedSum
 from .settings import Stage, TrainingSettings
@@ -168,18 +168,10 @@ class Training:
 
     def _evaluate(self) -> dict[str, Any]:
         """Games against held-out opponents, and the best kept; the weights as they are lie there before the first."""
-        wanted = self.settings.evaluation
-        shielded = self.settings.shield != "none"
         network = self.learner.network()
         write_weights(network, self.folder / FINAL)
-        found = {
-            name: summary_of(play_games(self.settings, network, name, wanted.games, wanted.seed, shielded))
-            for name in wanted.opponents
-        }
-        mean = float(np.mean([one["net"] for one in found.values()]))
-        if mean > self._best:
-            self._best = mean
-            write_weights(network, self.folder / BEST)
+        found = evaluation_of(self.settings, network)
+        self._best = keep_best(found, self._best, network, self.folder / BEST)
         return {"evaluation": found}
 
     def _begin_games(self, more: int = 0) -> None:

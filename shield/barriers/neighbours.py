@@ -36,6 +36,7 @@ def find_neighbours(scene: Scene) -> None:
     foresee(scene)
     for i in range(n):
         work.pursued[i] = False
+        work.side_samples[i] = boats.static_samples[i]
         work.reach_samples[i] = _reach_samples(i, scene)
         work.first_pursuer[i] = work.first_refuser[i] = 0
         work.first_manner[i, :] = 0
@@ -66,6 +67,7 @@ def find_neighbours(scene: Scene) -> None:
                     work.pursued[j] = work.pursued[j] or may_pursue(i, boats, work)
                     work.cost[i] += PURSUER_COST
                     work.cost[j] += PURSUER_COST
+                _look_along(i, j, square, radius, scene)
                 least = radius - tuning.buffer_m
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least
@@ -73,6 +75,22 @@ def find_neighbours(scene: Scene) -> None:
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
     find_outnumbered(scene)
+
+
+@lean_kernel
+def _look_along(i: int, j: int, square: float, radius: float, scene: Scene) -> None:
+    """Have two boats of ours look at the sides of the field to the end of their paths, if they are beside each other.
+
+    A straight run ends beyond a side of any field, and before one that is near a boat turns about in time: so sides
+    are looked at until a half turn could be over. Not if a team-mate could be in the way of that turn.
+    """
+    ours, boats, work = scene.ours, scene.boats, scene.work
+    if not (ours[i] and ours[j]):
+        return
+    turn_s = max(boats.static_samples[i], boats.static_samples[j]) * boats.sample_s
+    reach = radius + (boats.fastest_mps[i] + boats.fastest_mps[j]) * turn_s
+    if square <= reach * reach:
+        work.side_samples[i], work.side_samples[j] = boats.samples[i], boats.samples[j]
 
 
 @lean_kernel

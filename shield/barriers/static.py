@@ -40,6 +40,7 @@ class Sampling(NamedTuple):
 
     Attributes:
         near: sample at which a half turn could be over.
+        side: last sample at which the sides of the field are looked at.
         last: last sample.
         first_s: time until the first sample, s.
         sample_s: time from sample to sample, s.
@@ -49,6 +50,7 @@ class Sampling(NamedTuple):
     """
 
     near: int
+    side: int
     last: int
     first_s: float
     sample_s: float
@@ -82,6 +84,7 @@ def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
     state, boats = scene.state, scene.boats
     return Sampling(
         boats.static_samples[i],
+        scene.work.side_samples[i],
         boats.samples[i],
         scene.tuning.model_s,
         boats.sample_s,
@@ -175,7 +178,7 @@ def clear_of_constraints(
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only else sampling.last
+        last = sampling.near if near_only else (sampling.side if o >= total - SIDES else sampling.last)
         if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
     if beyond >= 0:

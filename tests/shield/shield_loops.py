@@ -12,13 +12,14 @@ from steerclear.shield.platforms import layout as L
 
 
 class Run(NamedTuple):
-    """What happened: positions (T+1, ..., n, 2) m; reasons, sent, certificates and what was changed (T, ..., n)."""
+    """What happened: positions (T+1, ..., n, 2) m; reasons, sent commands, certificates and the rest (T, ..., n)."""
 
     position: np.ndarray
     reason: np.ndarray
     sent: np.ndarray
     certificate_m: np.ndarray
     intervened: np.ndarray | None = None
+    cut_short: np.ndarray | None = None
 
     def closest(self, own):
         """Least distance between a boat of ``own`` (n,) bool and any boat, per game."""
@@ -43,7 +44,7 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
     """Run a single shield on; ``wanted(step, state)`` gives (n, 2) speed m/s and relative heading deg."""
     params, state = packed(fleet.platforms), fleet.state.copy()
     fill(state, params)
-    position, reason, sent, certificate, intervened = [state[:, :2].copy()], [], [], [], []
+    position, reason, sent, certificate, intervened, cut = [state[:, :2].copy()], [], [], [], [], []
     for step in range(steps):
         now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
         decisions = shield.decide(now, Commands.relative_deg(wanted(step, state)), surroundings)
@@ -53,7 +54,8 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
         sent.append(decisions.sent.values.copy())
         certificate.append(decisions.certificate_m.copy())
         intervened.append(decisions.intervened.copy())
-    return Run(*(np.array(kept) for kept in (position, reason, sent, certificate, intervened)))
+        cut.append(decisions.cut_short.copy())
+    return Run(*(np.array(kept) for kept in (position, reason, sent, certificate, intervened, cut)))
 
 
 def sail_games(config, state, platforms, team, wanted, steps, ours=None, surroundings=None):

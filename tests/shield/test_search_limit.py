@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from shield_loops import Wander, sail, sail_games, scattered
 from shield_scenes import distances
-from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from steerclear.shield.backup.effort import PATH_COST, PURSUER_COST
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import fresh_state
+from steerclear.shield.platforms import layout as L
 
 LEAST = 1000.0
 """The lowest limit there is."""
@@ -95,3 +96,34 @@ def test_a_batch_is_cut_short_as_single_decisions_are(limit):
 def test_a_limit_that_is_none_is_refused(limit):
     with pytest.raises(ConfigError, match="search_limit"):
         Shield(search_limit=limit)
+
+
+def crowded_edge(random, x_m):
+    """A few herons of ours anyhow at an edge, with an opponent or without: state rows, teams, courses, deg."""
+    own, opponents = int(random.integers(2, 6)), int(random.integers(0, 2))
+    rows = [
+        fresh_state(
+            x_m + random.uniform(-9.0, 9.0), random.uniform(62.0, 79.9), random.uniform(-180, 180), random.uniform(0, 2)
+        )
+        for _ in range(own + opponents)
+    ]
+    return rows, [0] * own + [1] * opponents, list(random.uniform(-180.0, 180.0, own + opponents))
+
+
+def test_who_backs_up_when_the_search_is_over_is_not_sent_what_it_wanted():
+    """Though team-mates have just joined, and not all have a manoeuvre from where they are."""
+    backed_up = 0
+    for seed in range(25):
+        random = np.random.default_rng(seed)
+        rows, team, courses = map(list.__add__, crowded_edge(random, 100.0), crowded_edge(random, 112.0))
+
+        def wanted(_, state, courses=courses):
+            error = (np.array(courses) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+            return np.stack([np.full(len(state), 2.0), error], axis=-1)
+
+        config, around = ShieldConfig(search_limit=LEAST, edge_m=0.2), Surroundings(field=(0.0, 0.0, 900.0, 80.0))
+        run = sail(Shield(config, around), fleet_of_rows(np.array(rows), team, "heron"), wanted, 100)
+        backs_up = (run.reason == Reason.BACKUP) & run.cut_short
+        backed_up += backs_up.sum()
+        assert run.intervened[backs_up].all()
+    assert backed_up > 100

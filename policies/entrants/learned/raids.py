@@ -16,9 +16,9 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from ..plane import SLOWEST, SLOWING_M, Order
-from ..play import EntrantTeam
-from ..sight import Sight, is_turned, look
+from ..front import BatchFront
+from ..plane import SLOWEST, SLOWING_M
+from ..sight import is_turned, look
 from ..undertow.aims import aim_of
 from ..undertow.chart import Chart
 from ..undertow.raid import Phase, Raid
@@ -172,21 +172,10 @@ class RaidsBatch:
         return np.concatenate(parts, axis=1).astype(np.float32)
 
 
-class RaidsTeam(EntrantTeam):
+class RaidsTeam(BatchFront):
     """The same in one game: a thin front over `RaidsBatch`, whose arguments it takes."""
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
         super().__init__()
         self.name = name
         self._batch = RaidsBatch(network, name, sample)
-
-    def begin(self, sight: Sight) -> None:
-        """No raid yet."""
-        self._batch.reset(self.core, self.team, self.seed)
-
-    def decide(self, sight: Sight) -> list[Order]:
-        """What the batch commands."""
-        commands = self._batch.act(self.core, self.team)[0].tolist()
-        return [
-            (speed, boat.heading + math.radians(turn)) for boat, (speed, turn) in zip(sight.own, commands, strict=True)
-        ]

@@ -24,7 +24,7 @@ def main(folder, what, states, out):
     import numpy as np
 
     recorded = dict(np.load(states))
-    package = next(Path(folder).glob("steerclear_*")).name
+    package = next(path for path in Path(folder).glob("steerclear_*") if path.is_dir()).name
     answer = {"shield": shield_commands, "entry": entry_actions}[what](package, folder, recorded)
     assert not BLOCKED & {name.partition(".")[0] for name in sys.modules}
     np.save(out, np.array(answer))

@@ -77,7 +77,7 @@ def test_qmix_keeps_its_weights_where_the_evaluation_fails(tiny, tmp_path, monke
     def failing(*arguments):
         raise RuntimeError("an opponent's file is gone")
 
-    monkeypatch.setattr("steerclear.experiments.training.qmix_training.play_games", failing)
+    monkeypatch.setattr("steerclear.experiments.training.playing.play_games", failing)
     training = training_of(read_config(tiny(algorithm="qmix", decisions=24)), tmp_path / "run", False)
     with pytest.raises(RuntimeError, match="is gone"):
         training.run()

@@ -181,7 +181,7 @@ def test_an_evaluation_that_fails_loses_nothing_and_is_made_up_for(tiny, tmp_pat
 
     config, folder = tiny(evaluation={"every": 100, "games": 2}), tmp_path / "run"
     with monkeypatch.context() as patched:
-        patched.setattr("steerclear.experiments.training.training.play_games", failing)
+        patched.setattr("steerclear.experiments.training.playing.play_games", failing)
         with pytest.raises(RuntimeError, match="is gone"):
             trained(config, folder)
     facts, _ = read_checkpoint(checkpoints_in(folder)[-1])

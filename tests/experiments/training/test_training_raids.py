@@ -183,6 +183,9 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
         ({"net": {"hidden": [16], "roles": "each"}}, "roles: shared"),
         ({"shield": "training", "shield_every": 10}, "shield_every: 1"),
         ({"rules": {"team_size": 2}}, "teams of 3 boats"),
+        ({"actions": "normalised"}, "no use for actions"),
+        ({"ppo": {"value": 1.0}}, "no use for ppo.value"),
+        ({"net": {"hidden": [16], "features": False}}, "no use for net.features"),
     ],
 )
 def test_what_raids_cannot_be_trained_with_is_one_error(tiny, tmp_path, changes, words):
