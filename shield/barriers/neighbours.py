@@ -88,7 +88,7 @@ def _look_along(i: int, j: int, square: float, radius: float, scene: Scene) -> N
     if not (ours[i] and ours[j]):
         return
     turn_s = max(boats.static_samples[i], boats.static_samples[j]) * boats.sample_s
-    reach = radius + (boats.fastest_mps[i] + boats.fastest_mps[j]) * turn_s
+    reach = radius + (boats.fastest_mps[i] + boats.fastest_mps[j]) * turn_s / math.pi * 1.0
     if square <= reach * reach:
         work.side_samples[i], work.side_samples[j] = boats.samples[i], boats.samples[j]
 

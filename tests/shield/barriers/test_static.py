@@ -28,7 +28,7 @@ def clear_of(near_only, path, static, here=None, near=None, drift_m=0.0, grace=1
     """Clearance row of a path sampled every 0.5 s, on which a boat goes 1 m from sample to sample."""
     out, last = np.full(N_CLEARANCE, FAR), len(path) - 1
     here, near = path[0] if here is None else np.asarray(here), last if near is None else near
-    sampling = Sampling(near, last, 0.1, 0.5, 1.0, drift_m, grace)
+    sampling = Sampling(near, last, last, 0.1, 0.5, 1.0, drift_m, grace)
     clear_of_constraints(near_only, here, path, sampling, static, NONE_REGISTERED, out)
     return out
 
