@@ -28,7 +28,7 @@ def find_neighbours(scene: Scene) -> None:
     The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
-    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
+    state, ours, boats, tuning, work = scene.state, scene.ours, scene.boats, scene.tuning, scene.work
     n = state.shape[0]
     work.spent[0], work.cut_short[0] = 0.0, False
     work.cost[:] = PATH_COST
@@ -67,7 +67,9 @@ def find_neighbours(scene: Scene) -> None:
                     work.pursued[j] = work.pursued[j] or may_pursue(i, boats, work)
                     work.cost[i] += PURSUER_COST
                     work.cost[j] += PURSUER_COST
-                _look_along(i, j, square, radius, scene)
+                if ours[i] and ours[j]:
+                    _look_along(i, square, radius, scene)
+                    _look_along(j, square, radius, scene)
                 least = radius - tuning.buffer_m
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least
@@ -78,19 +80,16 @@ def find_neighbours(scene: Scene) -> None:
 
 
 @lean_kernel
-def _look_along(i: int, j: int, square: float, radius: float, scene: Scene) -> None:
-    """Have two boats of ours look at the sides of the field to the end of their paths, if they are beside each other.
+def _look_along(i: int, square: float, radius: float, scene: Scene) -> None:
+    """Have boat i look at the sides of the field to the end of its paths if a team-mate is where it would turn about.
 
-    A straight run ends beyond a side of any field, and before one that is near a boat turns about in time: so sides
-    are looked at until a half turn could be over. Not if a team-mate could be in the way of that turn.
+    Every straight run ends beyond a side, so sides are looked at until a half turn could be over: one is made when it
+    is time. With a team-mate less far off than that turn is wide there may be no room for it then.
     """
-    ours, boats, work = scene.ours, scene.boats, scene.work
-    if not (ours[i] and ours[j]):
-        return
-    turn_s = max(boats.static_samples[i], boats.static_samples[j]) * boats.sample_s
-    reach = radius + (boats.fastest_mps[i] + boats.fastest_mps[j]) * turn_s / math.pi * 1.0
-    if square <= reach * reach:
-        work.side_samples[i], work.side_samples[j] = boats.samples[i], boats.samples[j]
+    boats, work = scene.boats, scene.work
+    width_m = 2.0 / math.pi * boats.fastest_mps[i] * boats.static_samples[i] * boats.sample_s
+    if square <= (radius + width_m) ** 2:
+        work.side_samples[i] = boats.samples[i]
 
 
 @lean_kernel
