@@ -7,8 +7,8 @@ the program, which are linear, then find no answer, and a boat that wants throug
 from __future__ import annotations
 
 from ..backup.effort import all_spent
-from ..jit import lean_kernel
-from ..plan import BACKUP, Plan
+from ..jit import copy_row, lean_kernel
+from ..plan import BACKUP, Plan, unchanged
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
@@ -34,9 +34,12 @@ def _mildest_turn(i: int, plan: Plan) -> float:
 
 @lean_kernel
 def _give_back(share: float, i: int, scene: Scene) -> None:
-    """Command of boat i that share of the way from its backup to the wanted one."""
+    """Command of boat i that share of the way from its backup to the wanted one; all of it is that, bit for bit."""
     state, boats, tuning, plan = scene.state, scene.boats, scene.tuning, scene.plan
     backup, mildest = plan.verified[i], _mildest_turn(i, plan)
+    if share == 1.0 and mildest == plan.wanted_turn[i]:
+        copy_row(plan.commands[i], plan.screened[i])
+        return
     turn = backup[TURN] + share * (mildest - backup[TURN])
     speed = backup[SPEED] + share * (plan.screened[i, 0] - backup[SPEED])
     speed = max(0.0, min(boats.params[i, L.MAX_SPEED], speed))
@@ -57,14 +60,15 @@ def _ease_one(i: int, scene: Scene) -> None:
         else:
             too_far = at
         if kept == 1.0:
-            return
-    if at == kept:
-        return
+            break
     if kept == 0.0:
         go_back(i, scene)
-    else:
+    elif at != kept:
         _give_back(kept, i, scene)
-    check_one(i, scene)
+    if at != kept:
+        check_one(i, scene)
+    if unchanged(i, scene.plan):
+        scene.plan.reason[i], scene.plan.slack_m[i] = scene.plan.screened_reason[i], 0.0
 
 
 @lean_kernel

@@ -108,7 +108,7 @@ def test_nothing_is_said_before_the_first_tick():
 
 
 def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
-    seen, stages = set(), {"begin", "linearise", "accept", "finish"}
+    seen, stages = set(), {"begin", "begin_group", "linearise", "accept", "end_group", "end"}
     for name in stages:
         stage = getattr(deciders, name)
         monkeypatch.setattr(deciders, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])

@@ -26,9 +26,9 @@ def test_a_safe_command_of_the_policy_leaves_bit_for_bit():
 
 def test_what_the_tick_says_was_decided_is_what_left():
     world = World(
-        fleet_of(blue=2, red=0),
-        [(20.0, 0.0, 0.0, 2.0), (20.3, 30.0, 180.0, 2.0)],
-        lambda s: np.array([[2.0, 0.0], [2.0, math.pi]]),
+        fleet_of(blue=3, red=0),
+        [(20.0, 0.0, 0.0, 2.0), (20.3, 30.0, 180.0, 2.0), (5.0, 15.0, 90.0, 2.0)],
+        lambda s: np.array([[2.0, 0.0], [2.0, math.pi], [2.0, 0.5 * math.pi]]),
     )
     world.run(10.0)
     assert sum(tick.decisions.count_intervened for tick in world.sink.ticks) > 10
