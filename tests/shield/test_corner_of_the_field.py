@@ -37,6 +37,6 @@ def test_boats_that_press_into_one_corner(platform, boats):
     inside_m = np.minimum(position - FIELD[:2], np.array(FIELD[2:]) - position).min(axis=(0, 2, 3))
     assert (inside_m < (-1.0 if platform == "heron" else -1.5)).mean() <= 0.04
     assert inside_m.min() >= -2.0
-    assert (inside_m < 0.0).mean() <= 0.1
+    assert (inside_m < 0.0).mean() <= (0.03 if platform == "heron" else 0.1)
     reached_m = np.linalg.norm(position - CORNER, axis=-1).min(axis=(0, 2))
     assert reached_m.max() < 5.0, "in some game nobody came to the corner"

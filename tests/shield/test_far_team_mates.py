@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import sail
 from shield_scenes import fleet_of
-from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
+from steerclear.shield import Shield, ShieldConfig, Surroundings
 from steerclear.shield.platforms import layout as L
 
 FIELD = (0.0, 0.0, 900.0, 80.0)
@@ -112,12 +112,12 @@ def remembered(shield):
     return [np.asarray(field)[0] for field in shield._deciders.memory]
 
 
-def sailed(groups, **settings):
+def sailed(groups):
     """Run of those groups, and the shield afterwards."""
     rows, team, courses = ([one for group in groups for one in group[k]] for k in range(3))
     fleet = fleet_of(rows, team, "heron")
     fleet.state[:, L.THRUST] = 100.0
-    shield = Shield(ShieldConfig(edge_m=0.2, **settings), Surroundings(field=FIELD))
+    shield = Shield(ShieldConfig(edge_m=0.2), Surroundings(field=FIELD))
 
     def wanted(step, state):
         error = (np.array(courses) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
@@ -139,15 +139,3 @@ def test_groups_that_cannot_meet_are_decided_for_as_if_each_were_alone(seed):
     for mine, ours in zip(remembered(one), remembered(both), strict=True):
         kept = ours[:n, :n] if ours.ndim == 2 else ours[:n]
         np.testing.assert_allclose(kept, mine, atol=1e-6)
-
-
-def test_who_backs_up_before_the_search_is_over_is_not_sent_what_it_wanted():
-    """Though not all who take part have a manoeuvre yet."""
-    backed_up = 0
-    for seed in range(25):
-        random = np.random.default_rng(seed)
-        run, _ = sailed([crowded_edge(random, 100.0), crowded_edge(random, 112.0)], search_limit=1000.0)
-        backs_up = run.reason == Reason.BACKUP
-        backed_up += backs_up.sum()
-        assert run.intervened[backs_up].all()
-    assert backed_up > 100

@@ -24,11 +24,12 @@ NONE_REGISTERED = Registered(
 )
 
 
-def clear_of(near_only, path, static, here=None, near=None, drift_m=0.0, grace=1.0):
+def clear_of(near_only, path, static, here=None, near=None, side=None, drift_m=0.0, grace=1.0):
     """Clearance row of a path sampled every 0.5 s, on which a boat goes 1 m from sample to sample."""
     out, last = np.full(N_CLEARANCE, FAR), len(path) - 1
     here, near = path[0] if here is None else np.asarray(here), last if near is None else near
-    sampling = Sampling(near, last, last, 0.1, 0.5, 1.0, drift_m, grace)
+    side = last if side is None else side
+    sampling = Sampling(near, side, last, 0.1, 0.5, 1.0, drift_m, grace)
     clear_of_constraints(near_only, here, path, sampling, static, NONE_REGISTERED, out)
     return out
 
@@ -175,11 +176,12 @@ def test_outside_the_field_the_way_back_is_worth_most_even_if_it_leads_farther_o
     assert straight_in < 0.0
 
 
-def test_the_edge_counts_to_the_end_of_the_path():
+def test_the_edge_counts_only_as_long_as_it_is_looked_at():
     path, field = np.column_stack([np.zeros(20), np.arange(20.0)]), things(field=FIELD)
-    out = clear_of_all(path, field, near=5)
-    assert (out[MARGIN], out[NORMAL_Y]) == (-9.0, -1.0)
-    out = clear_of_all(path[:6], field, near=3, drift_m=0.5)
+    out = clear_of_all(path, field, side=5)
+    assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
+    assert clear_of_all(path, field)[MARGIN] == -9.0
+    out = clear_of_all(path, field, side=5, drift_m=0.5)
     assert (out[MARGIN], out[SAMPLE]) == (2.5, 5.0)
 
 
