@@ -49,7 +49,6 @@ class Work(NamedTuple):
         bound: (n + 1,) neighbour the worst clearance comes from, -1 for none.
         near: (n, n) pairs that can matter.
         pursued: (n,) whether some opponent that may pursue the boat is near.
-        side_samples: (n,) path samples over which the sides of the field are looked at.
         reach_samples: (n,) path samples over which opponents may be followed, as the boat is now.
         breach: (n, n) pairs inside the separation.
         radius: (n, n) radius to keep, m.
@@ -103,7 +102,6 @@ class Work(NamedTuple):
     bound: IntArray
     near: BoolArray
     pursued: BoolArray
-    side_samples: IntArray
     reach_samples: IntArray
     breach: BoolArray
     radius: Array
@@ -161,7 +159,6 @@ def new_work(boats: int, samples: int) -> Work:
             bound=np.full(boats + 1, -1, np.int64),
             near=np.zeros((boats, boats), np.bool_),
             pursued=np.zeros(boats, np.bool_),
-            side_samples=np.zeros(boats, np.int64),
             reach_samples=np.zeros(boats, np.int64),
             breach=np.zeros((boats, boats), np.bool_),
             radius=np.zeros((boats, boats)),

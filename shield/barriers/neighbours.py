@@ -28,7 +28,7 @@ def find_neighbours(scene: Scene) -> None:
     The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
     again; one inside the separation itself is in breach, see `_rank_recovery`.
     """
-    state, ours, boats, tuning, work = scene.state, scene.ours, scene.boats, scene.tuning, scene.work
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
     n = state.shape[0]
     work.spent[0], work.cut_short[0] = 0.0, False
     work.cost[:] = PATH_COST
@@ -36,7 +36,6 @@ def find_neighbours(scene: Scene) -> None:
     foresee(scene)
     for i in range(n):
         work.pursued[i] = False
-        work.side_samples[i] = boats.static_samples[i]
         work.reach_samples[i] = _reach_samples(i, scene)
         work.first_pursuer[i] = work.first_refuser[i] = 0
         work.first_manner[i, :] = 0
@@ -67,9 +66,6 @@ def find_neighbours(scene: Scene) -> None:
                     work.pursued[j] = work.pursued[j] or may_pursue(i, boats, work)
                     work.cost[i] += PURSUER_COST
                     work.cost[j] += PURSUER_COST
-                if ours[i] and ours[j]:
-                    _look_along(i, square, radius, scene)
-                    _look_along(j, square, radius, scene)
                 least = radius - tuning.buffer_m
                 now = math.sqrt(square)
                 work.breach[i, j] = now < least
@@ -77,19 +73,6 @@ def find_neighbours(scene: Scene) -> None:
                 held = max(least, min(radius, now + REGAIN_M))
                 work.radius[i, j], work.radius[j, i] = held, held
     find_outnumbered(scene)
-
-
-@lean_kernel
-def _look_along(i: int, square: float, radius: float, scene: Scene) -> None:
-    """Have boat i look at the sides of the field to the end of its paths if a team-mate is where it would turn about.
-
-    Every straight run ends beyond a side, so sides are looked at until a half turn could be over: one is made when it
-    is time. With a team-mate less far off than that turn is wide there may be no room for it then.
-    """
-    boats, work = scene.boats, scene.work
-    width_m = 2.0 / math.pi * boats.fastest_mps[i] * boats.static_samples[i] * boats.sample_s
-    if square <= (radius + width_m) ** 2:
-        work.side_samples[i] = boats.samples[i]
 
 
 @lean_kernel

@@ -78,13 +78,16 @@ def way_per_sample(i: int, state: Array, boats: Boats) -> float:
 def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
     """How paths of boat i are sampled.
 
+    Sides of the field are looked at to the end of them. Not by who may be pursued: every long straight run ends beyond
+    a side, and of these it has none to spare; so it looks until a half turn could be over, which is made when it is time.
+
     Where there may be a current less and less is excused: asked only to come no nearer than it is, a boat would be
     carried in a little in every step.
     """
     state, boats = scene.state, scene.boats
     return Sampling(
         boats.static_samples[i],
-        scene.work.side_samples[i],
+        boats.static_samples[i] if scene.work.pursued[i] else boats.samples[i],
         boats.samples[i],
         scene.tuning.model_s,
         boats.sample_s,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..backup.effort import all_spent
 from ..jit import copy_row, lean_kernel
-from ..plan import BACKUP, Plan, unchanged
+from ..plan import BACKUP, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
@@ -67,8 +67,6 @@ def _ease_one(i: int, scene: Scene) -> None:
         _give_back(kept, i, scene)
     if at != kept:
         check_one(i, scene)
-    if unchanged(i, scene.plan):
-        scene.plan.reason[i], scene.plan.slack_m[i] = scene.plan.screened_reason[i], 0.0
 
 
 @lean_kernel

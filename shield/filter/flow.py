@@ -17,7 +17,7 @@ from ..barriers.registered import unknown_at
 from ..barriers.static import STATIC, about
 from ..jit import copy_row, lean_kernel
 from ..liveness.right_of_way import forget_pressing, note_pressing
-from ..plan import BACKUP, BEST_EFFORT, HELD, unchanged
+from ..plan import BACKUP, BEST_EFFORT, HELD, QP, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
@@ -110,11 +110,22 @@ def _name_static(scene: Scene) -> None:
 
 
 @lean_kernel
+def _name_unchanged(scene: Scene) -> None:
+    """Say of wanted commands that come out as they were that they passed."""
+    ours, plan = scene.ours, scene.plan
+    for i in range(ours.shape[0]):
+        settled = plan.reason[i] == QP or (plan.reason[i] == BACKUP and plan.slack_m[i] == 0.0)
+        if ours[i] and settled and unchanged(i, plan):
+            plan.reason[i] = plan.screened_reason[i]
+
+
+@lean_kernel
 def end(scene: Scene) -> None:
-    """Say what binds, and remember what was decided."""
+    """Say what binds and why, and remember what was decided."""
     close_groups(scene)
-    _name_static(scene)
     commit(scene)
+    _name_unchanged(scene)
+    _name_static(scene)
 
 
 @lean_kernel

@@ -11,7 +11,7 @@ from ..backup.rank import ALL
 from ..jit import lean_kernel
 from ..scene import Scene
 
-PASSED, NOT_YET = -1, -2
+NO_GROUP, NOT_YET = -1, -2
 """No group: not ours, or of boats whose wanted commands keep everything; and not looked at yet."""
 
 
@@ -31,7 +31,7 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
                 found += 1
     if not short:
         for k in range(found):
-            groups[queue[k]] = PASSED
+            groups[queue[k]] = NO_GROUP
     return short
 
 
@@ -40,7 +40,7 @@ def make_groups(scene: Scene) -> int:
     """Number, in ``plan.group``, the groups in which a wanted command is short of something; returns how many."""
     ours, groups = scene.ours, scene.plan.group
     for i in range(ours.shape[0]):
-        groups[i] = NOT_YET if ours[i] else PASSED
+        groups[i] = NOT_YET if ours[i] else NO_GROUP
     count = 0
     for i in range(ours.shape[0]):
         if groups[i] == NOT_YET and _gather(i, count, scene):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..backup.effort import all_spent
 from ..jit import Array, copy_row, lean_kernel
-from ..plan import QP, unchanged
+from ..plan import QP
 from ..scene import Scene
 from .exact_check import check
 from .linearised import build, list_movers, take_answer
@@ -88,7 +88,7 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
         i = plan.movers[m]
         if safe:
             plan.slack_m[i] = 0.0
-            plan.reason[i] = plan.screened_reason[i] if unchanged(i, plan) else QP
+            plan.reason[i] = QP
         else:
             go_back(i, scene)
     if count > 0 and not safe:

@@ -20,7 +20,6 @@ import numpy as np
 
 from ..backup.assign import assign_plans
 from ..backup.candidates import IN_MEMORY, candidate, remembered
-from ..backup.effort import all_spent
 from ..backup.laying import lay_path
 from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, rank_of, rank_path
 from ..barriers.boats import reported_margin
@@ -148,9 +147,9 @@ def _find_backups(count: int, scene: Scene) -> None:
     fit what boats have whose wanted commands passed: where these are in the way, or are themselves too near them, they
     take part, too.
     """
-    ours, tuning, work, plan = scene.ours, scene.tuning, scene.work, scene.plan
+    ours, plan = scene.ours, scene.plan
     for _ in range(ours.shape[0]):
-        if _assign_backups(count, scene) or all_spent(tuning, work):
+        if _assign_backups(count, scene):
             break
         movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
         if movers == count:
