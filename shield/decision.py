@@ -23,12 +23,12 @@ class Reason(IntEnum):
     PASSED = plan.PASSED
     """The wanted command leaves every boat its backup; it is sent bit for bit."""
     QP = plan.QP
-    """The least change, found by the quadratic program, re-checked with the full boat model."""
+    """The least change between team-mates, found by the quadratic program, re-checked with the full boat model."""
     QP_RELAXED = plan.QP_RELAXED
     """Of logs of 0.2.0 and before: the program's answer with slack. Nothing sends it any more."""
     BACKUP = plan.BACKUP
-    """No checked answer of the program; the boat's backup manoeuvre, which keeps clear of all boats, or as much
-    of it as static constraints ask for."""
+    """The boat's backup manoeuvre, which keeps clear of all boats; off team-mates and static constraints as much of it
+    as it takes."""
     ESCAPE = plan.BACKUP
     """The name of `BACKUP` in 0.2.0 and before, for whoever stored it."""
     BEST_EFFORT = plan.BEST_EFFORT

@@ -79,7 +79,7 @@ def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
     """How paths of boat i are sampled.
 
     Sides of the field are looked at to the end of them. Not by who may be pursued: every long straight run ends beyond
-    a side, and of these it has none to spare; so it looks until a half turn could be over, which is made when it is time.
+    a side, and of these it has none to spare; it looks until a half turn could be over, which is made when it is time.
 
     Where there may be a current less and less is excused: asked only to come no nearer than it is, a boat would be
     carried in a little in every step.

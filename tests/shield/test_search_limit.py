@@ -127,3 +127,25 @@ def test_who_backs_up_when_the_search_is_over_is_not_sent_what_it_wanted():
         backed_up += backs_up.sum()
         assert run.intervened[backs_up].all()
     assert backed_up > 100
+
+
+def test_a_search_that_is_cut_short_does_not_lose_the_plan_there_was():
+    """Twelve herons make for one point; whoever is joined to a backup has one, too, at the lowest limit."""
+    lost = cut = 0
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        state = scattered(random, 1, ["heron"] * 12, 30.0, gap_m=3.2, speed=(0.0, 1.0))[0]
+        away = random.uniform(-180.0, 180.0, 12)
+
+        def wanted(step, state, away=away):
+            middle = np.degrees(np.arctan2(15.0 - state[:, L.X], 15.0 - state[:, L.Y]))
+            error = ((middle if step < 60 else away) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+            return np.stack([np.full(12, 2.0), error], axis=-1)
+
+        run = sail(Shield(search_limit=LEAST), fleet_of_rows(state, [0] * 12, "heron"), wanted, 150)
+        assert run.closest(np.ones(12, bool)).min() >= 2.5
+        safe = run.certificate_m.min(axis=-1) >= 0.0
+        lost += (safe[:-1] & ~safe[1:]).sum()
+        cut += run.cut_short.any(axis=-1).sum()
+    assert cut > 300
+    assert lost <= 5
