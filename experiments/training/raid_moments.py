@@ -19,7 +19,7 @@ from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
 from .games import core_of, shield_of
-from .pool import opponent_of
+from .pool import Pool
 from .settings import TrainingSettings
 
 PLACE = (
@@ -41,12 +41,12 @@ PLACE = (
 """Arrays of a game that say how it stands; clocks, scores and random numbers are the new game's own."""
 TURNED = (L.RUDDER, L.HEADING_ERROR, L.HEADING_INTEGRAL, L.TURN_RATE)
 """Numbers of a boat's state that change their sign in a mirror."""
-KINDS = ("bait", "drag", "run", "flag")
-"""What a raid goes on to at a moment: its phases, and that it has taken the flag."""
+KINDS = ("bait", "drag", "run", "flag", "alone", "alone_flag")
+"""What a raid goes on to at a moment: its phases, and that it has taken the flag; the last two of boats alone."""
 
 
-Moment = tuple[dict[str, Array], list[float], int]
-"""Arrays of `PLACE`, what the raid remembered, number in `KINDS`."""
+Moment = tuple[dict[str, Array], list[float], int, str]
+"""Arrays of `PLACE`, what the raid remembered, number in `KINDS`, name of the opponent."""
 
 
 @dataclass(frozen=True)
@@ -55,29 +55,32 @@ class RaidMoments:
 
     Attributes:
         games: by name of `PLACE`, each (K, ...) as in `steerclear.env.arrays.Games`.
-        memory: (K, 6) what the raid remembered, see `Raid.memory`.
+        memory: (K, 7) what the raid remembered, see `Raid.memory`.
         kind: (K,) number in `KINDS`.
+        opponent: (K,) names.
     """
 
     games: Mapping[str, Array]
     memory: Array
     kind: Array
+    opponent: Array
 
     @staticmethod
-    def of(found: Sequence[Moment]) -> RaidMoments:
-        """Some moments, one of each kind at least.
+    def of(found: Sequence[Moment], shares: Sequence[float]) -> RaidMoments:
+        """Some moments, one at least of each kind that has a share.
 
         Raises:
             ConfigError: of some kind there is none.
         """
-        kinds = [kind for _, _, kind in found]
-        missing = [name for number, name in enumerate(KINDS) if number not in kinds]
+        kinds = [moment[2] for moment in found]
+        missing = [name for number, name in enumerate(KINDS) if shares[number] and number not in kinds]
         if missing:
             raise ConfigError(
                 f"no raid came to {missing[0]!r} in the games recorded; give more games, or longer ones (max_time_s)"
             )
-        games = {name: np.array([place[name] for place, _, _ in found]) for name in PLACE}
-        return RaidMoments(games, np.array([memory for _, memory, _ in found], float), np.array(kinds))
+        places, memory, _, opponents = zip(*found, strict=True)
+        games = {name: np.array([place[name] for place in places]) for name in PLACE}
+        return RaidMoments(games, np.array(memory, float), np.array(kinds), np.array(opponents, object))
 
 
 class Recorder(RaidsBatch):
@@ -87,14 +90,16 @@ class Recorder(RaidsBatch):
         interval: game steps for which a decision is held.
         spread: deviation of the numbers, in units of `shape.LIMITS`.
         seed: of the draws.
+        pool: of the opponents.
 
     Attributes:
         found: so far.
     """
 
-    def __init__(self, interval: int, spread: float, seed: int) -> None:
+    def __init__(self, interval: int, spread: float, seed: int, pool: Pool) -> None:
         self.network, self.name, self._team = _Drawn(interval, spread, seed), "recorder", -1  # type: ignore[assignment]
         self.found: list[Moment] = []
+        self._pool = pool
 
     def _asks(self, game: int) -> bool:
         before = self._stood[game]
@@ -103,7 +108,10 @@ class Recorder(RaidsBatch):
         if self._stood[game] != before and raid.phase > Phase.GATHER:
             place = {name: getattr(self._core.games, name)[game].copy() for name in PLACE}
             kind = KINDS.index("flag") if raid.held else raid.phase - 1
-            self.found.append((place, raid.memory(float(self._core.time_s[game])), kind))
+            if raid.unguarded:
+                kind = KINDS.index("alone_flag" if raid.held else "alone")
+            memory = raid.memory(float(self._core.time_s[game]))
+            self.found.append((place, memory, kind, self._pool.playing[game]))
         return asks
 
 
@@ -119,10 +127,11 @@ class _Drawn:
 
 
 def recorded(settings: TrainingSettings, spread: float, seed: int) -> list[Moment]:
-    """Moments of as many games as a training plays at once, with its rules and shield, against its first opponent."""
+    """Moments of as many games as a training plays at once, with its rules and shield, against its opponents."""
     core = core_of(settings, settings.games, seed, settings.stages[0])
     core.reset(seed=seed)
-    recorder, foe = Recorder(settings.interval, spread, seed), opponent_of(settings.stages[0].opponents[0])
+    foe = Pool(settings.stages[0], settings.league, seed, settings.entrants_every)
+    recorder = Recorder(settings.interval, spread, seed, foe)
     recorder.reset(core, 0, seed)
     foe.reset(core, 1, seed + 1)
     command_filter = shield_of(settings, core).filter_for(0) if settings.shielded_training else None

@@ -30,7 +30,7 @@ from .training import BEST, FINAL, card_of
 
 DEFAULTS = {
     "recorded": [0.0, 0.4],
-    "shares": [0.15, 0.35, 0.3, 0.2],
+    "shares": [0.15, 0.35, 0.3, 0.2, 0.0, 0.0],
     "spread": 0.5,
     "furthest": 0.05,
 }
@@ -62,8 +62,8 @@ class RaidsTraining:
         self.settings, self.folder, self.decisions = settings, folder, 0
         self.curve: list[dict[str, Any]] = []
         self._best, self._card = -np.inf, card_of(settings)
-        pool = Pool(settings.stages[0], settings.league, settings.seed, settings.entrants_every)
-        self.batch = learners_of(replace(settings, interval=1), pool)
+        self.pool = Pool(settings.stages[0], settings.league, settings.seed, settings.entrants_every)
+        self.batch = learners_of(replace(settings, interval=1), self.pool)
         self.batch.actions = "continuous"
         self.team = RaidsBatch(Network([], [], NONE, "tanh", "raids", settings.interval, SEEN))  # is never asked
         self._all = np.arange(settings.games)
@@ -97,8 +97,8 @@ class RaidsTraining:
         for part, spread in enumerate(self.options["recorded"], start=1):
             found += recorded(self.settings, spread, part * RECORDED_SEED + seed)
             notice(0, f"moments recorded in {part * self._all.size} games")
-        core = self.batch.core
-        self._begun = BeginInRaids(core, RaidMoments.of(found), self.options["shares"], seed)
+        core, shares = self.batch.core, self.options["shares"]
+        self._begun = BeginInRaids(core, RaidMoments.of(found, shares), shares, seed)
         set_stage(self.batch, self.settings, self.settings.stages[0], (self.batch.shield, self.batch._filter))
         self.batch.reset(seed)
         self.team.reset(core, 0, seed)
@@ -162,9 +162,10 @@ class RaidsTraining:
         return earned, over
 
     def _renewed(self, asked: Any, answers: list[list[Answer]], ended: list[dict[str, float]]) -> Any:
-        """Begin games anew whose raid is over; the games that ask now."""
+        """Begin games anew whose raid is over, or where no opponent stays at home the time; the games that ask now."""
         raids, core = self.team.raids, self.batch.core
-        over = np.array([raid.phase == Phase.GATHER for raid in raids]) | (core.time_s > LONGEST_S)
+        ended_raid = [raid.phase == Phase.GATHER and not raid.unguarded for raid in raids]
+        over = np.array(ended_raid) | (core.time_s > LONGEST_S)
         if not over.any():
             return asked
         ended += self._totals(self.batch.tallies.flat_totals(), over)
@@ -182,10 +183,11 @@ class RaidsTraining:
             self._open[game] = None
 
     def _restart(self, over: BoolArray) -> None:
-        """Begin the raids of games that began anew."""
+        """Begin the raids of games that began anew, against the opponents that they were recorded from."""
         if not over.any():
             return
         self.team.restart(over, 0)
+        self.pool.playing[over] = self._begun.moments.opponent[self._begun.drawn[over]]
         for game in np.flatnonzero(over):
             self._begun.remind(self.team.raids[game], int(game))
 

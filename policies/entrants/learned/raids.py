@@ -30,7 +30,7 @@ IDLE_S, RAID_S = 10.0, 3.0
 """Longest times that a shape holds while no raid is under way, and in one, s."""
 NEAR_M, KEPT_S = 10.0, 30.0
 """Distances below about this are told apart, m; the time that a side is kept is counted in the other, s."""
-BOATS, SEEN = 3, 66
+BOATS, SEEN = 3, 67
 """Boats of a team; numbers that the network is told."""
 
 
@@ -166,7 +166,7 @@ class RaidsBatch:
             np.exp(-apart / NEAR_M),
             core.flag_taken[games][:, [self._team, 1 - self._team]],
             np.eye(len(Phase))[[raid.phase for raid in raids]],
-            [[raid.bait_taken, raid.held] for raid in raids],
+            [[raid.bait_taken, raid.held, raid.unguarded] for raid in raids],
             np.clip((core.time_s[games] - [raid.kept_s for raid in raids]) / KEPT_S, 0.0, 2.0)[:, None],
         )
         return np.concatenate(parts, axis=1).astype(np.float32)

@@ -5,6 +5,9 @@ it and the dividing line. Three boats change that. The first stands just beyond 
 and tags it, and cannot tag for a while. The second sails along the other edge to the far corner: as the nearest
 intruder it draws the guard after it. The third then takes the flag from the bait's side and has the guard behind it all
 the way home. Boats without a part in it tag whoever comes.
+
+Where no opponent stays at home there is no guard to draw. Then two boats stand before their flag, and the third sails
+alone when no opponent can cut it off; meanwhile the two sail at the intruders, since who is tagged must go home first.
 """
 
 from .team import Undertow as Undertow

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ..plane import Order, distance, dock, go, heading_to
-from ..posts import arc
+from ..plane import Order, ahead, clip, distance, dock, go, heading_to, meeting_point
+from ..posts import arc, assign
 from ..sight import Boat, Point, Sight
 from .chart import Chart
 from .raid import BAIT, DRAG, RUN, Phase, Raid
+
+COMING_M = 5.0
+"""Opponents up to so far before the dividing line are taken for intruders, m."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
     if boat.carries:
         at = dock(boat, sight) if boat.on_side else None
         return Aim(chart.home(boat.at, up=number == RUN) if at is None else at)
+    if raid.unguarded:
+        return _alone(raid, sight, chart, number)
     part = _part(raid, sight, chart, number) if raid.phase > Phase.GATHER else None
     return _guarding(sight, chart, number) if part is None else part
 
@@ -52,6 +58,42 @@ def _part(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim | None:
     if phase == Phase.RUN:
         return Aim(chart.run(at))
     return None if sight.taken else Aim(chart.door if phase == Phase.DRAG else chart.posts[RUN], 2.0)
+
+
+def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
+    """While no opponent stays at home: the third boat waits and sails alone, the others guard."""
+    boat = sight.own[number]
+    if number != RUN or (sight.taken and boat.on_side):
+        return _before_flag(raid, sight, chart)[number]
+    return Aim(chart.dash(boat)[0]) if raid.phase == Phase.RUN else Aim(chart.edge, 1.5)
+
+
+def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
+    """Guards meet who has the flag; else each stands between the flag and another intruder, or sails at it."""
+    run, radius = sight.own[RUN], chart.shape.guard_m
+    if sight.taken:
+        foe = min(sight.foes, key=lambda one: distance(one.at, sight.flag))
+        return {n: Aim(_inside(meeting_point(boat, foe), sight), 2.0) for n, boat in enumerate(sight.own)}
+    guards = [n for n, boat in enumerate(sight.own) if n != RUN and not boat.tagged]
+    comers = [foe.at for foe in sight.foes if not foe.tagged and foe.x < sight.line + COMING_M]
+    comers = sorted(comers, key=lambda at: distance(at, sight.home))[: len(guards)]
+    near_m = distance(run.at, sight.base) - sight.reach
+    at_them = raid.phase == Phase.RUN and (run.carries or near_m < chart.shape.charge_m)
+    places = [_inside(at, sight) if at_them else _towards(sight.home, at, radius) for at in comers]
+    angles = [math.pi * (k + 1) / (len(guards) + 1) for k in range(len(comers), len(guards))]
+    places += [ahead(sight.home, angle, radius) for angle in angles]
+    chosen = assign([sight.own[n].at for n in guards], places)
+    return {n: Aim(places[k], 2.0) for n, k in zip(guards, chosen, strict=True)}
+
+
+def _towards(a: Point, b: Point, far_m: float) -> Point:
+    """So far from a towards b, m; at b where that is nearer."""
+    return ahead(a, heading_to(a, b), min(far_m, distance(a, b)))
+
+
+def _inside(point: Point, sight: Sight) -> Point:
+    """The nearest point well on the own side."""
+    return clip(point[0], 3.0, sight.line - 1.5), clip(point[1], 3.0, sight.size[1] - 3.0)
 
 
 def _guarding(sight: Sight, chart: Chart, number: int) -> Aim:

@@ -6,8 +6,12 @@ import math
 from dataclasses import dataclass
 
 from ..plane import clip
-from ..sight import Point, Sight
+from ..sight import Boat, Point, Sight
 from .shape import SCRIPTED, Shape
+from .way import slack_m
+
+GRABS_DEG = (0.0, 30.0, 60.0)
+"""Where a boat that sails alone may grab: round the flag, from before it towards its edge."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,23 @@ class Chart:
         if at[0] < self.sight.line + shape.run_x_m:
             return self.at(at[0] + 8.0, base[1] + shape.run_m)
         return self.at(base[0] + shape.past_x_m, base[1] + shape.past_m)
+
+    @property
+    def edge(self) -> Point:
+        """Where the third boat waits while no opponent stays at home."""
+        return self.at(self.sight.line - 2.0, self.sight.size[1] - self.shape.edge_m)
+
+    def dash(self, boat: Boat) -> tuple[Point, float]:
+        """Where a boat that sails alone grabs the flag, and by how much opponents would miss it, m."""
+        (x, y), reach_m, height_m = self.sight.base, self.sight.reach - 1.0, self.sight.size[1]
+        found = []
+        for angle in map(math.radians, GRABS_DEG):
+            up_m = reach_m * math.sin(angle)
+            grab = self.at(x - reach_m * math.cos(angle), y + up_m)
+            home = self.at(self.sight.line - 0.5, min(y + up_m + 6.0, height_m - 2.5))
+            found.append((slack_m(self.sight, boat, grab, home), grab))
+        slack, grab = max(found)
+        return grab, slack
 
     def home(self, at: Point, up: bool) -> Point:
         """What a boat with the flag steers for: its own side, bearing off to the bait's edge or the other."""

@@ -14,6 +14,8 @@ BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
 LONGEST_S, AGAIN_S = 60.0, 15.0
 """Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
+COME_M = 3.0
+"""An opponent so far beyond the dividing line is no guard, m."""
 
 
 class Phase(IntEnum):
@@ -34,6 +36,7 @@ class Raid:
         bait_taken: whether the bait was tagged since the second boat set out.
         held: whether the flag was held in this raid.
         kept_s: since when this chart is kept, s.
+        unguarded: whether every opponent has been on the own side by now, so that none stays to guard its flag.
         shape: its numbers.
     """
 
@@ -41,20 +44,56 @@ class Raid:
         self.shape = SCRIPTED
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
+        self.unguarded, self._came = False, set[int]()
 
     def memory(self, time_s: float) -> list[float]:
         """What it remembers but for its shape, as numbers; times count from ``time_s``."""
-        return [self.phase, self.upper, self.bait_taken, self.held, self._since_s - time_s, self.kept_s - time_s]
+        times = [self._since_s - time_s, self.kept_s - time_s]
+        return [self.phase, self.upper, self.bait_taken, self.held, *times, self.unguarded]
 
     def remember(self, memory: Sequence[float], time_s: float, mirrored: bool) -> None:
         """Go on with what `memory` told, in a game that is the same, or the same in a mirror."""
         self.phase, self.upper = Phase(int(memory[0])), bool(memory[1]) != mirrored
         self.bait_taken, self.held = bool(memory[2]), bool(memory[3])
         self._since_s, self.kept_s = memory[4] + time_s, memory[5] + time_s
+        self.unguarded = bool(memory[6])
 
     def advance(self, sight: Sight) -> Chart:
         """Look at the game, go on to the next phase or give up; where the raid leads."""
-        chart, shape = Chart(sight, self.upper, self.shape), self.shape
+        self._watched(sight)
+        chart = Chart(sight, self.upper, self.shape)
+        if self.unguarded:
+            self._countered(sight, chart)
+        else:
+            self._raided(sight, chart)
+        return Chart(sight, self.upper, self.shape)
+
+    def _watched(self, sight: Sight) -> None:
+        """Note who comes; once all have, a raid that draws a guard away is given up."""
+        if self.unguarded:
+            return
+        self._came |= {number for number, foe in enumerate(sight.foes) if foe.x < sight.line - COME_M}
+        if len(self._came) == len(sight.foes):
+            self.unguarded = True
+            self._end(sight.time)
+
+    def _countered(self, sight: Sight, chart: Chart) -> None:
+        """The third boat sails alone, while no opponent can cut it off in time."""
+        run, shape = sight.own[RUN], self.shape
+        kept_at_home = run.tagged or (sight.taken and run.on_side)
+        if self.phase == Phase.GATHER:
+            self.upper = run.y > 0.5 * sight.size[1]
+            if not kept_at_home and Chart(sight, self.upper, shape).dash(run)[1] > shape.free_m:
+                self.phase, self._since_s, self.held = Phase.RUN, sight.time, False
+        elif not run.carries:
+            late = sight.time - self._since_s > LONGEST_S
+            if kept_at_home or late or chart.dash(run)[1] < shape.kept_free_m:
+                self._end(sight.time)
+        self._brought_home(sight)
+
+    def _raided(self, sight: Sight, chart: Chart) -> None:
+        """Three boats sail, to draw a guard away."""
+        shape = self.shape
         taggers = [foe for foe in sight.foes if may_tag(foe, sight)]
         guard = guard_of(taggers, sight)
         clear_m = shape.clear_m if self.phase == Phase.GATHER else shape.kept_clear_m
@@ -68,7 +107,6 @@ class Raid:
             self._went_on(sight, chart, guard)
         if self.phase >= Phase.DRAG:
             self.bait_taken = self.bait_taken or sight.own[BAIT].tagged
-        return Chart(sight, self.upper, self.shape)
 
     def _gathered(self, sight: Sight, chart: Chart, guard: Boat | None, is_open: bool) -> None:
         posts, near_m = zip(sight.own, chart.posts, strict=False), self.shape.post_m

@@ -33,6 +33,11 @@ class Shape:
         past_x_m, past_m: then for a point so far behind the flag and beside it.
         home_m, drag_home_m: third and second boat with the flag bear off so far in 15 m.
         chase_m: intruders this near are met; all of them while the own flag is taken.
+        edge_m: how far from its edge the third boat waits while no opponent stays at home;
+        free_m: it sets out when opponents that cut it off at once would miss it by so much, see `way.slack_m`,
+        kept_free_m: and gives up below this;
+        guard_m: the others stand so far before the own flag,
+        charge_m: and sail at intruders when the third is this near to where it grabs.
     """
 
     post_m: float = 5.0
@@ -63,6 +68,11 @@ class Shape:
     home_m: float = 4.0
     drag_home_m: float = 4.0
     chase_m: float = 20.0
+    edge_m: float = 6.0
+    free_m: float = -24.0
+    kept_free_m: float = -30.0
+    guard_m: float = 7.0
+    charge_m: float = 22.0
 
     def moved(self, units: Sequence[float]) -> Shape:
         """Changed by so many units of `LIMITS` in each number, within its limits."""
@@ -103,6 +113,11 @@ LIMITS = {
     "home_m": (10.0, -15.0, 30.0),
     "drag_home_m": (10.0, -15.0, 30.0),
     "chase_m": (5.0, 0.0, 60.0),
+    "edge_m": (2.0, 2.0, 20.0),
+    "free_m": (6.0, -60.0, 20.0),
+    "kept_free_m": (6.0, -60.0, 20.0),
+    "guard_m": (2.0, 5.5, 20.0),
+    "charge_m": (8.0, 0.0, 60.0),
 }
 """Unit that a learner counts in, least and most of each number."""
 SCRIPTED = Shape()

@@ -9,9 +9,10 @@ import torch
 from steerclear.experiments.training.algorithms import training_of
 from steerclear.experiments.training.config_file import read_config
 from steerclear.experiments.training.games import core_of
+from steerclear.experiments.training.pool import Pool
 from steerclear.experiments.training.raid_moments import KINDS, PLACE, BeginInRaids, RaidMoments, Recorder, recorded
 from steerclear.experiments.training.raids_learner import Answer, RaidsLearner
-from steerclear.experiments.training.settings import settings_of
+from steerclear.experiments.training.settings import League, Stage, settings_of
 from steerclear.experiments.training.submission import write_submission
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
@@ -31,10 +32,17 @@ def moments_of(core, times_s):
     for step in range(int(10 * max(times_s)) + 1):
         if step / 10 in times_s:
             places.append({name: getattr(core.games, name)[0].copy() for name in PLACE})
-            memory.append([Phase.RUN, True, True, False, -12.0, -40.0])
+            memory.append([Phase.RUN, True, True, False, -12.0, -40.0, False])
         core.step(np.tile([1.5, 20.0], (1, core.n_boats, 1)))
     games = {name: np.array([place[name] for place in places]) for name in PLACE}
-    return RaidMoments(games, np.array(memory, float), np.arange(len(KINDS)))
+    return RaidMoments(games, np.array(memory, float), np.arange(4), np.array(["medium"] * 4, object))
+
+
+def pool_of(core):
+    """The opponents that games are recorded from."""
+    pool = Pool(Stage(opponents=("hold",)), League(), 1)
+    pool.reset(core, 1, 1)
+    return pool
 
 
 @pytest.fixture
@@ -46,7 +54,7 @@ def some():
 
 def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(some):
     core = core_of(settings_of({}), 200, 1)
-    begun = BeginInRaids(core, some, [0.0, 3.0, 0.0, 1.0], 3)
+    begun = BeginInRaids(core, some, [0.0, 3.0, 0.0, 1.0, 0.0, 0.0], 3)
     core.reset(seed=1)
     assert 0.6 < (begun.drawn == 1).mean() < 0.9
     assert set(begun.drawn) == {1, 3}
@@ -62,10 +70,10 @@ def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(som
 
 def test_a_mirrored_game_goes_on_as_the_mirror_of_the_game_and_so_does_its_raid(some):
     core = core_of(settings_of({}), 2, 1)
-    begun = BeginInRaids(core, some, [1.0, 0.0, 0.0, 0.0], 3)
+    begun = BeginInRaids(core, some, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 3)
     while begun.mirrored.tolist() != [False, True]:
         core.reset(seed=None)
-    recorder = Recorder(10, 0.0, 1)
+    recorder = Recorder(10, 0.0, 1, pool_of(core))
     recorder.reset(core, 0, 1)
     for game in range(2):
         begun.remind(recorder.raids[game], game)
@@ -86,18 +94,33 @@ def test_a_recorder_keeps_the_moment_a_raid_begins():
         core.games.state[0, boat, [L.X, L.Y]] = at
     core.games.on_side[:] = True
     core.observe()
-    recorder = Recorder(10, 0.0, 1)
+    recorder = Recorder(10, 0.0, 1, pool_of(core))
     recorder.reset(core, 0, 1)
     recorder.advance(np.arange(1))
-    assert [(memory[0], KINDS[kind]) for _, memory, kind in recorder.found] == [(Phase.BAIT, "bait")]
+    found = [(memory[0], KINDS[kind], opponent) for _, memory, kind, opponent in recorder.found]
+    assert found == [(Phase.BAIT, "bait", "hold")]
+    assert RaidMoments.of(recorder.found, [1, 0, 0, 0, 0, 0]).kind.tolist() == [0]
     with pytest.raises(ConfigError, match="no raid came to 'drag'"):
-        RaidMoments.of(recorder.found)
+        RaidMoments.of(recorder.found, [1, 1, 0, 0, 0, 0])
+
+
+def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_same_opponent_and_last(tiny, tmp_path):
+    changes = {"stages": [{"opponents": ["hold", "hard"]}], "decisions": 1, "options": {"shares": [0, 0, 0, 0, 1, 0]}}
+    training = training_of(tiny_raids(tiny, **changes), tmp_path / "run", False)
+    training.run()
+    moments = training._begun.moments
+    of_kind = moments.kind == KINDS.index("alone")
+    assert set(moments.opponent[of_kind]) == {"hard"}
+    assert moments.memory[of_kind][:, -1].all()
+    assert set(training.pool.playing) == {"hard"}
+    assert all(raid.unguarded for raid in training.team.raids)
+    assert training.batch.core.time_s.min() > 30.0  # though no raid lasts as long as 40 decisions
 
 
 def test_games_that_are_too_short_for_raids_are_one_error():
     settings = settings_of({"games": 1, "rules": {"max_time_s": 1.0}})
     with pytest.raises(ConfigError, match="no raid came to 'bait'"):
-        RaidMoments.of(recorded(settings, 0.0, 1))
+        RaidMoments.of(recorded(settings, 0.0, 1), [1] * 6)
 
 
 def learner(**ppo):
@@ -177,8 +200,8 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
         ({"options": {"share": [1]}}, "unknown option 'share'.*shares"),
         ({"options": {"spread": 0}}, "options.spread is 0"),
         ({"options": {"recorded": []}}, "options.recorded is"),
-        ({"options": {"shares": [1, 1]}}, "give a list of 4 numbers"),
-        ({"options": {"shares": [0, 0, 0, 0]}}, "give one above 0"),
+        ({"options": {"shares": [1, 1]}}, "give a list of 6 numbers"),
+        ({"options": {"shares": [0, 0, 0, 0, 0, 0]}}, "give one above 0"),
         ({"stages": [{"opponents": ["hold"]}, {"opponents": ["medium"]}]}, "one stage"),
         ({"net": {"hidden": [16], "roles": "each"}}, "roles: shared"),
         ({"shield": "training", "shield_every": 10}, "shield_every: 1"),
