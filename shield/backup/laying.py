@@ -113,7 +113,6 @@ def run_out(i: int, slot: int, done: int, scene: Scene) -> None:
         samples,
         boats.samples[i],
         beyond,
-        boats.pursuit_samples[i],
         earliest,
         boats.ready_thrust[i],
     )

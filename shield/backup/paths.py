@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate, full_turn, held_rudder
-from ..platforms.usv import next_speed, next_thrust, turn_of_rudder
+from ..platforms.usv import next_speed, next_thrust, speed_of_thrust, turn_of_rudder
 
 SAG_M = 0.022
 """Most a straight line between two samples may cut off the arc sailed between them, m."""
@@ -25,12 +25,11 @@ READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
 STEADY_SPEED = 1e-4
 """Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
 
-
-SETTLES_BY = 0.995
-"""A straight run's speed settles when less than this share of what it gains in one step is gained in the next,"""
+ALIKE = 1e-4
+"""A run settles where steps tell the same of the speed still to be gained, to this share of it,"""
 
 SETTLED_MPS = 1e-3
-"""and when that takes it this near, m/s, to the speed commanded, which is not 0: there it would be cut off.
+"""and it takes that to within this of the speed commanded, m/s, which is not 0: there it would be cut off.
 
 Only of a boat that gains speed: one that slows down may seem to settle there for one step of its way below."""
 
@@ -60,7 +59,6 @@ class Span(NamedTuple):
         samples: number of samples after sample 0.
         least: number of them after which the path may end.
         beyond: number of them after the one where thrust is full that the path goes on for.
-        closely: number of them for which it follows the model; a straight run then goes on as its speed settles.
         earliest: first sample at which that counts, at most ``samples``.
         ready_thrust: thrust, percent, from which the boat has all of it.
     """
@@ -71,18 +69,34 @@ class Span(NamedTuple):
     samples: int
     least: int
     beyond: int
-    closely: int
     earliest: int
     ready_thrust: float
 
 
-class Straight(NamedTuple):
-    """A straight run from (x, y), m: what it goes east and north in a step, m, or per m/s of speed."""
+class Settling(NamedTuple):
+    """A straight run on which speed and thrust settle: what each is short of falls by the same share in each step.
+
+    Attributes:
+        x: place now, east, m.
+        y: north, m.
+        ux: heading as a unit vector, east.
+        uy: north.
+        speed_mps: speed at which it settles, m/s.
+        short_mps: what it is short of that now, m/s.
+        thrust: thrust at which it settles, percent.
+        short_thrust: what it is short of that now, percent.
+        rate: share of it that is left after a step.
+    """
 
     x: float
     y: float
-    dx: float
-    dy: float
+    ux: float
+    uy: float
+    speed_mps: float
+    short_mps: float
+    thrust: float
+    short_thrust: float
+    rate: float
 
 
 @lean_kernel
@@ -109,17 +123,24 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 
 @lean_kernel
-def _note_ready(k: int, span: Span, thrust: float, heading_rad: float, speed_mps: float, ready: Array) -> None:
-    """Note the first sample, from the earliest that counts, at which thrust is full."""
-    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust:
-        ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, heading_rad, speed_mps
+def _is_ready(k: int, span: Span, thrust: float, ready: Array) -> bool:
+    """Whether sample k is the first, from the earliest that counts, at which thrust is full."""
+    return ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust
+
+
+@lean_kernel
+def _note_ready(k: int, ux: float, uy: float, speed_mps: float, ready: Array) -> None:
+    """Note that thrust is full at sample k, and heading and speed there."""
+    ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, math.atan2(ux, uy), speed_mps
 
 
 @lean_kernel
 def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
     """Write sample k: that of a state."""
     path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-    _note_ready(k, span, row[L.THRUST], math.radians(row[L.HEADING]), row[L.SPEED], ready)
+    if _is_ready(k, span, row[L.THRUST], ready):
+        ready[READY_SAMPLE], ready[READY_SPEED] = k, row[L.SPEED]
+        ready[READY_HEADING] = math.radians(row[L.HEADING])
 
 
 @lean_kernel
@@ -185,7 +206,7 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
-    gained = 0.0
+    gained, before, earlier = 0.0, 0.0, 0.0
     k, step = 0, -1
     if span.done > 0:
         k, step = _note_done(span.done, span, row, path, ready)
@@ -212,86 +233,51 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
             mx, my = ux, uy
         x += mx * mean * dt_s
         y += my * mean * dt_s
-        change = abs(mean - v) + abs(thrust - last)
-        gained_before, gained = gained, mean - v
+        earlier, before, gained = before, gained, mean - v
         v = min(max(mean, 0.0), top)
         step += 1
         if step % span.stride == 0:
             path[k, 0], path[k, 1] = x, y
-            if ready[READY_SAMPLE] < 0.0:
-                _note_ready(k, span, thrust, math.atan2(ux, uy), v, ready)
+            if _is_ready(k, span, thrust, ready):
+                _note_ready(k, ux, uy, v, ready)
             k += 1
         if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= span.samples:
-            if change < STEADY_SPEED:
-                _note_ready(max(k, span.earliest), span, thrust, math.atan2(ux, uy), v, ready)  # as now
-                _run_on(Straight(x, y, ux * v * dt_s, uy * v * dt_s), step, k, span, path, ready)
-                return
-            rate = _rate(gained, gained_before, k - span.closely, ready)
-            settled = _settled(v, gained, rate, min(speed_mps, top))
-            if settled > 0.0:
-                short = (v - settled) * rate / (1.0 - rate)
-                _settle(Straight(x, y, ux * dt_s, uy * dt_s), settled, short, rate, step, k, span, path, ready)
+            steady = abs(gained) + abs(thrust - last) < STEADY_SPEED
+            rate = 0.0 if steady else _share_left(gained, before, earlier)
+            left = rate / (1.0 - rate)
+            more_mps, more_thrust = gained * left, (thrust - last) * left
+            run = Settling(x, y, ux, uy, v + more_mps, more_mps, thrust + more_thrust, more_thrust, rate)
+            if steady or _settles_at(min(speed_mps, top), run, params):
+                _run_on(run, step, k, span, path, ready)
                 return
 
 
 @lean_kernel
-def _last_sample(span: Span, ready: Array) -> int:
-    """Last sample of a path that is straight and steady from here on."""
-    if ready[READY_SAMPLE] < 0.0:
-        return span.samples
-    return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
-
-
-@lean_kernel
-def _rate(gained: float, gained_before: float, followed: int, ready: Array) -> float:
-    """What a step gained over what the one before did, 0 where the model is to be followed on."""
-    if not 0.0 <= ready[READY_SAMPLE] < followed or gained_before == 0.0:
+def _share_left(gained: float, before: float, earlier: float) -> float:
+    """What a step gained over what the one before did, where that had been the same; 0: it had not, or nothing was."""
+    if not min(gained, before, earlier) > 0.0:
         return 0.0
-    return gained / gained_before
+    rate = gained / before
+    return rate if abs(rate - before / earlier) <= ALIKE * (1.0 - rate) else 0.0
 
 
 @lean_kernel
-def _settled(speed_mps: float, gained_mps: float, rate: float, commanded_mps: float) -> float:
-    """Speed, m/s, at which a boat that gained so much in this step settles; 0 where that is not the one commanded."""
-    if not 0.0 < rate < SETTLES_BY or gained_mps <= 0.0:
-        return 0.0
-    settled_mps = speed_mps + gained_mps * rate / (1.0 - rate)
-    if commanded_mps <= SETTLED_MPS or abs(settled_mps - commanded_mps) >= SETTLED_MPS:
-        return 0.0
-    return settled_mps
+def _settles_at(speed_mps: float, run: Settling, params: Array) -> bool:
+    """Whether a run settles at that speed, with the thrust that keeps it: else it only seems to settle."""
+    kept_mps = speed_of_thrust(params, run.thrust)
+    return run.rate > 0.0 and max(abs(run.speed_mps - speed_mps), abs(kept_mps - speed_mps)) < SETTLED_MPS < speed_mps
 
 
 @lean_kernel
-def _settle(
-    run: Straight,
-    settled_mps: float,
-    short_mps: float,
-    rate: float,
-    step: int,
-    k: int,
-    span: Span,
-    path: Array,
-    ready: Array,
-) -> None:
-    """Fill the rest of a path with a straight run whose speed settles: what it still gains falls geometrically.
-
-    ``run`` tells the way of a step per m/s, ``rate`` what a step gains over what the one before did; the speeds of all
-    steps to come fall short of the settled one by ``short_mps`` in sum.
-    """
-    stride, last = span.stride, _last_sample(span, ready)
-    left, per_sample = rate ** (k * stride - step), rate**stride
-    while k <= last:
-        way = (k * stride - step) * settled_mps + short_mps * (1.0 - left)
-        path[k, 0], path[k, 1] = run.x + way * run.dx, run.y + way * run.dy
-        left *= per_sample
-        k += 1
-
-
-@lean_kernel
-def _run_on(run: Straight, step: int, k: int, span: Span, path: Array, ready: Array) -> None:
-    """Fill the rest of a path with equal steps: a steady straight run needs no model."""
-    last = _last_sample(span, ready)
-    while k <= last:
-        ahead = k * span.stride - step
-        path[k, 0], path[k, 1] = run.x + ahead * run.dx, run.y + ahead * run.dy
+def _run_on(run: Settling, step: int, k: int, span: Span, path: Array, ready: Array) -> None:
+    """Fill the rest of a path with a straight run as its speed settles: that needs no model."""
+    missed_mps = run.short_mps * run.rate / (1.0 - run.rate)  # in sum, of all steps to come
+    ahead, left = 0, 1.0
+    while _goes_on(k, span, ready):
+        while ahead < k * span.stride - step:
+            ahead, left = ahead + 1, left * run.rate
+        way_m = (ahead * run.speed_mps - missed_mps * (1.0 - left)) * span.dt_s
+        path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
+        if _is_ready(k, span, run.thrust - run.short_thrust * left, ready):
+            _note_ready(k, run.ux, run.uy, run.speed_mps - run.short_mps * left, ready)
         k += 1

@@ -149,11 +149,11 @@ def stays_away(
     the longest strides of `roll_out_pursuer` make no difference. False when in doubt; for the rest see there.
     """
     spare = 0.5 * CHASE_STRIDE
-    root = radius_m + cap_m
+    root, per_m = radius_m + cap_m, 1.0 / closing_m
     k = 0
     while k <= samples:
         dx, dy = own[k, 0] - x, own[k, 1] - y
-        free = (math.sqrt(dx * dx + dy * dy) - way * k - root) / closing_m - spare
+        free = (math.sqrt(dx * dx + dy * dy) - way * k - root) * per_m - spare
         if not free >= 1.0:
             return False
         k += int(min(free, samples + 1))
