@@ -23,8 +23,7 @@ class Plan(NamedTuple):
     of, as in ``Work.bound``, -1 for nothing. ``verified`` is what the backups come to: of
     each boat the turn of this step, deg, the command, and the rank, see `filter.verified`. ``screened`` are the
     commands that screening looked at, wanted ones but for boats that hold or give way, ``screened_reason`` is
-    ``reason`` as it left it. ``decided`` are all boats of ours, and ``group`` says of which group each is, see
-    `filter.groups`.
+    ``reason`` as it left it. ``group`` says of which group each boat is, see `filter.groups`.
     """
 
     commands: Array
@@ -46,7 +45,6 @@ class Plan(NamedTuple):
     slack_m: Array
     reason: IntArray
     screened_reason: IntArray
-    decided: BoolArray
     group: IntArray
 
 
@@ -73,7 +71,6 @@ def new_plan(boats: int, rows: int) -> Plan:
             slack_m=np.zeros(boats),
             reason=np.zeros(boats, np.int64),
             screened_reason=np.zeros(boats, np.int64),
-            decided=np.zeros(boats, np.bool_),
             group=np.zeros(boats, np.int64),
         )
     )

@@ -165,14 +165,13 @@ def _forget_threats(slot: int, work: Work) -> None:
     """Make ready for the threats to the path in ``slot``."""
     work.threats_m[slot, :] = FAR
     work.joint_m[slot], work.table_m[slot], work.threat_m[slot] = FAR, FAR, FAR
-    work.threat_by[slot], work.fails[slot], work.sealed[slot] = -1, False, False
+    work.threat_by[slot], work.sealed[slot] = -1, False
 
 
 @lean_kernel
-def _note_threat(j: int, slot: int, target_m: float, work: Work) -> None:
-    """Note the margin from boat j in ``work.out``: whether it is short of its target, and whether it is the least."""
+def _note_threat(j: int, slot: int, work: Work) -> None:
+    """Note the margin from boat j in ``work.out`` if it is the least."""
     margin = work.out[MARGIN]
-    work.fails[slot] = work.fails[slot] or not margin >= target_m
     if margin < work.threat_m[slot]:
         work.threat_m[slot], work.threat_by[slot] = margin, j
 
@@ -215,20 +214,30 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) ->
         # one cap for all: a pursuer's steps depend on it, and must not depend on who is looked at before
         clear_of_pursuer(i, j, slot, scene, floor_m, tuning.margin_cap_m)
     work.threats_m[slot, j] = work.out[MARGIN]
-    _note_threat(j, slot, work.threat_target_m[i, j], work)
+    _note_threat(j, slot, work)
     if not work.out[MARGIN] >= floor_m or not by_table or not work.outnumbered[i]:
         return work.out[MARGIN] >= floor_m
     floor_m = min(work.joint_target_m[i], level_m)
     _clear_by_run(i, j, slot, floor_m, scene)
-    _note_threat(j, slot, work.joint_target_m[i], work)
+    _note_threat(j, slot, work)
     return work.out[MARGIN] >= floor_m
+
+
+@lean_kernel
+def _falls_short(i: int, slot: int, scene: Scene) -> bool:
+    """Whether a margin against pursuers on the path in ``slot`` is short of what boat i must keep."""
+    work = scene.work
+    short = work.outnumbered[i] and not work.joint_m[slot] >= work.joint_target_m[i]
+    for j in range(scene.ours.shape[0]):
+        short = short or not work.threats_m[slot, j] >= work.threat_target_m[i, j]
+    return short
 
 
 @lean_kernel
 def worst_pursuer(i: int, slot: int, scene: Scene, level_m: float) -> None:
     """Clearance from each pursuer, in ``work.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
-    What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre.
+    What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre, nor on the targets.
 
     Of one that is short of its target (``work.fails``) and below the level nothing more is to be known: the search
     stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
@@ -250,5 +259,6 @@ def worst_pursuer(i: int, slot: int, scene: Scene, level_m: float) -> None:
                 work.pursuers_known[slot] = False
                 break
         work.sealed[slot] = work.sealed[slot] and work.threat_m[slot] >= work.table_m[slot]
+    work.fails[slot] = _falls_short(i, slot, scene)
     if work.threat_m[slot] < work.clear[slot, MARGIN]:
         work.clear[slot, MARGIN], work.bound[slot] = work.threat_m[slot], work.threat_by[slot]

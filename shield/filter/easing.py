@@ -12,9 +12,9 @@ from ..plan import BACKUP, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
-from .exact_check import check_one
-from .least_change import among_mates, before_opponent
-from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all, verify
+from .exact_check import check
+from .least_change import before_opponent
+from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
@@ -51,10 +51,12 @@ def _give_back(share: float, i: int, scene: Scene) -> None:
 def _ease_one(i: int, scene: Scene) -> None:
     """Bring boat i's command as near to the wanted one as costs no boat of ours anything."""
     kept, too_far, at = 0.0, 2.0, 0.0
+    scene.plan.moving[:] = False
+    scene.plan.moving[i] = True
     for _ in range(TRIALS):
         at = 0.5 * (kept + too_far)
         _give_back(at, i, scene)
-        check_one(i, scene)
+        check(scene)
         if costs_at_most(0.0, scene):
             kept = at
         else:
@@ -66,7 +68,7 @@ def _ease_one(i: int, scene: Scene) -> None:
     elif at != kept:
         _give_back(kept, i, scene)
     if at != kept:
-        check_one(i, scene)
+        check(scene)
 
 
 @lean_kernel
@@ -76,7 +78,7 @@ def _may_be_eased(i: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def _any_may_be_eased(scene: Scene) -> bool:
+def any_may_be_eased(scene: Scene) -> bool:
     """Whether some boat may be."""
     found = False
     for i in range(scene.ours.shape[0]):
@@ -93,9 +95,6 @@ def ease(scene: Scene) -> None:
     these and team-mates: who uses up its room there has none left to make for others.
     """
     tuning, work = scene.tuning, scene.work
-    if not _any_may_be_eased(scene) or all_spent(tuning, work):
-        return
-    verify(among_mates(scene), scene)
     for i in range(scene.ours.shape[0]):
         if _may_be_eased(i, scene) and keeps_all(i, scene) and not all_spent(tuning, work):
             _ease_one(i, scene)

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from ..backup.assign import hold
+from ..backup.effort import all_spent
 from ..backup.rank import ALL, OBSTACLES, OPPONENTS
 from ..barriers.clearance import MARGIN
 from ..barriers.registered import unknown_at
@@ -21,12 +22,13 @@ from ..plan import BACKUP, BEST_EFFORT, HELD, QP, unchanged
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Scene
-from .easing import ease
+from .easing import any_may_be_eased, ease
 from .groups import close_groups, make_groups, open_group
-from .least_change import ROUNDS, accept, begin_program, end_program, linearise
+from .least_change import ROUNDS, accept, among_mates, begin_program, end_program, linearise
 from .linearised import solve_compiled
 from .screening import screen
 from .switching import back_up
+from .verified import verify
 
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
@@ -141,9 +143,7 @@ def groups_left(scene: Scene) -> int:
 @lean_kernel
 def begin(scene: Scene) -> int:
     """Screen the wanted commands; returns how many groups of boats they are not sent to as they are."""
-    if screen(scene):
-        scene.plan.cause[:] = -1
-        return 0
+    screen(scene)
     return groups_left(scene)
 
 
@@ -152,6 +152,9 @@ def begin_group(group: int, scene: Scene) -> int:
     """Make backups the commands of a group, and set up its program; returns how many boats take part in that."""
     open_group(group, scene)
     back_up(scene)
+    if all_spent(scene.tuning, scene.work) or not any_may_be_eased(scene):
+        return 0
+    verify(among_mates(scene), scene)
     return begin_program(scene)
 
 

@@ -11,8 +11,8 @@ from ..backup.rank import ALL
 from ..jit import lean_kernel
 from ..scene import Scene
 
-NO_GROUP, NOT_YET = -1, -2
-"""No group: not ours, or of boats whose wanted commands keep everything; and not looked at yet."""
+NOT_OURS, NONE, NOT_YET = -1, -2, -3
+"""Boats of no group: not ours; of those whose wanted commands keep everything; not looked at yet."""
 
 
 @lean_kernel
@@ -31,7 +31,7 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
                 found += 1
     if not short:
         for k in range(found):
-            groups[queue[k]] = NO_GROUP
+            groups[queue[k]] = NONE
     return short
 
 
@@ -40,7 +40,7 @@ def make_groups(scene: Scene) -> int:
     """Number, in ``plan.group``, the groups in which a wanted command is short of something; returns how many."""
     ours, groups = scene.ours, scene.plan.group
     for i in range(ours.shape[0]):
-        groups[i] = NOT_YET if ours[i] else NO_GROUP
+        groups[i] = NOT_YET if ours[i] else NOT_OURS
     count = 0
     for i in range(ours.shape[0]):
         if groups[i] == NOT_YET and _gather(i, count, scene):
@@ -61,4 +61,4 @@ def open_group(group: int, scene: Scene) -> None:
 def close_groups(scene: Scene) -> None:
     """Make all boats of ours those that are decided for again."""
     for i in range(scene.ours.shape[0]):
-        scene.ours[i] = scene.plan.decided[i]
+        scene.ours[i] = scene.plan.group[i] != NOT_OURS

@@ -11,7 +11,7 @@ from ..plan import QP
 from ..scene import Scene
 from .exact_check import check
 from .linearised import build, list_movers, take_answer
-from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, verify
+from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, note_verified
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups stand."""
@@ -54,14 +54,10 @@ def among_mates(scene: Scene) -> bool:
 def begin_program(scene: Scene) -> int:
     """Make wanted commands of the boats that take part the candidate; returns how many do."""
     plan = scene.plan
-    if not among_mates(scene):
-        return 0
-    verify(True, scene)
     count = _pick_pairs(scene)
     for m in range(count):
         copy_row(plan.commands[plan.movers[m]], plan.screened[plan.movers[m]])
-    if count > 0:
-        check(count, scene)
+    check(scene)
     return count
 
 
@@ -76,7 +72,7 @@ def accept(scene: Scene, z: Array, count: int) -> bool:
     """Take an answer of the program; whether it costs no boat more than a little by the exact check."""
     if not take_answer(z, count, scene):
         return False
-    check(count, scene)
+    check(scene)
     return costs_at_most(LITTLE_M, scene)
 
 
@@ -91,5 +87,7 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
             plan.reason[i] = QP
         else:
             go_back(i, scene)
-    if count > 0 and not safe:
-        check(count, scene)
+    if safe:
+        note_verified(scene)
+    elif count > 0:
+        check(scene)

@@ -90,5 +90,5 @@ def screen(scene: Scene) -> bool:
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):
         copy_row(plan.screened[i], plan.commands[i])
-        plan.screened_reason[i], plan.decided[i] = plan.reason[i], ours[i]
+        plan.screened_reason[i] = plan.reason[i]
     return assign_plans(scene, 1, ours)

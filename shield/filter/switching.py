@@ -158,7 +158,7 @@ def _find_backups(count: int, scene: Scene) -> None:
     run_opponents(1, scene)
     for m in range(count):
         set_off(plan.movers[m], scene)
-    check(count, scene)
+    check(scene)
 
 
 @lean_kernel

@@ -40,7 +40,6 @@ def verify(static_rate: bool, scene: Scene) -> None:
     Without ``static_rate`` of static constraints only their distance is asked for.
     """
     set_targets(scene)
-    scene.work.pursuers_known[:] = False  # they were asked for other targets
     if not static_rate:
         scene.work.static_target_m[:] = 0.0
     rate(scene)

@@ -89,9 +89,9 @@ def built(at):
     return count, least_change.linearise(count, at.scene)
 
 
-def decided(at, safe, solver="quadprog"):
+def decided(at, solver="quadprog"):
     """The rest of a decision after screening: commands and reasons."""
-    for group in range(0 if safe else flow.groups_left(at.scene)):
+    for group in range(flow.groups_left(at.scene)):
         count, found = flow.begin_group(group, at.scene), False
         for _ in range(least_change.ROUNDS if count > 0 else 0):
             z = _answer(at, count, least_change.linearise(count, at.scene), solver)

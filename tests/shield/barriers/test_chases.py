@@ -59,7 +59,7 @@ def any_boat(random, params):
 def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, seed):
     """The speed of what is left of the way settles geometrically: no step of the model is needed for it."""
     random, params = np.random.default_rng(seed), get_platform(platform).pack()
-    span = Span(0.1, 1, 2, 217, 28, 151, 30, 0, 85.0)
+    span = Span(0.1, 1, 2, 217, 28, 151, 0, 85.0)
     for _ in range(80):
         row, speed = any_boat(random, params)
         togo = random.choice([0.0, 30.0, 90.0, 180.0])
@@ -68,7 +68,7 @@ def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, se
         last = 217 if ready[0] < 0 else min(217, max(28, int(ready[0]) + 151))
         assert np.isfinite(path[: last + 1]).all()
         for k in range(last + 1):
-            np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=2e-2)
+            np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=1e-2)
             for _ in range(2):
                 togo = sail(params, row, 1.0, togo, speed, 0.1)
 

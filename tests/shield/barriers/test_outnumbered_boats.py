@@ -247,14 +247,15 @@ def test_the_margin_of_runs_is_remembered_once_for_all_opponents():
     rows = boat(0.0, 0.0, 0.0), boat(0.0, 35.0, 180.0), boat(30.0, 0.0, -90.0)
     at = stages_of(ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
     screened(at, np.array([[3.0, -90.0]] * 3))
-    decided(at, True)
+    decided(at)
     assert at.memory.joint_m[0] == at.work.joint_m[0] == pytest.approx(1.0, abs=1.0)
     np.testing.assert_array_equal(at.memory.threat_m[0], at.work.threats_m[0])
     screened(at, np.array([[3.0, -90.0]] * 3))
     assert at.work.joint_target_m[0] == pytest.approx(math.exp(-0.1) * min(at.memory.joint_m[0], at.boats.cap_m[0]))
     alone = stages_of(ShieldConfig(profile="rammers"), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
     alone.memory.joint_m[0] = 1.0
-    decided(alone, screened(alone, np.array([[3.0, -90.0]] * 2)))
+    screened(alone, np.array([[3.0, -90.0]] * 2))
+    decided(alone)
     assert alone.memory.joint_m[0] == 0.0
 
 
