@@ -280,7 +280,7 @@ def test_nothing_is_noted_beyond_the_end_of_a_path(speed_mps, turn_deg):
                 at.boats.params[0],
                 at.state[0].copy(),
                 Manoeuvre(1.0, turn_deg, 3.0),
-                Span(0.1, 1, at.boats.stride, samples, samples, 0, samples, earliest, at.boats.ready_thrust[0]),
+                Span(0.1, 1, at.boats.stride, samples, samples, 0, earliest, at.boats.ready_thrust[0]),
                 path,
                 ready,
             )
