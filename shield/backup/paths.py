@@ -73,30 +73,33 @@ class Span(NamedTuple):
     ready_thrust: float
 
 
-class Settling(NamedTuple):
-    """A straight run on which speed and thrust settle: what each is short of falls by the same share in each step.
-
-    Attributes:
-        x: place now, east, m.
-        y: north, m.
-        ux: heading as a unit vector, east.
-        uy: north.
-        speed_mps: speed at which it settles, m/s.
-        short_mps: what it is short of that now, m/s.
-        thrust: thrust at which it settles, percent.
-        short_thrust: what it is short of that now, percent.
-        rate: share of it that is left after a step.
-    """
+class Straight(NamedTuple):
+    """A straight run from (x, y), m, along the unit vector (ux, uy); x and ux east."""
 
     x: float
     y: float
     ux: float
     uy: float
+
+
+class Settling(NamedTuple):
+    """How speed and thrust settle on a straight run: what they are short of falls in each step.
+
+    Attributes:
+        speed_mps: speed at which the run settles, m/s.
+        short_mps: what it is short of that now, m/s.
+        thrust: thrust at which it settles, percent.
+        short_thrust: what it is short of that now, percent.
+        rate: share of both that is left after a step.
+        fall_mps: what more the speed gains in a step, m/s.
+    """
+
     speed_mps: float
     short_mps: float
     thrust: float
     short_thrust: float
     rate: float
+    fall_mps: float
 
 
 @lean_kernel
@@ -236,19 +239,17 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         earlier, before, gained = before, gained, mean - v
         v = min(max(mean, 0.0), top)
         step += 1
-        if step % span.stride == 0:
-            path[k, 0], path[k, 1] = x, y
-            if _is_ready(k, span, thrust, ready):
-                _note_ready(k, ux, uy, v, ready)
-            k += 1
-        if togo_deg <= 0.0 and turn == 0.0 and 0 < k <= span.samples:
-            steady = abs(gained) + abs(thrust - last) < STEADY_SPEED
-            rate = 0.0 if steady else _share_left(gained, before, earlier)
-            left = rate / (1.0 - rate)
-            more_mps, more_thrust = gained * left, (thrust - last) * left
-            run = Settling(x, y, ux, uy, v + more_mps, more_mps, thrust + more_thrust, more_thrust, rate)
-            if steady or _settles_at(min(speed_mps, top), run, params):
-                _run_on(run, step, k, span, path, ready)
+        if step % span.stride != 0:
+            continue
+        path[k, 0], path[k, 1] = x, y
+        if _is_ready(k, span, thrust, ready):
+            _note_ready(k, ux, uy, v, ready)
+        k += 1
+        if togo_deg <= 0.0 and turn == 0.0:
+            commanded_mps = min(speed_mps, top)
+            end = _settling(v, commanded_mps, (gained, before, earlier), thrust, thrust - last)
+            if end.short_mps == 0.0 or _settles_at(commanded_mps, end, params):
+                _run_on(Straight(x, y, ux, uy), end, k, span, path, ready)
                 return
 
 
@@ -262,22 +263,42 @@ def _share_left(gained: float, before: float, earlier: float) -> float:
 
 
 @lean_kernel
-def _settles_at(speed_mps: float, run: Settling, params: Array) -> bool:
-    """Whether a run settles at that speed, with the thrust that keeps it: else it only seems to settle."""
-    kept_mps = speed_of_thrust(params, run.thrust)
-    return run.rate > 0.0 and max(abs(run.speed_mps - speed_mps), abs(kept_mps - speed_mps)) < SETTLED_MPS < speed_mps
+def _settling(
+    speed_mps: float, commanded_mps: float, gains: tuple[float, float, float], thrust: float, more_thrust: float
+) -> Settling:
+    """How a straight run settles, by what its last three steps gained, m/s, and the last one's thrust; NaN: unknown."""
+    gained, before, earlier = gains
+    if abs(gained) + abs(more_thrust) < STEADY_SPEED:
+        return Settling(speed_mps, 0.0, thrust, 0.0, 0.0, 0.0)
+    if more_thrust == 0.0 and gained > 0.0 and abs(gained - before) <= ALIKE * gained:  # all that a boat accelerates by
+        return Settling(commanded_mps, commanded_mps - speed_mps, thrust, 0.0, 1.0, gained)
+    rate = _share_left(gained, before, earlier)
+    left = rate / (1.0 - rate) if rate > 0.0 else math.nan
+    return Settling(
+        speed_mps + gained * left, gained * left, thrust + more_thrust * left, more_thrust * left, rate, 0.0
+    )
 
 
 @lean_kernel
-def _run_on(run: Settling, step: int, k: int, span: Span, path: Array, ready: Array) -> None:
-    """Fill the rest of a path with a straight run as its speed settles: that needs no model."""
-    missed_mps = run.short_mps * run.rate / (1.0 - run.rate)  # in sum, of all steps to come
-    ahead, left = 0, 1.0
+def _settles_at(speed_mps: float, end: Settling, params: Array) -> bool:
+    """Whether a run settles at that speed, with the thrust that keeps it: else it only seems to settle."""
+    off_mps = max(abs(end.speed_mps - speed_mps), abs(speed_of_thrust(params, end.thrust) - speed_mps))
+    return end.short_mps > 0.0 and off_mps < SETTLED_MPS < speed_mps
+
+
+@lean_kernel
+def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready: Array) -> None:
+    """Fill the rest of a path, from sample k, with a straight run as its speed settles: that needs no model."""
+    left, fall_mps, missed_s, gained_m = 1.0, 0.0, 0.0, 0.0  # from sample to sample
+    for _ in range(span.stride):
+        left, fall_mps = left * end.rate, fall_mps * end.rate + end.fall_mps
+        missed_s, gained_m = missed_s + left * span.dt_s, gained_m + fall_mps * span.dt_s
+    way_m, most_m = 0.0, end.speed_mps * span.stride * span.dt_s
+    short_mps, short_thrust = end.short_mps, end.short_thrust
     while _goes_on(k, span, ready):
-        while ahead < k * span.stride - step:
-            ahead, left = ahead + 1, left * run.rate
-        way_m = (ahead * run.speed_mps - missed_mps * (1.0 - left)) * span.dt_s
+        way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
+        short_mps, short_thrust = max(0.0, short_mps * left - fall_mps), short_thrust * left
         path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
-        if _is_ready(k, span, run.thrust - run.short_thrust * left, ready):
-            _note_ready(k, run.ux, run.uy, run.speed_mps - run.short_mps * left, ready)
+        if _is_ready(k, span, end.thrust - short_thrust, ready):
+            _note_ready(k, run.ux, run.uy, end.speed_mps - short_mps, ready)
         k += 1
