@@ -289,15 +289,19 @@ def _settles_at(speed_mps: float, end: Settling, params: Array) -> bool:
 @lean_kernel
 def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready: Array) -> None:
     """Fill the rest of a path, from sample k, with a straight run as its speed settles: that needs no model."""
-    left, fall_mps, missed_s, gained_m = 1.0, 0.0, 0.0, 0.0  # from sample to sample
-    for _ in range(span.stride):
-        left, fall_mps = left * end.rate, fall_mps * end.rate + end.fall_mps
-        missed_s, gained_m = missed_s + left * span.dt_s, gained_m + fall_mps * span.dt_s
-    way_m, most_m = 0.0, end.speed_mps * span.stride * span.dt_s
+    at_once = (
+        1 if end.fall_mps > 0.0 else span.stride
+    )  # steps: a speed that falls short evenly does so until it is there
+    left, missed_s = 1.0, 0.0
+    for _ in range(at_once):
+        left *= end.rate
+        missed_s += left * span.dt_s
+    way_m, most_m, gained_m = 0.0, end.speed_mps * at_once * span.dt_s, end.fall_mps * span.dt_s
     short_mps, short_thrust = end.short_mps, end.short_thrust
     while _goes_on(k, span, ready):
-        way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
-        short_mps, short_thrust = max(0.0, short_mps * left - fall_mps), short_thrust * left
+        for _ in range(span.stride // at_once):
+            way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
+            short_mps, short_thrust = max(0.0, short_mps * left - end.fall_mps), short_thrust * left
         path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
         if _is_ready(k, span, end.thrust - short_thrust, ready):
             _note_ready(k, run.ux, run.uy, end.speed_mps - short_mps, ready)
