@@ -22,7 +22,7 @@ from .plan import HELD, NOT_COVERED, PASSED, new_plan
 from .platforms import layout as L
 from .scene import Boats, Registered, Scene, Static, new_scene, path_samples
 from .setup import tuning_of
-from .shared import share
+from .shared import Called, share
 from .tracking.fears import note_fears, one_of_one_team, told_fear
 from .tracking.tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
@@ -198,6 +198,9 @@ def decide_all(desk: Desk) -> None:
         hand_over(b, desk)
 
 
+_DECIDE_ALL = Called(decide_all)
+
+
 class Deciders:
     """B deciders of the same fleet.
 
@@ -239,7 +242,7 @@ class Deciders:
             scene = new_scene(self._boats, (static, self._registered), self._tuning, *self._scratch)
             self._desk = desk = share(Desk(self.asked, self.decided, self.memory, self.pending, scene))
         if self._solver is None:
-            decide_all(desk)
+            _DECIDE_ALL(desk)
             return
         for b in range(len(self.asked.state)):
             take_up(b, desk)

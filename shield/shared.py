@@ -69,6 +69,26 @@ def share(row: Row) -> Row:
     return cast(Row, Shared(row))
 
 
+class Called:
+    """A compiled function of one shared tuple, without numba's look at what it is called with, which takes 3 us.
+
+    Args:
+        function: made by `jit.kernel`.
+    """
+
+    def __init__(self, function: Callable[[Any], None]) -> None:
+        self._function: Any = function
+        self._last: tuple[SharedType, Callable[[Any], None]] | None = None
+
+    def __call__(self, row: Any) -> None:
+        """Call it with a shared tuple."""
+        last, of = self._last, row._type
+        if last is None or last[0] is not of:
+            plain = not hasattr(self._function, "compile")  # where NUMBA_DISABLE_JIT is set
+            self._last = last = of, self._function if plain else self._function.compile((of,))
+        last[1](row)
+
+
 class SharedType(types.Type):
     """numba's type of a shared tuple: ``row`` is that of the tuple."""
 

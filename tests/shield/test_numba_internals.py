@@ -3,7 +3,7 @@
 import inspect
 
 import pytest
-from numba import njit
+from numba import njit, types
 from numba.core import caching, cgutils, config, dispatcher, imputils
 from numba.core.registry import cpu_target
 from numba.core.typing import templates
@@ -51,6 +51,14 @@ def test_a_dispatcher_asks_the_cache_that_stands_in_its_place():
     compiled._cache = Listening(test_a_dispatcher_asks_the_cache_that_stands_in_its_place)
     assert compiled(1.5) == 2.5
     assert len(asked) == 2
+
+
+def test_compiling_for_types_gives_what_can_be_called_at_once():
+    """As `shared.Called` does, also where the function has machine code already."""
+    compiled = njit(lambda x: x + 1)
+    entry = compiled.compile((types.float64,))
+    assert entry(1.5) == 2.5
+    assert compiled.compile((types.float64,)) is entry
 
 
 def test_a_cache_has_the_attributes_that_are_replaced():

@@ -15,7 +15,7 @@ from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from steerclear.shield import shared
 from steerclear.shield.jit import kernel, lean_kernel
-from steerclear.shield.shared import Shared, share
+from steerclear.shield.shared import Called, Shared, share
 
 
 class Inner(NamedTuple):
@@ -261,3 +261,20 @@ def test_a_field_that_is_not_there_is_an_error():
         read_nothing(shared)
     with pytest.raises(AttributeError, match="nothing"):
         _ = shared.nothing
+
+
+@kernel
+def count_up(of):
+    """Write how often it was called into an array of a tuple."""
+    of.row[0] += 1.0
+
+
+def test_a_compiled_function_called_past_numbas_look_takes_tuples_of_several_kinds():
+    """One call after another of one kind, of another, and of the first again."""
+    called = Called(count_up)
+    first, second = share(outer()), share(outer(of=Twin))
+    for of, times in ((first, 2), (second, 3), (first, 1)):
+        before = of.row[0]
+        for _ in range(times):
+            called(of)
+        assert of.row[0] == before + times
