@@ -121,23 +121,12 @@ def rate(scene: Scene) -> None:
 
 
 @lean_kernel
-def _concerned(i: int, scene: Scene) -> bool:
-    """Whether boat i is a mover, or could meet one."""
-    concerned = scene.plan.moving[i]
-    for j in range(scene.ours.shape[0]):
-        concerned = concerned or (scene.plan.moving[j] and scene.work.near[i, j])
-    return concerned
-
-
-@lean_kernel
 def recheck(scene: Scene) -> None:
-    """Rate anew whom it concerns that movers carry out ``plan.held`` from newly predicted states."""
+    """Rate all boats of ours when movers carry out ``plan.held`` from newly predicted states."""
     for i in range(scene.ours.shape[0]):
         if scene.plan.moving[i]:
             _go_on(i, scene)
-    for i in range(scene.ours.shape[0]):
-        if scene.ours[i] and _concerned(i, scene):
-            refresh(i, scene)
+    rate(scene)
 
 
 @lean_kernel

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import sail
 from shield_scenes import fleet_of
-from steerclear.shield import Shield, ShieldConfig, Surroundings
+from steerclear.shield import Commands, Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.platforms import layout as L
 
 FIELD = (0.0, 0.0, 900.0, 80.0)
@@ -139,3 +139,29 @@ def test_groups_that_cannot_meet_are_decided_for_as_if_each_were_alone(seed):
     for mine, ours in zip(remembered(one), remembered(both), strict=True):
         kept = ours[:n, :n] if ours.ndim == 2 else ours[:n]
         np.testing.assert_allclose(kept, mine, atol=1e-6)
+
+
+def abreast(first, other):
+    """The last of three surveyors in a row abreast, or of the last two: what is decided for it, an opponent nearby.
+
+    The first has to back up before an opponent of its own, and is in reach of the second only.
+    """
+    rows = [(0.0, 0.0, 0.0, 2.5), (0.0, 20.0, 180.0, 3.0), (105.0, 0.0, 0.0, 2.5), (210.0, 0.0, 0.0, 3.0), other]
+    fleet = fleet_of(rows[first:], [0, 1, 0, 0, 1][first:], "surveyor")
+    fleet.state[:, L.THRUST] = 100.0
+    decisions = Shield(profile="rammers").decide(fleet, Commands.relative_deg(np.tile([3.0, 0.0], (len(fleet), 1))))
+    assert first > 0 or decisions[0].intervened
+    return decisions[len(fleet) - 2]
+
+
+def test_what_is_told_of_a_boat_hangs_on_no_backup_of_one_that_it_cannot_meet():
+    """Value tables are looked up at another time for who backs up than for who passes."""
+    random, close = np.random.default_rng(0), 0
+    for _ in range(250):
+        bearing, far_m = random.uniform(-np.pi, np.pi), random.uniform(15.0, 40.0)
+        other = (210.0 + far_m * np.sin(bearing), far_m * np.cos(bearing), random.uniform(-180.0, 180.0), 3.0)
+        alone, together = abreast(2, other), abreast(0, other)
+        assert together.reason == alone.reason
+        assert together.certificate_m == pytest.approx(alone.certificate_m, abs=1e-9)
+        close += alone.reason == Reason.PASSED and alone.certificate_m < 2.0
+    assert close > 5
