@@ -154,9 +154,10 @@ def report(
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
+    processes = check_jobs(jobs)
     folder = results_folder("entry-report", out_folder, resume)
-    results = run_games("entry report", settings, folder, jobs, resume, quick)
-    _show(settings, folder, results, looks, check_jobs(jobs))
+    results = run_games("entry report", settings, folder, processes, resume, quick)
+    _show(settings, folder, results, looks, processes)
     if json_file is not None:
         write_json(json_file, results)
     check_complete(results)
