@@ -204,8 +204,9 @@ def _show(settings: AblationSettings, folder: Path, results: dict[str, Any], loo
     for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
         chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
         with progress(f"replay {number + 1}", 1):
-            outcomes = {one.job.key: one.answer for one in run_all(play_match, chosen, processes)}
-        records = [outcomes[spec.key].record for spec in chosen if outcomes.get(spec.key) is not None]
+            outcomes = run_all(play_match, chosen, processes)
+            found = {one.job.key: one.answer.record for one in outcomes if one.answer is not None}
+        records = [found[spec.key] for spec in chosen if spec.key in found]
         if len(records) == len(chosen):
             name = f"look_{number + 1}.html"
             write_replay(records, folder / name, f"{off['pairing']}, game {off['game']}: {words}")
