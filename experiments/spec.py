@@ -113,8 +113,10 @@ def check_seed(seed: int) -> None:
     Raises:
         ConfigError: a negative one, or one beyond `LARGEST_SEED`.
     """
-    if not 0 <= seed <= LARGEST_SEED:
-        raise ConfigError(f"--seed must be 0 or more, and at most {LARGEST_SEED}; got {seed}")
+    if seed < 0:
+        raise ConfigError(f"--seed must be 0 or more; got {seed}")
+    if seed > LARGEST_SEED:
+        raise ConfigError(f"--seed must be at most {LARGEST_SEED}; got {seed}")
 
 
 def check_count(option: str, number: int, low: int, high: int) -> None:
