@@ -193,7 +193,7 @@ _TEXTS = {"certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
 _POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "move_s", "speed_weight", "horizon_s"}
 RANGES = {
-    "separation_m": (0.0, 200.0),
+    "separation_m": (0.0, 1000.0),
     "buffer_m": (0.0, 50.0),
     "hull_m": (0.0, 200.0),
     "edge_m": (0.0, 200.0),
@@ -246,5 +246,5 @@ def _check_number(name: str, value: object) -> None:
         first = "more than 0 and at most" if name in _POSITIVE and low == 0.0 else f"{low:g} to"
         unit = name.rsplit("_")[-1]
         small, unit = _UNITS.get(unit, ("", unit))
-        words = f" (if that is {small}, give {number / 1000.0:g})" if small and number >= 4.0 * high else ""
+        words = f" (if that is {small}, give {number / 1000.0:g})" if small and number >= 2.0 * high else ""
         raise ConfigError(f"{name} is {value}{words}; give {first} {high:g} {unit}".rstrip())

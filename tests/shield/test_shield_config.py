@@ -201,7 +201,7 @@ def test_what_nothing_can_be_decided_for_is_refused(name, value):
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [
-        ("separation_m", 2500, r"2500 \(if that is mm, give 2.5\); give more than 0 and at most 200 m"),
+        ("separation_m", 2500, r"2500 \(if that is mm, give 2.5\); give more than 0 and at most 1000 m"),
         ("dt_s", 100.0, r"100.0 \(if that is ms, give 0.1\); give 0.01 to 2 s"),
         ("current_mps", 300, r"300 \(if that is mm/s, give 0.3\); give 0 to 10 m/s"),
         ("track_error_mps", 51, "51; give 0 to 50 m/s$"),
