@@ -7,7 +7,7 @@ import re
 from dataclasses import fields
 from typing import NamedTuple
 
-from steerclear.shield.config import PROFILES, ShieldConfig
+from steerclear.shield.config import PROFILES, RANGES, ShieldConfig
 
 from .markdown import MADE
 
@@ -72,7 +72,8 @@ HEAD = f"""# Settings
 {MADE}
 
 What can be set: `Shield(name=value)`, `--shield-set name=value` of the commands that play games, `shield:` in a
-`FLEET.yaml`. A name that is misspelt, a value of another type or out of range is refused when the shield is built.
+`FLEET.yaml`. A name that is misspelt, a value of another type (True and False are no numbers) or out of range is
+refused when the shield is built.
 
 What a setting changes is told by games from the same seeds, each setting into a folder of its own:
 
@@ -100,7 +101,16 @@ def settings_page() -> str:
         "| --- | --- | --- | --- | --- | --- |",
     ]
     profiles = ", ".join(f"`{name}` {away:g} and {home:g} s" for name, (away, home) in PROFILES.items())
-    return HEAD + "\n".join(table + rows) + f"\n\n`adversary_s` and `visitor_s` of the profiles: {profiles}.\n"
+    ends = f"`adversary_s` and `visitor_s` of the profiles: {profiles}."
+    return HEAD + "\n".join(table + rows) + f"\n\n{ends}\n\n{_ranges()}\n"
+
+
+def _ranges() -> str:
+    """What is refused as too small or too large."""
+    told = ", ".join(
+        f"`{name}` {low:g} to {high:g} {COSTS[name].unit}".rstrip() for name, (low, high) in RANGES.items()
+    )
+    return f"Ranges: {told}. All other numbers are at least 0."
 
 
 def meanings() -> dict[str, str]:

@@ -17,6 +17,8 @@ from .store import key_of
 from .tally import RADII_M
 
 SIDES = ("blue", "red")
+LARGEST_SEED = 2**62
+"""Seeds of games count up from that of a run: all of them are whole numbers of 64 bits, as tables hold."""
 ANSWER_S, MOST_ANSWER_S = 10.0, 86_400.0
 """Time a policy from a file has for the actions of a step, and the longest that can be given, s."""
 
@@ -106,13 +108,25 @@ class MatchSpec:
 
 
 def check_seed(seed: int) -> None:
-    """Refuse seeds that no random numbers can be drawn from.
+    """Refuse seeds that no random numbers can be drawn from, or whose games' seeds no record or table can hold.
 
     Raises:
-        ConfigError: a negative one.
+        ConfigError: a negative one, or one beyond `LARGEST_SEED`.
     """
     if seed < 0:
         raise ConfigError(f"--seed must be 0 or more; got {seed}")
+    if seed > LARGEST_SEED:
+        raise ConfigError(f"--seed must be at most {LARGEST_SEED}; got {seed}")
+
+
+def check_count(option: str, number: int, low: int, high: int) -> None:
+    """Refuse a number of things that are none, or too many to be listed.
+
+    Raises:
+        ConfigError: it is not from ``low`` to ``high``.
+    """
+    if not low <= number <= high:
+        raise ConfigError(f"{option} must be at least {low} and at most {high:,}; got {number:,}")
 
 
 def check_side(side: str) -> str:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
-from .arrays import NoNumbersError, numbers
+from .arrays import NoNumbersError, holds_bools, numbers
 from .exceptions import GameError
 from .jit import Array
 
@@ -117,28 +117,16 @@ def _is_plain_pair(action: Any) -> TypeGuard[Command]:
 
 def _values(seat: Seat, action: Any) -> Array:
     """The numbers of an action."""
-    if not (seat.bools or not _is_bool(action)):
+    if not seat.bools and holds_bools(action):
         raise _unusable(seat, action)
     try:
-        return numbers(action)
+        return numbers(action, seat.bools)
     except NoNumbersError:
         pass
     try:
         return np.array(float(operator.index(action)))  # anything that indexes a list
     except Exception:  # foreign code may raise anything
         raise _unusable(seat, action) from None
-
-
-def _is_bool(action: Any) -> bool:
-    if isinstance(action, (list, tuple)) and len(action) == 1:
-        return _is_bool(action[0])
-    kind = getattr(action, "dtype", None)
-    return isinstance(action, (bool, np.bool_)) or str(kind) in ("bool", "torch.bool")
-
-
-def _holds_bools(actions: Any) -> bool:
-    """Whether an action of several boats is True or False."""
-    return _is_bool(actions) if hasattr(actions, "dtype") else any(map(_is_bool, actions))
 
 
 def _number(seat: Seat, action: Any, value: float) -> int | str:
@@ -215,7 +203,7 @@ def read_flat(actions: Any, top_mps: Array, seat_of: Callable[[int], Seat], pair
         if fits and pairs and np.isfinite(given).all():
             return given.copy()
         whole = fits and not pairs and ((given == np.floor(given)) & (given >= -1) & (given <= STOP)).all()
-        if whole and not _holds_bools(actions):
+        if whole:
             return DISCRETE[given.astype(np.int64)] * np.stack([top_mps, np.ones(n)], axis=1)
         rows = list(actions) if fits else []
     if len(rows) != n:

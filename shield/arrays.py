@@ -12,24 +12,42 @@ LARGEST_WHOLE = 2**53
 """Whole numbers given as floats are exact up to here."""
 
 _NUMERIC = "iufb"
+_BOOLS = ("bool", "torch.bool")
 
 
 class NoNumbersError(ValueError):
     """What was given holds no numbers; its text says why, for the message of whoever asked."""
 
 
-def numbers(value: Any) -> Array:
+def numbers(value: Any, bools: bool = False) -> Array:
     """Numbers of any kind as an array that compiled code knows: float64, C order, aligned, writeable.
 
     Such an array is handed on as it is; of any other (lists, tensors, whole numbers, float32, strided or read-only
     views) a copy is made. Compiled code would be compiled anew for each other kind, and would round in whole numbers.
+
+    Args:
+        value: numbers.
+        bools: True and False are 1 and 0; else they are no numbers: a mask or a flag in the place of a speed or heading
+            is a mistake.
 
     Raises:
         NoNumbersError: it holds something else: texts, complex numbers, masked values, rows of unlike length.
     """
     if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
         return value
-    return np.require(_plain(value), np.float64, ["C", "A", "W"])
+    found = _plain(value)
+    if not bools and (found.dtype == np.bool_ or holds_bools(value)):
+        raise NoNumbersError("some are True or False")
+    return np.require(found, np.float64, ["C", "A", "W"])
+
+
+def holds_bools(value: Any) -> bool:
+    """Whether an entry is True or False, Python's, numpy's or a tensor's, at any depth of lists and tuples."""
+    if type(value) in (list, tuple):
+        return any(map(holds_bools, value))
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        return any(map(holds_bools, value.flat))
+    return isinstance(value, bool) or str(getattr(value, "dtype", None)) in _BOOLS
 
 
 def truths(value: Any) -> BoolArray:
@@ -40,7 +58,7 @@ def truths(value: Any) -> BoolArray:
     """
     if type(value) is np.ndarray and value.dtype == np.bool_ and value.flags.carray:
         return value
-    found = numbers(value)
+    found = numbers(value, bools=True)
     if not ((found == 0.0) | (found == 1.0)).all():
         raise NoNumbersError(f"a value that is neither True nor False: {_short(found)}")
     yes: BoolArray = found == 1.0

@@ -34,7 +34,8 @@ class Commands:
             they are. Of others it cuts them.
 
     Raises:
-        FleetError: the shape is wrong, the values are not numbers, or ``relative`` is neither True nor False.
+        FleetError: the shape is wrong, the values are not numbers (True and False are none), or ``relative`` is neither
+            True nor False.
     """
 
     values: Array

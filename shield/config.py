@@ -25,6 +25,8 @@ class Unsaid(float):
 class ShieldConfig:
     """Settings of the shield.
 
+    Numbers are finite and at least 0 where nothing else is said; what stands in `RANGES` is refused beyond it.
+
     Attributes:
         separation_m: distance to keep between boat centres, m. Where nobody gives it, a wrapper or `games_shield` takes
             the distance at which its game counts a collision, if that is larger.
@@ -190,7 +192,16 @@ def _names(barriers: object) -> tuple[str, ...]:
 _TEXTS = {"certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
 _POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "move_s", "speed_weight", "horizon_s"}
-_RANGES = {
+RANGES = {
+    "separation_m": (0.0, 1000.0),
+    "buffer_m": (0.0, 50.0),
+    "hull_m": (0.0, 200.0),
+    "edge_m": (0.0, 200.0),
+    "position_error_m": (0.0, 100.0),
+    "table_margin_m": (0.0, 50.0),
+    "current_mps": (0.0, 10.0),
+    "track_error_mps": (0.0, 50.0),
+    "speed_weight": (0.0, 1e6),
     "margin_cap_m": (0.0, 50.0),
     "mate_cap_m": (0.0, 50.0),
     "dt_s": (0.01, 2.0),
@@ -202,7 +213,10 @@ _RANGES = {
     "search_limit": (1e3, math.inf),
 }
 """What a decision can be made for at all: with times memory and work grow, and what is farther off is a guess; a larger
-cap of margins would weigh more than the field's edge."""
+cap of margins would weigh more than the field's edge. Lengths and speeds beyond theirs are of other units, as mm for m:
+the water would be closed."""
+_UNITS = {"m": ("mm", "m"), "s": ("ms", "s"), "mps": ("mm/s", "m/s"), "weight": ("", ""), "limit": ("", "clearances")}
+"""By the end of a setting's name: the unit a thousand times smaller in which it may have been given, and its own."""
 _MAY_BE_NONE = {"adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m"}
 _MAY_BE_INFINITE = _RATES | {"adversary_s", "visitor_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
@@ -227,7 +241,10 @@ def _check_number(name: str, value: object) -> None:
     if number < 0 or (number == 0 and name in _POSITIVE):
         bound = "> 0" if name in _POSITIVE else ">= 0"
         raise ConfigError(f"{name} is {value}; it must be {bound}")
-    low, high = _RANGES.get(name, (0.0, math.inf))
+    low, high = RANGES.get(name, (0.0, math.inf))
     if not low <= number <= high:
         first = "more than 0 and at most" if name in _POSITIVE and low == 0.0 else f"{low:g} to"
-        raise ConfigError(f"{name} is {value}; give {first} {high:g} {name.rsplit('_')[-1]}")
+        unit = name.rsplit("_")[-1]
+        small, unit = _UNITS.get(unit, ("", unit))
+        words = f" (if that is {small}, give {number / 1000.0:g})" if small and number >= 2.0 * high else ""
+        raise ConfigError(f"{name} is {value}{words}; give {first} {high:g} {unit}".rstrip())

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
 from enum import IntEnum
 from typing import Any, overload
 
@@ -13,6 +16,7 @@ import numpy as np
 from . import plan
 from .barriers.static import STATIC
 from .commands import Commands
+from .exceptions import FleetError
 from .fleet import FIELD, Fleet
 from .jit import Array, BoolArray, IntArray
 
@@ -103,7 +107,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Decisions(Sequence[Decision]):
-    """Decisions for all boats of a fleet, in its order; indexing builds the `Decision` of one boat.
+    """Decisions for all boats of a fleet, in its order; indexing, by place or name, builds the `Decision` of one boat.
+
+    ``decisions[0]`` is that of the fleet's first boat, ``decisions["boat_0"]`` that of the boat of this name, and
+    ``"boat_0" in decisions`` tells whether there is one. `sent` and the other arrays have all boats at once.
 
     Attributes:
         fleet: the fleet decided on.
@@ -118,6 +125,10 @@ class Decisions(Sequence[Decision]):
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
         feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
         barriers: names of the registered barriers that are kept.
+
+    Raises:
+        FleetError: indexed by a name that no boat has, or by what is neither place nor name.
+        IndexError: by a place that there is not.
     """
 
     fleet: Fleet
@@ -138,18 +149,34 @@ class Decisions(Sequence[Decision]):
         return len(self.reason)
 
     @overload
-    def __getitem__(self, index: int) -> Decision: ...
+    def __getitem__(self, index: int | str) -> Decision: ...
     @overload
     def __getitem__(self, index: slice) -> Sequence[Decision]: ...
-    def __getitem__(self, index: int | slice) -> Decision | Sequence[Decision]:
+    def __getitem__(self, index: int | str | slice) -> Decision | Sequence[Decision]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"no boat {index} in a fleet of {len(self)}")
-        return self._decision(index % len(self))
+        i = self._place_of(index) if isinstance(index, str) else _place(index)
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"no boat {i} in a fleet of {len(self)}")
+        return self._decision(i % len(self))
 
     def __iter__(self) -> Iterator[Decision]:
         return (self[i] for i in range(len(self)))
+
+    def __contains__(self, item: object) -> bool:
+        return item in self.fleet.names if isinstance(item, str) else any(item == one for one in self)
+
+    def _place_of(self, name: str) -> int:
+        """The place of a boat in the fleet.
+
+        Raises:
+            FleetError: there is no boat of that name.
+        """
+        if name in self.fleet.names:
+            return self.fleet.names.index(name)
+        near = get_close_matches(name, self.fleet.names, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(self.fleet.names) or 'none'}"
+        raise FleetError(f"no boat {name!r} in the fleet decided on; {hint}")
 
     def _decision(self, i: int) -> Decision:
         heading = self.fleet.heading_rad[i]
@@ -198,3 +225,18 @@ class Decisions(Sequence[Decision]):
     def count_intervened(self) -> int:
         """Number of boats whose command was changed."""
         return int(np.count_nonzero(self.intervened))
+
+
+def _place(index: Any) -> int:
+    """A boat's place as Python's own whole number.
+
+    Raises:
+        FleetError: it is none: a fraction, a mask, True or False.
+    """
+    if not isinstance(index, (bool, np.bool_)):
+        with suppress(TypeError):
+            return operator.index(index)
+    raise FleetError(
+        f"decisions are indexed by a boat's name or place in the fleet, not by {index!r}; of several boats at once "
+        "see their arrays: sent.values, intervened, reason"
+    )

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import NoNumbersError, numbers, whole_numbers
+from .arrays import NoNumbersError, numbers, truths, whole_numbers
 from .exceptions import FleetError
-from .hints import hint_at_headings, hint_at_positions
+from .hints import hint_at_errors, hint_at_headings, hint_at_positions
 from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform, get_platform
 from .platforms import layout as L
@@ -29,6 +29,12 @@ LARGEST = 1e9
 
 LARGEST_SPEED_MPS = 50.0
 """Speeds beyond this are faults of the source, m/s: such a boat would jump over the radius within a step."""
+
+LARGEST_ERROR_M = 1000.0
+"""Bounds on a position's error that are given beyond this say nothing of where a boat is, m."""
+
+LARGEST_AGE_S = 3600.0
+"""Ages of tracks that are given beyond this are times of day, or of a boat long gone, s."""
 
 
 @kernel
@@ -114,25 +120,25 @@ class Fleet:
         """Fleet from plain arrays.
 
         Args:
-            position_m: (n, 2) east and north, m.
-            heading_rad: (n,) clockwise from north, rad; or
+            position_m: (n, 2) east and north, m, within 1e9 of the origin.
+            heading_rad: (n,) clockwise from north, rad; any number of turns; or
             heading_deg: (n,) the same in deg.
-            speed_mps: (n,) m/s, negative astern.
+            speed_mps: (n,) m/s, negative astern, at most 50 either way.
             team: (n,) integers.
             platforms: one platform for all, or n of them.
             controlled: (n,) bool; None: the boats of team 0.
             names: n names; None: boat_0, boat_1, ...
-            thrust: (n,) thrust in percent where known, else NaN: of own boats it is then followed from what was
-                sent; at first, and of others, it is taken from the speed.
+            thrust: (n,) thrust in percent where known, at most the platform's ``max_thrust`` either way, else NaN: of
+                own boats it is then followed from what was sent; at first, and of others, it is taken from the speed.
             heading_error_rad: (n,) last error the heading controller saw where known, else NaN.
-            age_s: (n,) age of each track, s.
-            position_error_m: (n,) bound on the position error, m.
-            adversary_s: (n,) how long each may do its worst as an opponent, s; NaN: as the settings say.
+            age_s: (n,) age of each track, s, 0 to 3600; more than `ShieldConfig.max_track_age_s` is refused later.
+            position_error_m: (n,) bound on the position error, m, 0 to 1000.
+            adversary_s: (n,) how long each may do its worst as an opponent, s, 0 to inf; NaN: as the settings say.
             visiting: (n,) bool, boats on the other team's side, where they can tag nobody.
 
         Raises:
-            FleetError: shapes do not fit together, a value cannot be used, two boats have the same name, or one is
-                called "field".
+            FleetError: shapes do not fit together, a value cannot be used or is out of its range, two boats have the
+                same name, or one is called "field".
             PlatformError: a platform is unknown.
         """
         position = _shaped("position_m", position_m, (None, 2))
@@ -145,7 +151,9 @@ class Fleet:
         state[:, L.SPEED_ERROR] = np.nan
         state[:, L.HEADING_ERROR] = np.nan
         if heading_error_rad is not None:
-            state[:, L.HEADING_ERROR] = np.degrees(_shaped("heading_error_rad", heading_error_rad, (n,)))
+            error_rad = _shaped("heading_error_rad", heading_error_rad, (n,))
+            hint_at_headings("Fleet.of: heading_error_rad", error_rad, "give radians")
+            state[:, L.HEADING_ERROR] = np.degrees(error_rad)
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
             state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
         hint_at_positions(position)
@@ -162,6 +170,7 @@ class Fleet:
             visiting=None if visiting is None else _yes_or_no("visiting", visiting, n),
         )
         fleet.check()
+        _check_given(fleet)
         if FIELD in fleet.names:
             raise FleetError(f"names holds {FIELD!r}, by which decisions name walls and edges; give that boat another")
         twins = sorted({name for name in fleet.names if fleet.names.count(name) > 1})
@@ -199,11 +208,18 @@ class Fleet:
             self._name_fault()
         error = self.position_error_m
         if error is not None and not ((error >= 0.0) & (error <= LARGEST)).all():
+            i = int(np.argmin((error >= 0.0) & (error <= LARGEST)))
             raise FleetError(
-                "position_error_m holds a value that is negative or not finite; give a bound in m per boat"
+                f"position_error_m holds {error[i]} for boat {self.names[i]!r}: negative, not finite or beyond "
+                f"{LARGEST:g}; give a bound in m per boat"
             )
-        if self.adversary_s is not None and (self.adversary_s < 0.0).any():
-            raise FleetError("adversary_s holds a negative time; give s per boat, or NaN where the settings say it")
+        fear = self.adversary_s
+        if fear is not None and (fear < 0.0).any():
+            i = int(np.argmax(fear < 0.0))
+            raise FleetError(
+                f"adversary_s holds a negative time for boat {self.names[i]!r} ({fear[i]:g}); give s per boat, 0 to "
+                "inf, or NaN where the settings say it"
+            )
 
     def _check_length(self, name: str, n: int) -> None:
         value = getattr(self, name)
@@ -236,11 +252,13 @@ class Fleet:
         bad[:, L.SPEED] |= size[:, L.SPEED] > LARGEST_SPEED_MPS
         i, column = np.argwhere(bad)[0]
         what = {L.X: "position", L.Y: "position", L.HEADING: "heading", L.SPEED: "speed"}.get(column, "memory")
-        remedy = (
-            "give NaN where it is unknown"
-            if what == "memory"
-            else "give the last fix with its age_s; leave out boats that never had one"
-        )
+        remedy = "give the last fix with its age_s; leave out boats that never had one"
+        if what == "memory":
+            remedy = "give NaN where it is unknown"
+        elif np.isfinite(size[i, column]):
+            remedy = {"speed": "give m/s, not mm/s or cm/s", "position": "give m from a place nearby"}.get(
+                what, "give deg"
+            )
         most = f"{LARGEST_SPEED_MPS:g} m/s" if what == "speed" else f"{LARGEST:g}"
         raise FleetError(
             f"{what} of boat {self.names[i]!r} is not finite or beyond {most} ({self.state[i, column]}); {remedy}"
@@ -292,10 +310,10 @@ _FORMS: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...], bools: bool = False) -> Array:
     """Value as a float array of that shape (None matches any length); nothing at all fits any."""
     try:
-        array = numbers(value)
+        array = numbers(value, bools)
     except NoNumbersError as error:
         raise FleetError(f"{name} is not an array of numbers ({error})") from None
     if array.shape == (0,) and shape[0] in (None, 0):
@@ -305,6 +323,37 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array
         wanted = tuple("n" if entry is None else entry for entry in shape)
         raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
     return array
+
+
+def _check_given(fleet: Fleet) -> None:
+    """Check what a person gave: numbers that compiled code would take, but that say nothing, or are of other units.
+
+    Of fleets that programs build these are not refused: a boat at sea is better kept clear of as well as may be.
+
+    Raises:
+        FleetError: one is out of its range.
+    """
+    errors_m, ages_s, thrusts = fleet.position_error_m, fleet.age_s, fleet.state[:, L.THRUST]
+    if errors_m is not None:
+        within = "give a bound in m from 0 to {:g}, not in mm; leave out boats whose place is not known"
+        _check_range(fleet, "position_error_m", errors_m, 0.0, np.full(len(fleet), LARGEST_ERROR_M), within)
+        hint_at_errors(errors_m)
+    if ages_s is not None:
+        within = "give seconds since its fix from 0 to {:g}, not the time of day, nor ms; leave out boats long gone"
+        _check_range(fleet, "age_s", ages_s, 0.0, np.full(len(fleet), LARGEST_AGE_S), within)
+    most = np.array([get_platform(kind).max_thrust for kind in fleet.platforms])
+    within = "give percent up to {:g} either way, not the pulse in us, or NaN where it is unknown"
+    _check_range(fleet, "thrust", np.where(np.isnan(thrusts), 0.0, thrusts), -most, most, within)
+
+
+def _check_range(fleet: Fleet, name: str, values: Array, low: Array | float, high: Array, remedy: str) -> None:
+    """Raise for the first boat whose value is not within its range.
+
+    Raises:
+        FleetError: names the boat, the value and the ``remedy``, in which {} is its highest value.
+    """
+    for i in np.flatnonzero(~((values >= low) & (values <= high)))[:1]:
+        raise FleetError(f"{name} of boat {fleet.names[i]!r} is {values[i]:g}; {remedy.format(high[i])}")
 
 
 def _copied(name: str, value: ArrayLike | None, n: int) -> Array | None:
@@ -352,15 +401,16 @@ def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tupl
 
 def _yes_or_no(name: str, value: ArrayLike, n: int) -> BoolArray:
     """Values as booleans; what is neither true nor false, as NaN, is refused."""
-    values = _shaped(name, value, (n,))
-    if not ((values == 0.0) | (values == 1.0)).all():
-        raise FleetError(f"{name} holds a value that is neither True nor False: {values.tolist()}")
-    return values == 1.0
+    _shaped(name, value, (n,), bools=True)
+    try:
+        return truths(value).reshape(n).copy()
+    except NoNumbersError as error:
+        raise FleetError(f"{name} holds {error}") from None
 
 
 def _whole(name: str, values: ArrayLike, n: int) -> IntArray:
     """Values of n boats as integers; fractions, NaN and what 64 bits do not hold are refused."""
-    _shaped(name, values, (n,))
+    _shaped(name, values, (n,), bools=True)
     try:
         return whole_numbers(values).reshape(n).copy()
     except NoNumbersError as error:

@@ -16,6 +16,9 @@ MOST_RAD = 10.0
 SMALLEST_FLEET_M = 0.05
 """Boats that are all within so much of each other, and not at one point, are hardly given in metres."""
 
+MOST_ERROR_M = 50.0
+"""Bounds on a position's error beyond this are hardly metres: nobody can keep clear of such a boat."""
+
 _said: set[str] = set()
 
 
@@ -46,6 +49,17 @@ def hint_at_positions(position_m: Array) -> None:
             f"all {len(position_m)} boats are within {spread:.2g} m of each other; if these are degrees, give metres "
             "east and north of a place nearby: steerclear.shield.bridge.frame.FieldFrame(latitude_deg, longitude_deg)"
             ".to_field_m(latitude_deg, longitude_deg)",
+        )
+
+
+def hint_at_errors(position_error_m: Array) -> None:
+    """Say so if bounds on position errors, m, look like mm or cm."""
+    largest = position_error_m.max(initial=0.0)
+    if largest > MOST_ERROR_M:
+        say_once(
+            "position_error_m",
+            f"position_error_m holds {largest:g} m; if that is mm, divide by 1000. The separation is widened by the "
+            "errors of both boats, so that every boat nearby will seem too near",
         )
 
 

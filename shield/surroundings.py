@@ -17,6 +17,7 @@ from .arrays import NoNumbersError, numbers
 from .barriers.static import LEAVE_S
 from .config import ShieldConfig
 from .exceptions import ConfigError
+from .fleet import LARGEST
 from .jit import Array
 from .scene import Static
 from .shared import share
@@ -37,8 +38,8 @@ class Surroundings:
             obstacle without a hull.
 
     Raises:
-        ConfigError: a value is not finite, a radius negative, a polygon has fewer than three corners, or the field
-            is empty.
+        ConfigError: a value is not finite or beyond 1e9, a radius negative, a polygon has fewer than three corners, or
+            the field is empty.
     """
 
     field: tuple[float, float, float, float] | None = None
@@ -132,7 +133,7 @@ _LISTS = {
 
 
 def _numbers(name: str, row: object, form: str) -> tuple[float, ...]:
-    """A row as a tuple of finite floats, as many as ``form`` names."""
+    """A row as a tuple of finite floats of a sensible size, as many as ``form`` names."""
     try:
         array = numbers(row)
     except NoNumbersError:
@@ -142,6 +143,8 @@ def _numbers(name: str, row: object, form: str) -> tuple[float, ...]:
         raise ConfigError(f"{name} holds {row!r}; give {form} in m")
     if not all(math.isfinite(value) for value in values):
         raise ConfigError(f"{name} holds a value that is not finite: {row}")
+    if any(abs(value) > LARGEST for value in values):
+        raise ConfigError(f"{name} holds a value beyond {LARGEST:g} m: {row}; give {form} in m from a place nearby")
     return values
 
 

@@ -33,13 +33,18 @@ PROGRAM = [sys.executable, "-m", "steerclear.experiments.cli"]
 
 def commands(kind=""):
     """The page's commands, in its order."""
+    return [words for words in lines(kind) if words[0] == "steerclear"]
+
+
+def lines(kind=""):
+    """The page's commands, and files that it moves."""
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE.read_text(), flags=re.M | re.S)
     return [
         shlex.split(line)
         for name, block in blocks
         if name == kind
         for line in block.splitlines()
-        if line.startswith("steerclear")
+        if line.startswith(("steerclear ", "mv "))
     ]
 
 
@@ -49,10 +54,13 @@ def follow(folder, last=""):
     for k, port in enumerate(free_ports(2)):
         text = text.replace(f"PORT{k}", str(port))
     (folder / "FLEET.yaml").write_text(text)
-    page, (sim,) = commands(), commands("sim")
+    page, (sim,) = lines(), commands("sim")
     boats = None
     try:
         for words in page:
+            if words[0] == "mv":
+                (folder / words[1]).rename(folder / words[2])
+                continue
             if words[1] in DRIVES and boats is None:
                 with (folder / "boats.txt").open("wb") as said:
                     program = [*PROGRAM, *sim[1:], "--speed", SPEED, "--no-wait"]

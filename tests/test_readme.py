@@ -12,7 +12,7 @@ BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 def run(block):
     """The names a block leaves."""
     left = {}
-    exec(compile(block.replace("my_submission.zip", "medium"), "README.md", "exec"), left)
+    exec(compile(block, "README.md", "exec"), left)
     return left
 
 

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 
 from ..encounters.guards import check_guard
@@ -26,10 +25,12 @@ from ..encounters.scenes import Conditions
 from ..encounters.start import start_certificate_m
 from ..encounters.tally import Columns, tally
 from ..encounters.verdicts import judge_game, side_name
-from ..spec import check_seed
+from ..spec import check_count, check_seed
 from ..store import key_of
 from .opponents import Duel
 
+MOST_PLAYED = 10_000
+"""Opponents of a generation, generations of a search and searches at most: a generation is played in memory at once."""
 MOST_JUDGED = 3
 """Breaches judged in one generation: a search ends with the first avoidable one."""
 NO_SUCCESS_M = 1.0
@@ -69,10 +70,8 @@ class Search:
 
     def __post_init__(self) -> None:
         check_guard(self.guard)
-        if self.population < 8:
-            raise ConfigError(f"--population must be at least 8; got {self.population}")
-        if self.generations < 1:
-            raise ConfigError(f"--generations must be at least 1; got {self.generations}")
+        check_count("--population", self.population, 8, MOST_PLAYED)
+        check_count("--generations", self.generations, 1, MOST_PLAYED)
         check_seed(self.seed)
 
     def duel(self) -> Duel:

@@ -10,12 +10,13 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 
 from ..attack.campaign import passed, run_searches, searches_of, searches_table, write_all
-from ..attack.search import Search
+from ..attack.search import MOST_PLAYED, Search
 from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
 from ..engines import Workers as Engines
 from ..engines import engine_of
 from ..failed_jobs import end_failed
+from ..spec import check_count
 from ..store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
@@ -59,8 +60,9 @@ def attack(
         finish(play_scene_files(replay, guards, folder))
         return
     pairs = platform_pairs(platform)
-    if len(pairs) != 1 or restarts < 1:
-        raise ConfigError("attack takes one --platform (own or own/attackers') and at least 1 of --restarts")
+    if len(pairs) != 1:
+        raise ConfigError(f"attack takes one --platform, own or own/attackers', not {len(pairs)}")
+    check_count("--restarts", restarts, 1, MOST_PLAYED)
     conditions = Conditions(radius, delay, noise, current)
     first = Search(*pairs[0], attackers, own, guards[0], conditions, seed, 0, population, generations)
     first.duel()

@@ -154,9 +154,10 @@ def report(
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
+    processes = check_jobs(jobs)
     folder = results_folder("entry-report", out_folder, resume)
-    results = run_games("entry report", settings, folder, jobs, resume, quick)
-    _show(settings, folder, results, looks, check_jobs(jobs))
+    results = run_games("entry report", settings, folder, processes, resume, quick)
+    _show(settings, folder, results, looks, processes)
     if json_file is not None:
         write_json(json_file, results)
     check_complete(results)
@@ -203,8 +204,9 @@ def _show(settings: AblationSettings, folder: Path, results: dict[str, Any], loo
     for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
         chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
         with progress(f"replay {number + 1}", 1):
-            outcomes = {one.job.key: one.answer for one in run_all(play_match, chosen, processes)}
-        records = [outcomes[spec.key].record for spec in chosen if outcomes.get(spec.key) is not None]
+            outcomes = run_all(play_match, chosen, processes)
+            found = {one.job.key: one.answer.record for one in outcomes if one.answer is not None}
+        records = [found[spec.key] for spec in chosen if spec.key in found]
         if len(records) == len(chosen):
             name = f"look_{number + 1}.html"
             write_replay(records, folder / name, f"{off['pairing']}, game {off['game']}: {words}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from typer.models import OptionInfo
 
 from ..new_file import NEW, check_new, check_place
+from ..store import BESIDE, LINES_FILE, RESULTS_FILE
 
 OTHERS = {
     ".mcap": "black boxes",
@@ -21,6 +22,15 @@ OTHERS = {
     ".yaml": "fleet files",
     ".yml": "fleet files",
     ".py": "programs",
+    ".zip": "entries and models",
+    ".png": "pictures",
+    ".svg": "pictures",
+    ".pdf": "pictures",
+    ".mp4": "films",
+    ".gif": "films",
+    ".csv": "tables",
+    ".parquet": "tables",
+    ".jsonl": "games that are kept",
 }
 """Endings of files that are no JSON."""
 
@@ -35,11 +45,16 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
         given: its arguments by name.
 
     Raises:
-        ConfigError: one file is named for two things, that of ``--json`` cannot be written, or one to write is there.
+        ConfigError: one file is named for two things, or is what the command writes into its folder of results, that of
+            ``--json`` cannot be written, or one to write is there.
     """
     spelled = {name: _spelling(function, name) for name in given}
     check_apart({spelled[name]: value for name, value in given.items()})
     check_json_file(given.get("json_file"))
+    folders = _folders(function, given)
+    for name in written_by(function):
+        check_each_once(given.get(name), spelled.get(name, name))
+        check_not_in(given.get(name), spelled.get(name, name), folders)
     for name in [] if given.get("resume") else written_by(function):
         value = given.get(name)
         for path in value if isinstance(value, list) else (value,):
@@ -64,6 +79,33 @@ def check_apart(given: Mapping[str, Any]) -> None:
             other = seen.setdefault(path.resolve(), name)
             if other != name:
                 raise ConfigError(f"{path} is named twice, by {other} and by {name}; name another file by one of them")
+
+
+def check_each_once(paths: Any, option: str) -> None:
+    """Refuse a file that one option names twice: it would be written twice, or read as if it were two.
+
+    Raises:
+        ConfigError: there is one.
+    """
+    seen: set[Path] = set()
+    for path in _files(paths):
+        if path.resolve() in seen:
+            raise ConfigError(f"{path} is named twice by {option}; name every file once")
+        seen.add(path.resolve())
+
+
+def check_not_in(paths: Any, option: str, folders: Iterable[Path]) -> None:
+    """Refuse a file that the command itself writes into its folder of results.
+
+    Raises:
+        ConfigError: it is one.
+    """
+    for path in _files(paths):
+        for folder in folders:
+            if path.name in (LINES_FILE, RESULTS_FILE, *BESIDE) and path.resolve().parent == folder.resolve():
+                raise ConfigError(
+                    f"{option} {path} is what the command writes into {folder} itself; leave it out, or name another"
+                )
 
 
 def check_json_file(path: Path | None) -> None:
@@ -122,6 +164,16 @@ def _is_file(path: Path) -> bool:
 
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
     return typing.get_type_hints(inspect.unwrap(function), include_extras=True)
+
+
+def _folders(function: Callable[..., Any], given: Mapping[str, Any]) -> list[Path]:
+    """Folders of results among the arguments."""
+    named = [name for name, hint in _hints(function).items() if any(_is_folder(info) for info in typing.get_args(hint))]
+    return [given[name] for name in named if isinstance(given.get(name), Path)]
+
+
+def _is_folder(info: Any) -> bool:
+    return isinstance(info, OptionInfo) and info.metavar == "DIR"
 
 
 def _spelling(function: Callable[..., Any], name: str) -> str:

@@ -19,7 +19,7 @@ from ..new_file import NEW, check_new, make_folder_of
 from ..store import write_json
 from . import options as o
 from .console import command, err, out
-from .files import check_ending
+from .files import check_each_once, check_ending
 
 Logs = Annotated[
     list[Path],
@@ -52,6 +52,7 @@ def fit(
 
     Exit status: 0 done, 2 bad input or too little to fit, 130 interrupted.
     """
+    check_each_once(logs, "LOG...")  # else a run would be held out from a fit to itself
     check_ending(file, "--out", (".yaml", ".yml"))
     picture = plot or file.with_suffix(".png")
     check_ending(picture, "--plot", (".png", ".pdf", ".svg"))

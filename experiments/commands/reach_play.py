@@ -81,5 +81,8 @@ def _played(tasks: list[Task], store: ResultStore, processes: int) -> list[Playe
                 store.append(key, found[key])
                 notice(len(found))
     except KeyboardInterrupt:
-        raise Interrupted(f"interrupted; {len(found)} of {len(tasks)} are kept: go on with --resume") from None
+        raise Interrupted(
+            f"interrupted: {len(found)} of {len(tasks)} sets kept in {store.lines}; the same command with --out "
+            f"{store.folder} --resume goes on from there"
+        ) from None
     return [PlayedSet(**found[key]) for key in keys]

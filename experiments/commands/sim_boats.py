@@ -25,6 +25,7 @@ from ..boats.off import off_platform
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from ..deploy.lifeline import end_with_parent
 from ..new_file import NEW
+from ..spec import check_seed
 from ..store import write_json
 from . import deploying as d
 from . import options as o
@@ -107,6 +108,7 @@ def sim_boats(
         **{"really": really, "off": off, "no_wait": no_wait, "random_start": random_start, "fault": fault or []},
     }
     check_ending(record, "--record", (".npz",))
+    check_seed(seed)
     if duration is not None and not 0.0 < duration < math.inf:
         raise ConfigError(f"--duration is {duration:g} s; give more than 0, or leave it out to run until Ctrl-C")
     file = _file(fleet, demo)

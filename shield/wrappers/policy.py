@@ -74,7 +74,10 @@ class ShieldedTeamPolicy:
         """Actions of the boats; those the shield had to change are (speed m/s, relative heading deg) pairs.
 
         Raises:
-            PolicyError: `reset` has not been called, or another game is played than the one it was called with.
+            PolicyError: `reset` has not been called, another game is played than the one it was called with, or the
+                policy answered no mapping.
+            GameError: an answer is no action: not finite, True or False, of another length, the name of no field point.
+                What the policy itself raises comes out as it is: nothing is sent, and whoever plays decides what then.
             ConfigError: the env was set since then to what the shield is not for, or it has begun to serve others.
         """
         if self._reader is None or self._facts is None:
@@ -172,8 +175,9 @@ class ShieldedCallable:
     def __call__(self, seen: Any) -> Commands:
         """Safe commands, in the frame of the policy's last usable answer.
 
-        A policy that raises or answers something else holds all boats; the reason says so, and the log once for each
-        thing that is wrong. Before the first usable answer the frame is that of `Commands.relative_deg`.
+        A policy that raises or answers something else holds all boats, and a command that is not finite holds its own;
+        the reason says so, and the log once for each thing that is wrong. Before the first usable answer the frame is
+        that of `Commands.relative_deg`.
 
         Raises:
             ConfigError: the shield serves another function, team or game since its last `Shield.reset`.
@@ -185,10 +189,10 @@ class ShieldedCallable:
             raise FleetError(f"read answered {type(fleet).__name__}; let it return a Fleet, see Fleet.of")
         try:
             wanted = _usable(self.policy(seen), len(fleet))
-            self._note("")
+            self._note(_not_finite(wanted, fleet))
             self._relative = wanted.relative
         except Exception as error:  # whatever a policy does, its boats must get commands
-            self._note(f"{type(error).__name__}: {error}")
+            self._note(f"{type(error).__name__}: {error}; all boats hold")
             nothing = np.full((len(fleet), 2), np.nan)
             wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
         self.decisions = self.shield.decide(fleet, wanted)
@@ -200,7 +204,7 @@ class ShieldedCallable:
     def _note(self, failure: str) -> None:
         """Log a failure when it begins, or becomes another one, and when it is over."""
         if failure and failure != self._failure:
-            logger.error("policy failed (%s); all boats hold", failure)
+            logger.error("policy failed: %s", failure)
         if self._failure and not failure:
             logger.warning("policy answers again")
         self._failure = failure
@@ -218,9 +222,22 @@ def _usable(answer: Any, boats: int) -> Commands:
     return answer
 
 
+def _not_finite(wanted: Commands, fleet: Fleet) -> str:
+    """Which boats to decide for have commands that are not finite, in words; empty: none."""
+    rows = np.flatnonzero(fleet.controlled & ~np.isfinite(wanted.values).all(axis=1))
+    named = ", ".join(repr(fleet.names[i]) for i in rows)
+    return f"commands of {named} are not finite; they hold" if named else ""
+
+
 def wrap_policy(policy: Any, shield: Shield, read: Callable[[Any], Fleet] | None = None) -> Any:
     """Put a shield around a policy, see `Shield.wrap`."""
+    if isinstance(policy, type):
+        raise ConfigError(f"{policy.__name__} is a class; give a policy: {policy.__name__}(...)")
     if hasattr(policy, "act") and hasattr(policy, "reset"):
+        if read is not None:
+            raise ConfigError(
+                "read= is for plain functions; a team policy's boats are read from its game: leave it out"
+            )
         return ShieldedTeamPolicy(policy, shield)
     if callable(policy) and read is not None:
         return ShieldedCallable(policy, shield, read)

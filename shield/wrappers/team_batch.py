@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..actions import Seat, read_flat
+from ..arrays import NoNumbersError, numbers
 from ..batch import BatchedShield
 from ..exceptions import ConfigError, GameError, PolicyError
 from ..jit import Array, BoolArray
@@ -254,8 +255,8 @@ class TeamBatch:
 def _in_units(actions: Any, top_mps: Array) -> Any:
     """Speed m/s and relative heading deg of actions in [-1, 1], which are clipped to that; nonsense stays nonsense."""
     try:
-        given = np.asarray(actions, np.float64)
-    except (TypeError, ValueError):
+        given = numbers(actions)
+    except NoNumbersError:
         return actions
     if given.shape != (len(top_mps), 2):
         return given

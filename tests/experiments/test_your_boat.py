@@ -4,7 +4,7 @@ import re
 
 import pytest
 import yaml
-from boat_page import PAGE, commands, follow
+from boat_page import PAGE, commands, follow, lines
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.observing import NEED_NO_GAME
 from steerclear.shield.platforms.files import load_platform
@@ -29,6 +29,19 @@ def test_the_first_description_is_one_that_the_shield_takes(tmp_path, monkeypatc
         assert result.exit_code == 0, (words, result.output)
     assert load_platform("my_boat.yaml").platform.name == "my_boat"
     assert "turns 90 deg" in result.output
+
+
+def test_the_page_has_no_command_write_over_a_file():
+    """What a command would refuse to write is moved away by the page before."""
+    there = set()
+    for words in lines():
+        if words[0] == "mv":
+            there = there - {words[1]} | {words[2]}
+        elif words[1] == "fit" or words[1:3] == ["platform", "new"]:
+            file = words[words.index("--out") + 1] if "--out" in words else f"{words[3]}.yaml"
+            assert file not in there, words
+            there.add(file)
+    assert there == {"first.yaml", "my_boat.yaml"}
 
 
 def test_the_first_run_is_by_a_policy_that_the_fleet_of_the_page_can_play():

@@ -99,6 +99,24 @@ def test_what_holds_no_numbers_is_refused(value, text):
             brought(value)
 
 
+@pytest.mark.parametrize(
+    "value",
+    [True, np.True_, [True, 2.0], [[0.0, np.False_]], np.zeros(2, bool), [np.zeros(2, bool)], np.array([True, None])],
+)
+def test_true_and_false_are_numbers_only_where_that_is_said(value):
+    with pytest.raises(NoNumbersError, match="some are True or False"):
+        numbers(value)
+    assert numbers(value, bools=True).dtype == np.float64
+
+
+def test_tensors_of_true_and_false_are_no_numbers():
+    torch = pytest.importorskip("torch")
+    for value in (torch.tensor([True, False]), [torch.tensor(True), 1.0]):
+        with pytest.raises(NoNumbersError, match="some are True or False"):
+            numbers(value)
+    assert truths(torch.tensor([True, False])).tolist() == [True, False]
+
+
 def test_none_is_not_a_number_as_numpy_has_it():
     assert np.isnan(numbers([None, 1.0])[0])
 

@@ -91,6 +91,27 @@ def test_other_shapes_are_refused_with_the_one_wanted(make, values):
         make(values)
 
 
+BOOLS = [
+    [[True, False]],
+    [[1.0, True]],
+    [(np.False_, 0.5)],
+    np.ones((2, 2), bool),
+    [np.array([True, False])],
+    np.array([[1.0, True]], object),
+]
+
+
+@pytest.mark.parametrize(
+    "make", [Commands.relative_deg, Commands.game_deg, Commands.absolute_rad, Commands.absolute_deg]
+)
+@pytest.mark.parametrize("values", BOOLS)
+def test_true_and_false_are_no_commands(make, values):
+    with pytest.raises(
+        FleetError, match=r"commands are not numbers \(some are True or False\); give an \(n, 2\) array"
+    ):
+        make(values)
+
+
 @pytest.mark.parametrize("values", [[["fast", 0.0]], [[1.0, 2.0], [3.0]], [[object(), 1.0]]])
 def test_what_is_no_number_is_refused(values):
     with pytest.raises(FleetError, match=r"commands are not numbers .*\(n, 2\)"):

@@ -55,13 +55,34 @@ def fleet(**changes):
         ({"position_error_m": [0.0, math.nan]}, "position_error_m holds"),
         ({"position_error_m": [0.0, -1.0]}, "position_error_m holds"),
         ({"position_error_m": [math.inf, 0.0]}, "position_error_m holds"),
+        (
+            {"position_error_m": [0.0, 1e6]},
+            r"position_error_m of boat 'boat_1' is 1e\+06; give a bound in m from 0 to 1000",
+        ),
+        ({"age_s": [0.0, -0.1]}, "age_s of boat 'boat_1' is -0.1; give seconds since its fix from 0 to 3600"),
+        ({"age_s": [math.nan, 0.0]}, "age_s of boat 'boat_0' is nan"),
+        ({"age_s": [1.76e9, 0.0]}, r"age_s of boat 'boat_0' is 1.76e\+09; .* not the time of day"),
+        ({"thrust": [1500.0, 0.0]}, "thrust of boat 'boat_0' is 1500; give percent up to 100 either way"),
+        (
+            {"adversary_s": [0.0, -1.0]},
+            r"adversary_s holds a negative time for boat 'boat_1' \(-1\); give s per boat, 0 to",
+        ),
         ({"position_m": [[0.0, 0.0], [math.nan, 9.0]]}, "position of boat 'boat_1'.*give the last fix"),
         ({"heading_rad": [math.nan, 0.0]}, "heading of boat 'boat_0'"),
         ({"heading_rad": [0.0, math.inf]}, "heading of boat 'boat_1'"),
         ({"speed_mps": [math.inf, 0.0]}, "speed of boat 'boat_0'"),
         ({"speed_mps": [1e300, 0.0]}, "speed of boat 'boat_0'.*beyond"),
         ({"speed_mps": [0.0, -51.0]}, r"speed of boat 'boat_1' is not finite or beyond 50 m/s \(-51.0\)"),
-        ({"position_m": [[0.0, 0.0], [0.0, 1e300]]}, "position of boat 'boat_1'.*beyond"),
+        ({"position_m": [[0.0, 0.0], [0.0, 1e300]]}, "position of boat 'boat_1'.*beyond.*give m from a place nearby"),
+        ({"speed_mps": [2000.0, 0.0]}, r"speed of boat 'boat_0'.*\(2000.0\); give m/s, not mm/s"),
+        ({"speed_mps": [True, False]}, r"speed_mps is not an array of numbers \(some are True or False\)"),
+        ({"speed_mps": [True, 2.0]}, "speed_mps is not an array of numbers"),
+        ({"heading_rad": np.array([True, False])}, "heading_rad is not an array of numbers"),
+        ({"heading_rad": [0.0, np.True_]}, "heading_rad is not an array of numbers"),
+        ({"position_m": np.ones((2, 2), bool)}, "position_m is not an array of numbers"),
+        ({"age_s": [False, False]}, "age_s is not an array of numbers"),
+        ({"position_error_m": [True, False]}, "position_error_m is not an array of numbers"),
+        ({"thrust": np.array([True, False], object)}, "thrust is not an array of numbers"),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_words_that_help(changes, text):
@@ -101,7 +122,9 @@ def test_an_unknown_platform_is_told_the_known_ones(names):
         ),
         ({"age_s": np.array([0.0, -0.1])}, "age_s holds a value that is negative"),
         ({"age_s": np.array([math.nan, 0.0])}, "age_s holds"),
-        ({"position_error_m": np.array([math.nan, 0.0])}, "position_error_m holds"),
+        ({"position_error_m": np.array([math.nan, 0.0])}, "position_error_m holds nan for boat 'boat_0'"),
+        ({"age_s": np.zeros(2, bool)}, "age_s is of bool; give float64"),
+        ({"state": np.ones((2, L.N_STATE), bool)}, "state has shape .* of bool"),
         ({"position_error_m": np.zeros(3)}, "position_error_m has 3 entries"),
     ],
 )
@@ -113,6 +136,26 @@ def test_every_call_checks_not_just_the_first(changes, text, warm):
     with pytest.raises(FleetError, match=text):
         shield.decide(replace(fleet(), **changes), AHEAD)
     assert shield.decide(fleet(), AHEAD)[0].reason in Reason, "the shield works on after refusing"
+
+
+@pytest.mark.parametrize("value", [1e6, 5000.0])
+def test_a_boat_whose_place_is_hardly_known_is_decided_on_all_the_same(value):
+    """Errors that programs work out are not refused: they keep clear of such a boat as well as may be."""
+    vague = replace(fleet(), position_error_m=np.array([0.0, value]))
+    assert Shield().decide(vague, AHEAD)[0].reason in Reason
+
+
+def test_numbers_at_the_ends_of_their_ranges_are_taken():
+    ends = fleet(position_error_m=[0.0, 1000.0], age_s=[0.0, 3600.0], thrust=[-100.0, 100.0], speed_mps=[50.0, -50.0])
+    assert ends.position_error_m.tolist() == [0.0, 1000.0]
+    assert ends.age_s.tolist() == [0.0, 3600.0]
+    assert np.isinf(fleet(adversary_s=[math.inf, math.nan]).adversary_s[0])
+
+
+def test_teams_and_who_is_controlled_may_be_told_by_true_and_false():
+    table = fleet(team=[False, True], controlled=[True, 0], visiting=np.array([1, 0]))
+    assert (table.team.tolist(), table.controlled.tolist()) == ([0, 1], [True, False])
+    assert table.visiting.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])
@@ -134,6 +177,37 @@ def test_decisions_can_be_indexed_like_a_sequence():
     for index in (2, -3):
         with pytest.raises(IndexError, match="no boat"):
             decisions[index]
+    assert decisions[np.int64(1)] == decisions[1]
+
+
+def test_decisions_can_be_indexed_by_name():
+    decisions = Shield().decide(fleet(names=["ours", "theirs"]), AHEAD)
+    assert decisions["ours"] == decisions[0]
+    assert decisions["theirs"] == decisions[1] == decisions[np.str_("theirs")]
+    assert "ours" in decisions
+    assert "boat_0" not in decisions
+    assert decisions[1] in decisions
+    assert Shield().decide(fleet(), AHEAD)["boat_1"].boat == "boat_1"
+
+
+@pytest.mark.parametrize(
+    ("index", "text"),
+    [
+        ("boat_2", "no boat 'boat_2' in the fleet decided on; did you mean 'boat_1'?"),
+        ("zzz", "no boat 'zzz' in the fleet decided on; there are boat_0, boat_1"),
+        (1.0, "indexed by a boat's name or place in the fleet, not by 1.0"),
+        (True, "not by True"),
+        (np.False_, "not by np.False_"),
+        (None, "not by None"),
+        ([0, 1], r"not by \[0, 1\]; of several boats at once see their arrays: sent.values"),
+        (np.array([True, False]), "of several boats at once"),
+        ((0, 1), "of several boats at once"),
+        (b"boat_0", "not by b'boat_0'"),
+    ],
+)
+def test_what_is_no_boat_of_the_decisions_is_told_how_to_ask(index, text):
+    with pytest.raises(FleetError, match=text):
+        Shield().decide(fleet(), AHEAD)[index]
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.backup.families import CERTIFICATES
-from steerclear.shield.config import COORDINATION, PROFILES
+from steerclear.shield.config import COORDINATION, PROFILES, RANGES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 
 TEXTS = ("certificate", "coordination", "profile", "solver")
@@ -185,11 +185,41 @@ def test_whole_numbers_are_kept_as_floats_for_compiled_code():
         ("tail_s", 1e4),
         ("delay_s", 1e4),
         ("margin_cap_m", 51),
+        ("separation_m", 2500),
+        ("position_error_m", 1e6),
+        ("hull_m", 1000),
+        ("buffer_m", 50.1),
+        ("edge_m", 201),
+        ("table_margin_m", 450),
     ],
 )
 def test_what_nothing_can_be_decided_for_is_refused(name, value):
     with pytest.raises(ConfigError, match=rf"{name} is .*; give .* [0-9]+ (s|m)$"):
         ShieldConfig(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("separation_m", 2500, r"2500 \(if that is mm, give 2.5\); give more than 0 and at most 1000 m"),
+        ("dt_s", 100.0, r"100.0 \(if that is ms, give 0.1\); give 0.01 to 2 s"),
+        ("current_mps", 300, r"300 \(if that is mm/s, give 0.3\); give 0 to 10 m/s"),
+        ("track_error_mps", 51, "51; give 0 to 50 m/s$"),
+        ("speed_weight", 1e7, r"10000000.0; give more than 0 and at most 1e\+06$"),
+        ("search_limit", 10, "10; give 1000 to inf clearances$"),
+    ],
+)
+def test_a_number_of_another_unit_is_told_its_range_and_what_it_may_be(name, value, text):
+    with pytest.raises(ConfigError, match=f"^{name} is {text}"):
+        ShieldConfig(**{name: value})
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_ranges_are_taken_to_their_ends(name):
+    low, high = RANGES[name]
+    for value in {low if low > 0.0 else 0.25, high}:
+        more = {"dt_s": value, "move_s": None} if name == "dt_s" else {"dt_s": 1.0} if name == "move_s" else {}
+        assert getattr(ShieldConfig(**{name: value, **more}), name) == (None if more.get(name, 0) is None else value)
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, int])

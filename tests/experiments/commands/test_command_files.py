@@ -65,6 +65,50 @@ def test_folders_devices_and_what_is_no_file_may_be_named_twice(tmp_path):
     check_apart({"records": [tmp_path / "a.npz", tmp_path / "a.npz"], "seed": 3, "--to": None})
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ("play --save a.npz --save a.npz", "a.npz is named twice by --save"),
+        ("play --save a.html --save b.npz --save ./a.html", "a.html is named twice by --save"),
+        ("play --save link.npz --save a.npz", "a.npz is named twice by --save"),
+        ("fit run.csv run.csv", "run.csv is named twice by LOG..."),
+        ("fit run.csv ../here/run.csv", "../here/run.csv is named twice by LOG..."),
+        ("play --save a.npz --json a.npz", "a.npz is named twice, by --save and by --json"),
+    ],
+)
+def test_one_option_names_a_file_once(words, named, tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    Path("run.csv").touch()
+    Path("link.npz").symlink_to("a.npz")
+    done = CliRunner().invoke(app, words.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"error: {named}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert sorted(path.name for path in here.iterdir()) == ["link.npz", "run.csv"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["ablate", "evaluate medium", "tournament", "encounters", "attack", "reach play --own heron --other heron"],
+)
+@pytest.mark.parametrize("more", ["", " --resume"])
+def test_no_json_is_written_where_the_command_keeps_its_own_results(words, more, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    line = f"{words} --out out --json ./out/results.json{more}"
+    done = CliRunner().invoke(app, line.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--json out/results.json is what the command writes into out itself; leave it out" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["games.jsonl", "games.csv", "games.parquet", "boat.png", "a.zip", "a.gif"])
+def test_json_has_no_ending_of_other_results(name):
+    with pytest.raises(ConfigError, match=r"has the ending of .*; give a name that ends in \.json"):
+        check_json_file(Path(name))
+
+
 def test_results_may_have_any_ending_that_is_nobody_elses(tmp_path):
     for name in ("results.json", "results", "results.txt"):
         check_json_file(tmp_path / name)

@@ -12,6 +12,8 @@ from steerclear.experiments.commands.entry import time_text
 from steerclear.experiments.entries.imports import imports_of
 from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
 from steerclear.experiments.keys import KEYS, undocumented
+from steerclear.experiments.pool import available_cores
+from steerclear.shield.exceptions import PolicyError
 from typer.testing import CliRunner
 
 
@@ -120,6 +122,26 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
     assert "report.html" in links
     assert all(Path("out", name).exists() for name in links)
     assert undocumented(json.loads(Path("out/results.json").read_text()), KEYS["entry report"]) == []
+
+
+@pytest.mark.parametrize(("jobs", "processes"), [([], available_cores()), (["--jobs", "3"], 3)])
+def test_a_report_takes_all_cores_where_nobody_says_how_many(jobs, processes, write_entry, monkeypatch):
+    entry, asked = write_entry("return (1.5, 10.0)"), []
+
+    def played(command, settings, folder, workers, resume, quick):
+        asked.append(workers)
+        raise PolicyError("that is all")
+
+    monkeypatch.setattr("steerclear.experiments.commands.entry.run_games", played)
+    assert "that is all" in run("report", entry, *jobs).stderr
+    assert asked == [processes]
+
+
+def test_a_report_by_no_process_is_refused_before_anything_is_played(write_entry):
+    done = run("report", write_entry("return 4"), "--jobs", "0")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--jobs must be at least 1" in done.stderr
+    assert not Path("results").exists()
 
 
 def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0):

@@ -5,13 +5,24 @@ from gymnasium.vector import AutoresetMode
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch
 
 
 def batch(seconds=1.0, games=2, **settings):
     core = BatchedMctf(GameConfig.preset("aamas2024", max_time_s=seconds, default_start=False), n_games=games)
     return TeamBatch(core, policies.make_batch("medium"), "blue", **settings)
+
+
+@pytest.mark.parametrize("value", [True, np.False_])
+@pytest.mark.parametrize("actions", ["normalised", "continuous", "discrete"])
+def test_true_and_false_are_no_actions(actions, value):
+    game = batch(actions=actions)
+    game.reset(seed=1)
+    shape = (game.learners,) if actions == "discrete" else (game.learners, 2)
+    for given in (np.full(shape, value), np.full(shape, value).tolist(), np.full(shape, value, object)):
+        with pytest.raises(PolicyError, match="of learner 0 is not usable"):
+            game.step(given)
 
 
 def test_normalised_actions_are_the_same_commands():

@@ -9,7 +9,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Reason, Shield
-from steerclear.shield.exceptions import ConfigError, PolicyError
+from steerclear.shield.exceptions import ConfigError, GameError, PolicyError
 from steerclear.shield.wrappers import ShieldedCallable, ShieldedParallelEnv, ShieldedTeamPolicy, games_shield
 
 OWN = ["agent_0", "agent_1", "agent_2"]
@@ -158,6 +158,75 @@ def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     failed = [record.message for record in caplog.records if "failed" in record.message]
     assert len(failed) == 4, "once when it begins, and when it becomes another"
     assert sum("answers again" in record.message for record in caplog.records) == 2
+
+
+def test_commands_that_are_not_finite_hold_their_boats_and_the_log_says_whose(caplog):
+    answers = iter(
+        [[[2.0, 0.0], [np.nan, 0.0]], [[np.nan, 0.0], [2.0, 0.0]], [[np.inf, 0.0], [2.0, 0.0]], [[2.0, 0.0]] * 2]
+    )
+    team = Shield().wrap(lambda gap_m: Commands.absolute_rad(next(answers)), read=near)
+    reasons = []
+    for _ in range(4):
+        team(60.0)
+        reasons.append(team.decisions["boat_0"].reason)
+    assert reasons == [Reason.PASSED, Reason.HELD, Reason.HELD, Reason.PASSED]
+    said = [record.message for record in caplog.records]
+    assert said == ["policy failed: commands of 'boat_0' are not finite; they hold", "policy answers again"]
+
+
+def test_a_class_is_no_policy_and_a_team_policy_is_not_read():
+    with pytest.raises(ConfigError, match=r"ScriptedTeam is a class; give a policy: ScriptedTeam\(...\)"):
+        Shield().wrap(type(policies.make("medium")))
+    with pytest.raises(ConfigError, match=r"read= is for plain functions; .* leave it out"):
+        Shield().wrap(policies.make("medium"), read=near)
+
+
+@pytest.mark.parametrize(
+    ("action", "text"),
+    [
+        (np.array([np.nan, 0.0]), "not finite"),
+        (None, "not usable"),
+        ((1.0, 2.0, 3.0), "not usable"),
+        (np.ma.masked_array([1.0, 2.0], mask=[False, True]), "not usable"),
+        (np.array(4.5), "not usable"),
+        (1.0 + 2.0j, "not usable"),
+        ("home", "unknown field point 'home'"),
+        (True, "not usable"),
+        ((True, 0.0), "not usable"),
+        (np.array([True, False]), "not usable"),
+        (iter([1.0, 2.0]), "not usable"),
+    ],
+)
+def test_what_is_no_action_is_refused_by_name_of_the_boat(action, text):
+    class Odd:
+        def reset(self, env, agent_ids, seed):
+            pass
+
+        def act(self, observations, infos):
+            return dict.fromkeys(OWN, action)
+
+    env, start = crowd()
+    env.reset(seed=1, options=start)
+    team = Shield().wrap(Odd())
+    team.reset(env, OWN, 0)
+    with pytest.raises(GameError, match=text):
+        team.act({}, {})
+
+
+@pytest.mark.parametrize("action", [np.array([1.0, 20.0], np.float16), np.array(4), np.ma.masked_array([1.0, 20.0])])
+def test_numbers_of_any_kind_are_actions(action):
+    class Odd:
+        def reset(self, env, agent_ids, seed):
+            pass
+
+        def act(self, observations, infos):
+            return dict.fromkeys(OWN, action)
+
+    env, start = crowd()
+    env.reset(seed=1, options=start)
+    team = Shield().wrap(Odd())
+    team.reset(env, OWN, 0)
+    assert set(team.act({}, {})) == set(OWN)
 
 
 def test_a_policy_that_answers_nothing_is_told_what_to_answer():
