@@ -37,6 +37,8 @@ class Aim:
 def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
     """What an own boat steers for: home with the flag, its part in the raid, or else intruders and its post."""
     boat = sight.own[number]
+    if number == RUN and raid.unguarded and raid.passage is not None:
+        return Aim(_next(boat, raid.passage.points))
     if boat.carries:
         at = dock(boat, sight) if boat.on_side else None
         return Aim(chart.home(boat.at, up=number == RUN) if at is None else at)
@@ -84,6 +86,11 @@ def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
     places += [ahead(sight.home, angle, radius) for angle in angles]
     chosen = assign([sight.own[n].at for n in guards], places)
     return {n: Aim(places[k], 2.0) for n, k in zip(guards, chosen, strict=True)}
+
+
+def _next(boat: Boat, points: tuple[Point, ...]) -> Point:
+    """The first bend of a way that is not reached yet."""
+    return next((point for point in points if distance(boat.at, point) > 2.0), points[-1])
 
 
 def _towards(a: Point, b: Point, far_m: float) -> Point:

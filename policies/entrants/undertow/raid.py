@@ -8,12 +8,16 @@ from enum import IntEnum
 from ..plane import distance
 from ..sight import Boat, Sight
 from .chart import Chart
+from .habits import Habits
+from .passage import Passage, Waters, homeward, outward
 from .shape import SCRIPTED
 
 BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
 LONGEST_S, AGAIN_S = 60.0, 15.0
 """Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
+KEEP_M = 2.0
+"""A boat sets out when it will keep so far off the reach of opponents that keep a habit, m."""
 COME_M = 3.0
 """An opponent so far beyond the dividing line is no guard, m."""
 
@@ -45,6 +49,8 @@ class Raid:
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
         self.unguarded, self._came = False, set[int]()
+        self._left, self.settled = False, False
+        self.habits, self.passage = Habits(len(sight.foes)), None
 
     def memory(self, time_s: float) -> list[float]:
         """What it remembers but for its shape, as numbers; times count from ``time_s``."""
@@ -56,7 +62,7 @@ class Raid:
         self.phase, self.upper = Phase(int(memory[0])), bool(memory[1]) != mirrored
         self.bait_taken, self.held = bool(memory[2]), bool(memory[3])
         self._since_s, self.kept_s = memory[4] + time_s, memory[5] + time_s
-        self.unguarded = bool(memory[6])
+        self.unguarded = self._left = bool(memory[6])
 
     def advance(self, sight: Sight) -> Chart:
         """Look at the game, go on to the next phase or give up; where the raid leads."""
@@ -70,15 +76,21 @@ class Raid:
 
     def _watched(self, sight: Sight) -> None:
         """Note who comes; once all have, a raid that draws a guard away is given up."""
-        if self.unguarded:
-            return
+        self._looked = self.habits.look(sight)
         self._came |= {number for number, foe in enumerate(sight.foes) if foe.x < sight.line - COME_M}
-        if len(self._came) == len(sight.foes):
-            self.unguarded = True
+        numbers = range(len(sight.foes))
+        unguarded = self._left or all(number in self._came or self.habits.settled(number) for number in numbers)
+        if unguarded != self.unguarded:
+            self.unguarded = unguarded
             self._end(sight.time)
+        self.settled = any(self.habits.settled(number) for number in numbers)
 
     def _countered(self, sight: Sight, chart: Chart) -> None:
         """The third boat sails alone, while no opponent can cut it off in time."""
+        if self.settled:
+            self._timed(sight)
+            return
+        self.passage = None
         run, shape = sight.own[RUN], self.shape
         kept_at_home = run.tagged or (sight.taken and run.on_side)
         if self.phase == Phase.GATHER:
@@ -89,6 +101,29 @@ class Raid:
             late = sight.time - self._since_s > LONGEST_S
             if kept_at_home or late or chart.dash(run)[1] < shape.kept_free_m:
                 self._end(sight.time)
+        self._brought_home(sight)
+
+    def _timed(self, sight: Sight) -> None:
+        """The third boat passes opponents that keep a habit when they are elsewhere."""
+        run, shape = sight.own[RUN], self.shape
+        kept_at_home = run.tagged or (sight.taken and run.on_side)
+        if run.carries and not self._looked and self.phase == Phase.RUN:
+            pass
+        elif run.carries:
+            self.passage = homeward(Waters(sight, self.habits, KEEP_M, shape.kept_free_m), run, run.at)
+            self.phase = Phase.RUN
+        elif not self._looked and not kept_at_home:
+            pass
+        elif kept_at_home:
+            self.phase, self.passage = Phase.GATHER, None
+        else:
+            free_m = shape.free_m if self.phase == Phase.GATHER else shape.kept_free_m
+            keep_m = KEEP_M if self.phase == Phase.GATHER else 0.0
+            out = outward(Waters(sight, self.habits, keep_m, free_m), run)
+            if out.room_m > 0.0:
+                self.phase, self.passage = Phase.RUN, out
+            else:
+                self.phase, self.passage = Phase.GATHER, None
         self._brought_home(sight)
 
     def _raided(self, sight: Sight, chart: Chart) -> None:
