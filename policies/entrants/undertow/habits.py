@@ -20,6 +20,8 @@ PROVEN = 15
 """So many expectations in a row make a habit."""
 
 Track = NDArray[np.float64]
+"""What an opponent does at the next looks, (looks, 3): x, y, m, and 1 where it is on its own side and not tagged."""
+TAGGED, HOME = 3, 4
 
 
 class Habits:
@@ -55,18 +57,17 @@ class Habits:
         return number not in self.broken and self._kept[number] >= PROVEN
 
     def track(self, number: int, looks: int) -> Track | None:
-        """Where an opponent that is settled will be at the next looks, (looks, 2) m; None where it is not."""
+        """What an opponent that is settled will do at the next looks, see `Track`; None where it is not."""
         return self._again(number, looks) if self.settled(number) else None
 
     def _compare(self, number: int, foe: Boat) -> None:
-        """Hold where it is against what was expected `LEAD` looks ago."""
-        expected, recent = self._expected[number], self._looks[number][-LEAD:]
-        free = foe.on_side and not foe.tagged and all(look[3] > 0.0 for look in recent)
-        if not free or len(expected) < LEAD or expected[0] is None:
-            self._kept[number] = self._kept[number] if free and len(expected) == LEAD else 0
+        """Hold where it is, on its own side, against what was expected `LEAD` looks ago."""
+        expected, looks = self._expected[number], self._looks[number][-LEAD:]
+        there = foe.on_side and all(look[HOME] > 0.0 for look in looks)
+        if not there or len(expected) < LEAD or expected[0] is None:
             return
-        off_m = float(np.hypot(*(expected[0][LEAD - 1] - foe.at)))
-        self._kept[number] = 0 if off_m > BROKEN_M else self._kept[number] + 1
+        off_m = float(np.hypot(*(expected[0][LEAD - 1, :2] - foe.at)))
+        self._kept[number] += 1
         if off_m > BROKEN_M:
             self.broken.add(number)
 
@@ -77,14 +78,15 @@ class Habits:
             return None
         now, past = seen[-1], seen[:-FRESH]
         turn = np.abs((past[:, 2] - now[2] + np.pi) % (2.0 * np.pi) - np.pi)
-        off = np.hypot(past[:, 0] - now[0], past[:, 1] - now[1]) + RAD_M * turn + 1e3 * (past[:, 3] != now[3])
+        off = np.hypot(past[:, 0] - now[0], past[:, 1] - now[1]) + RAD_M * turn + 1e3 * (past[:, TAGGED] != now[TAGGED])
         best = len(off) - 1 - int(np.argmin(off[::-1]))
         if off[best] > ALIKE_M:
             return None
         period = len(seen) - 1 - best
-        found: Track = seen[best + 1 + np.arange(looks) % period, :2] + (now[:2] - seen[best, :2])
+        then = seen[best + 1 + np.arange(looks) % period]
+        found: Track = np.column_stack([then[:, :2], then[:, HOME] * (1.0 - then[:, TAGGED])])
         return found
 
 
 def _row(foe: Boat) -> tuple[float, ...]:
-    return foe.x, foe.y, wrap(foe.heading), float(foe.on_side and not foe.tagged)
+    return foe.x, foe.y, wrap(foe.heading), float(foe.tagged), float(foe.on_side)

@@ -20,6 +20,8 @@ ALONG_SHARES = (0.2, 0.45, 0.7)
 """and in shares of the way from the line to the flag."""
 GRABS = 8
 """Points round the flag at which it may be grabbed."""
+WAKES_S = 2.0
+"""So long before and after a tagged opponent is free again it is kept clear of, s."""
 AHEAD_S = 90
 """Longest time that is looked ahead, s."""
 ENOUGH_M = 6.0
@@ -69,9 +71,10 @@ class Waters:
         return nearest
 
     def _to_settled_m(self, track: Track, points: Numbers, times_s: Numbers) -> Numbers:
-        at = track[np.clip(np.rint(times_s).astype(int) - 1, 0, AHEAD_S - 1)]
-        off: Numbers = np.linalg.norm(points - at, axis=-1) - self.sight.reach - self._keep_m
-        return off
+        then = track[np.clip(np.rint(times_s).astype(int) - 1, 0, AHEAD_S - 1)]
+        off_m = np.linalg.norm(points - then[..., :2], axis=-1) - self.sight.reach - self._keep_m
+        found: Numbers = np.where(then[..., 2] > 0.0, off_m, np.inf)
+        return found
 
     def _to_chaser_m(self, foe: Boat, points: Numbers, times_s: Numbers, grabs_s: Numbers) -> Numbers:
         at, free_s = foe.at, np.zeros_like(grabs_s) if foe.on_side else grabs_s
@@ -80,8 +83,12 @@ class Waters:
             at = foe.x + share * (self.sight.base[0] - foe.x), foe.y + share * (self.sight.base[1] - foe.y)
             free_s = np.full_like(grabs_s, distance(foe.at, at) / foe.top)
         sailed_m = foe.top * np.maximum(times_s - free_s[:, None], 0.0)
-        off: Numbers = np.linalg.norm(points - np.array(at), axis=-1) - self.sight.reach - sailed_m - self._free_m
-        return off
+        off: Numbers = np.linalg.norm(points - np.array(at), axis=-1) - self.sight.reach
+        found: Numbers = off - sailed_m - self._free_m
+        if foe.tagged:
+            wakes = np.abs(times_s - free_s[:, None]) < WAKES_S
+            found = np.minimum(found, np.where(wakes, off - self._keep_m, np.inf))
+        return found
 
 
 def homeward(waters: Waters, boat: Boat, at: Point) -> Passage:
