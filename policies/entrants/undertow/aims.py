@@ -67,6 +67,8 @@ def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
     boat = sight.own[number]
     if number != RUN or (sight.taken and boat.on_side):
         return _before_flag(raid, sight, chart)[number]
+    if raid.settled:
+        return Aim((sight.line - 2.0, (0.15, 0.5, 0.85, 0.5)[raid.place] * sight.size[1]), 1.5)
     return Aim(chart.dash(boat)[0]) if raid.phase == Phase.RUN else Aim(chart.edge, 1.5)
 
 

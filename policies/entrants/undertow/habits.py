@@ -16,8 +16,8 @@ ALIKE_M, RAD_M, FRESH = 3.0, 4.0, 3
 """Looks are alike below so many m, a turn of 1 rad counting as `RAD_M`; the last `FRESH` ones are not compared."""
 LEAD, BROKEN_M = 5, 6.0
 """An opponent that is so far from where it was expected so many looks ago has broken its habit, m."""
-PROVEN = 15
-"""So many expectations in a row make a habit."""
+PROVEN, WARY = 15, 45
+"""So many right expectations make a habit, and so many more for each that was wrong."""
 
 Track = NDArray[np.float64]
 """What an opponent does at the next looks, (looks, 3): x, y, m, and 1 where it is on its own side and not tagged."""
@@ -29,9 +29,6 @@ class Habits:
 
     A look is likened to earlier ones of the same opponent, and it is expected to go on as then, for ever. One that is
     not where it was expected, on its own side, sails at somebody: it is no longer relied on.
-
-    Attributes:
-        broken: numbers of opponents that have broken theirs.
     """
 
     def __init__(self, foes: int) -> None:
@@ -39,7 +36,7 @@ class Habits:
         self._expected: list[list[Track | None]] = [[] for _ in range(foes)]
         self._kept = [0] * foes
         self._next_s = -np.inf
-        self.broken = set[int]()
+        self._breaks = [0] * foes
 
     def look(self, sight: Sight) -> bool:
         """Remember this moment, where it is time for it; whether it was."""
@@ -54,7 +51,7 @@ class Habits:
 
     def settled(self, number: int) -> bool:
         """Whether an opponent has kept its habit for long enough."""
-        return number not in self.broken and self._kept[number] >= PROVEN
+        return self._kept[number] >= PROVEN
 
     def track(self, number: int, looks: int) -> Track | None:
         """What an opponent that is settled will do at the next looks, see `Track`; None where it is not."""
@@ -69,7 +66,8 @@ class Habits:
         off_m = float(np.hypot(*(expected[0][LEAD - 1, :2] - foe.at)))
         self._kept[number] += 1
         if off_m > BROKEN_M:
-            self.broken.add(number)
+            self._breaks[number] += 1
+            self._kept[number] = -WARY * self._breaks[number]
 
     def _again(self, number: int, looks: int) -> Track | None:
         """What followed the look most like the last one."""

@@ -14,9 +14,9 @@ from .habits import Habits, Track
 
 LOOKS = 40
 """Points of a way that are looked at."""
-ACROSS_SHARES = (0.06, 0.2, 0.35, 0.5, 0.65, 0.8, 0.94)
+ACROSS_SHARES = (0.06, 0.18, 0.29, 0.4, 0.5, 0.6, 0.71, 0.82, 0.94)
 """Where a way may bend or come home, in shares of the field's height;"""
-ALONG_SHARES = (0.2, 0.45, 0.7)
+ALONG_SHARES = (0.12, 0.3, 0.5, 0.7)
 """and in shares of the way from the line to the flag."""
 GRABS = 8
 """Points round the flag at which it may be grabbed."""

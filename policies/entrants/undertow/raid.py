@@ -16,6 +16,7 @@ BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
 LONGEST_S, AGAIN_S = 60.0, 15.0
 """Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
+MOVE_S = 20.0
 KEEP_M = 2.0
 """A boat sets out when it will keep so far off the reach of opponents that keep a habit, m."""
 COME_M = 3.0
@@ -49,7 +50,7 @@ class Raid:
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
         self.unguarded, self._came = False, set[int]()
-        self._left, self.settled = False, False
+        self._left, self.settled, self.place = False, False, 0
         self.habits, self.passage = Habits(len(sight.foes)), None
 
     def memory(self, time_s: float) -> list[float]:
@@ -124,6 +125,8 @@ class Raid:
                 self.phase, self.passage = Phase.RUN, out
             else:
                 self.phase, self.passage = Phase.GATHER, None
+                if sight.time - self.kept_s > MOVE_S:
+                    self.place, self.kept_s = (self.place + 1) % 4, sight.time
         self._brought_home(sight)
 
     def _raided(self, sight: Sight, chart: Chart) -> None:
