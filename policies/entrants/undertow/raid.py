@@ -19,6 +19,7 @@ LONGEST_S, AGAIN_S = 60.0, 15.0
 MOVE_S = 20.0
 KEEP_M = 2.0
 """A boat sets out when it will keep so far off the reach of opponents that keep a habit, m."""
+ROAM_SHARE, ALONE_S = 0.3, 15.0
 COME_M = 3.0
 """An opponent so far beyond the dividing line is no guard, m."""
 
@@ -51,6 +52,7 @@ class Raid:
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
         self.unguarded, self._came = False, set[int]()
         self._left, self.settled, self.place = False, False, 0
+        self._lured_s = sight.time
         self.habits, self.passage = Habits(len(sight.foes)), None
 
     def memory(self, time_s: float) -> list[float]:
@@ -79,6 +81,11 @@ class Raid:
         """Note who comes; once all have, a raid that draws a guard away is given up."""
         self._looked = self.habits.look(sight)
         self._came |= {number for number, foe in enumerate(sight.foes) if foe.x < sight.line - COME_M}
+        if any(boat.x > sight.line - 1.0 for boat in sight.own):
+            self._lured_s = sight.time
+        if sight.time - self._lured_s > ALONE_S:
+            roaming = sight.line + ROAM_SHARE * (sight.base[0] - sight.line)
+            self._came |= {number for number, foe in enumerate(sight.foes) if foe.x < roaming and not foe.tagged}
         numbers = range(len(sight.foes))
         unguarded = self._left or all(number in self._came or self.habits.settled(number) for number in numbers)
         if unguarded != self.unguarded:
