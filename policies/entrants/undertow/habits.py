@@ -1,4 +1,4 @@
-"""Opponents that keep a habit: who circles, patrols or stands still whatever happens is known ahead of time."""
+"""Opponents that keep a habit: who circles, patrols or drives home is known ahead of time."""
 
 from __future__ import annotations
 
@@ -18,25 +18,29 @@ LEAD, BROKEN_M = 5, 6.0
 """An opponent that is so far from where it was expected so many looks ago has broken its habit, m."""
 PROVEN, WARY = 15, 45
 """So many right expectations make a habit, and so many more for each that was wrong."""
+TAGGED, HOME = 3, 4
+"""Columns of a look: after x, y, m, and heading, rad, whether it is tagged, and on its own side."""
 
 Track = NDArray[np.float64]
 """What an opponent does at the next looks, (looks, 3): x, y, m, and 1 where it is on its own side and not tagged."""
-TAGGED, HOME = 3, 4
 
 
 class Habits:
     """What each opponent did, and whether it does it again.
 
-    A look is likened to earlier ones of the same opponent, and it is expected to go on as then, for ever. One that is
-    not where it was expected, on its own side, sails at somebody: it is no longer relied on.
+    A look at an opponent is likened to earlier ones, and it is expected to go on as it did then, over and over. One
+    that is often right on the opponent's own side is relied on: it does the same whatever we do. Who sails at our boats
+    is soon somewhere else than expected, and is not relied on for long after that.
+
+    Args:
+        foes: how many opponents there are.
     """
 
     def __init__(self, foes: int) -> None:
         self._looks: list[list[tuple[float, ...]]] = [[] for _ in range(foes)]
         self._expected: list[list[Track | None]] = [[] for _ in range(foes)]
-        self._kept = [0] * foes
+        self._kept, self._breaks = [0] * foes, [0] * foes
         self._next_s = -np.inf
-        self._breaks = [0] * foes
 
     def look(self, sight: Sight) -> bool:
         """Remember this moment, where it is time for it; whether it was."""
@@ -54,34 +58,33 @@ class Habits:
         return self._kept[number] >= PROVEN
 
     def track(self, number: int, looks: int) -> Track | None:
-        """What an opponent that is settled will do at the next looks, see `Track`; None where it is not."""
+        """What a settled opponent will do at the next looks; None where it is not, or stands as never before."""
         return self._again(number, looks) if self.settled(number) else None
 
     def _compare(self, number: int, foe: Boat) -> None:
         """Hold where it is, on its own side, against what was expected `LEAD` looks ago."""
         expected, looks = self._expected[number], self._looks[number][-LEAD:]
-        there = foe.on_side and all(look[HOME] > 0.0 for look in looks)
-        if not there or len(expected) < LEAD or expected[0] is None:
+        at_home = foe.on_side and all(look[HOME] > 0.0 for look in looks)
+        if not at_home or len(expected) < LEAD or expected[0] is None:
             return
-        off_m = float(np.hypot(*(expected[0][LEAD - 1, :2] - foe.at)))
         self._kept[number] += 1
-        if off_m > BROKEN_M:
+        if np.hypot(*(expected[0][LEAD - 1, :2] - foe.at)) > BROKEN_M:
             self._breaks[number] += 1
             self._kept[number] = -WARY * self._breaks[number]
 
     def _again(self, number: int, looks: int) -> Track | None:
-        """What followed the look most like the last one."""
+        """What followed the look most like the last one, repeated from there on."""
         seen = np.array(self._looks[number])
         if len(seen) <= FRESH:
             return None
         now, past = seen[-1], seen[:-FRESH]
         turn = np.abs((past[:, 2] - now[2] + np.pi) % (2.0 * np.pi) - np.pi)
-        off = np.hypot(past[:, 0] - now[0], past[:, 1] - now[1]) + RAD_M * turn + 1e3 * (past[:, TAGGED] != now[TAGGED])
+        off = np.hypot(past[:, 0] - now[0], past[:, 1] - now[1]) + RAD_M * turn
+        off[past[:, TAGGED] != now[TAGGED]] = np.inf
         best = len(off) - 1 - int(np.argmin(off[::-1]))
         if off[best] > ALIKE_M:
             return None
-        period = len(seen) - 1 - best
-        then = seen[best + 1 + np.arange(looks) % period]
+        then = seen[best + 1 + np.arange(looks) % (len(seen) - 1 - best)]
         found: Track = np.column_stack([then[:, :2], then[:, HOME] * (1.0 - then[:, TAGGED])])
         return found
 
