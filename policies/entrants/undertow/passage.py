@@ -81,7 +81,7 @@ def _bends(sight: Sight) -> Numbers:
 
 def _out_ways(sight: Sight, at: Point, grab: Point) -> Numbers:
     """Ways (W, 3, 2): straight, and with one bend."""
-    bends = np.concatenate([[at], _bends(sight)])
+    bends = np.concatenate([[grab], _bends(sight)])
     return np.stack([np.broadcast_to(at, bends.shape), bends, np.broadcast_to(grab, bends.shape)], axis=1)
 
 

@@ -44,10 +44,10 @@ class Waters:
         """
         rooms = np.full(points.shape[:2], np.inf)
         for foe, track in zip(self.sight.foes, self._tracks, strict=True):
-            chased = track is None
-            room = (
-                self._of_chaser_m(foe, points, times_s, grabs_s) if chased else self._of_track_m(track, points, times_s)
-            )
+            if track is None:
+                room = self._of_chaser_m(foe, points, times_s, grabs_s)
+            else:
+                room = self._of_track_m(track, points, times_s)
             rooms = np.minimum(rooms, room)
         nearest: Numbers = np.where(points[..., 0] > self.sight.line, rooms, np.inf).min(axis=1)
         return nearest
