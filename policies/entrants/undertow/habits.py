@@ -17,8 +17,8 @@ ALIKE_M, RAD_M, FRESH = 3.0, 4.0, 3
 LEAD, BROKEN_M = 5, 6.0
 """An opponent that is so far from where it was expected so many looks ago has broken its habit, m."""
 PROVEN, WARY = 15, 45
-"""So many right expectations make a habit, and so many more for each that was wrong by then: one that leaves its way once
-is wrong at several looks, and so is not relied on for most of a game."""
+"""So many right expectations make a habit, and so many more for each that was wrong by then: one that leaves its way
+once is wrong at several looks, and so is not relied on for most of a game."""
 TAGGED, HOME = 3, 4
 """Columns of a look: after x, y, m, and heading, rad, whether it is tagged, and on its own side."""
 
