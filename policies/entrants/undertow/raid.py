@@ -9,7 +9,7 @@ from ..plane import distance
 from ..sight import Boat, Sight
 from .chart import Chart
 from .passage import Passage, homeward, outward
-from .shape import SCRIPTED
+from .shape import SCRIPTED, WIDE_M
 from .watch import Watch
 from .waters import Waters
 
@@ -44,11 +44,11 @@ class Raid:
         unguarded: whether nobody stays there to guard the flag.
         passage: of the third boat past opponents that keep a habit; None while there is none.
         place: number of the place where it waits for one, see `Chart.wait`.
-        shape: its numbers.
+        shape: its numbers; the script's for a field of this size, until others are given.
     """
 
     def __init__(self, sight: Sight) -> None:
-        self.shape = SCRIPTED
+        self.shape = SCRIPTED.scaled(sight.size[0] / WIDE_M)
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
         self.watch, self.unguarded = Watch(sight), False
