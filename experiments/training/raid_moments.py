@@ -105,7 +105,8 @@ class Recorder(RaidsBatch):
         before = self._stood[game]
         asks = super()._asks(game)
         raid = self.raids[game]
-        if self._stood[game] != before and raid.phase > Phase.GATHER:
+        by_numbers = raid.phase > Phase.GATHER and raid.passage is None  # habits that a passage rests on are not kept
+        if self._stood[game] != before and by_numbers:
             place = {name: getattr(self._core.games, name)[game].copy() for name in PLACE}
             kind = KINDS.index("flag") if raid.held else raid.phase - 1
             if raid.unguarded:

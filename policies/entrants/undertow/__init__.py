@@ -8,6 +8,8 @@ the way home. Boats without a part in it tag whoever comes.
 
 Where no opponent stays at home there is no guard to draw. Then two boats stand before their flag, and the third sails
 alone when no opponent can cut it off; meanwhile the two sail at the intruders, since who is tagged must go home first.
+An opponent is no guard, either, that is up at the line with nobody to chase, or that does the same over and over,
+whoever comes: who circles or patrols is known ahead, and the third boat passes while it is elsewhere.
 """
 
 from .team import Undertow as Undertow

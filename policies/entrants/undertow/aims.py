@@ -11,6 +11,8 @@ from ..sight import Boat, Point, Sight
 from .chart import Chart
 from .raid import BAIT, DRAG, RUN, Phase, Raid
 
+REACHED_M = 2.0
+"""A bend of a way is reached this near to it, m."""
 COMING_M = 5.0
 """Opponents up to so far before the dividing line are taken for intruders, m."""
 
@@ -37,9 +39,14 @@ class Aim:
 def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
     """What an own boat steers for: home with the flag, its part in the raid, or else intruders and its post."""
     boat = sight.own[number]
+    sails = number == RUN and raid.passage is not None
     if boat.carries:
         at = dock(boat, sight) if boat.on_side else None
-        return Aim(chart.home(boat.at, up=number == RUN) if at is None else at)
+        if at is not None:
+            return Aim(at)
+        return Aim(_next_of(raid, boat) if sails else chart.home(boat.at, up=number == RUN))
+    if sails:
+        return Aim(_next_of(raid, boat))
     if raid.unguarded:
         return _alone(raid, sight, chart, number)
     part = _part(raid, sight, chart, number) if raid.phase > Phase.GATHER else None
@@ -65,6 +72,8 @@ def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
     boat = sight.own[number]
     if number != RUN or (sight.taken and boat.on_side):
         return _before_flag(raid, sight, chart)[number]
+    if raid.watch.timed:
+        return Aim(chart.wait(raid.place), 1.5)
     return Aim(chart.dash(boat)[0]) if raid.phase == Phase.RUN else Aim(chart.edge, 1.5)
 
 
@@ -84,6 +93,13 @@ def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
     places += [ahead(sight.home, angle, radius) for angle in angles]
     chosen = assign([sight.own[n].at for n in guards], places)
     return {n: Aim(places[k], 2.0) for n, k in zip(guards, chosen, strict=True)}
+
+
+def _next_of(raid: Raid, boat: Boat) -> Point:
+    """The first bend of the raid's passage that the boat has not reached yet."""
+    assert raid.passage is not None
+    points = raid.passage.points
+    return next((point for point in points if distance(boat.at, point) > REACHED_M), points[-1])
 
 
 def _towards(a: Point, b: Point, far_m: float) -> Point:

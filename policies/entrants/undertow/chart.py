@@ -13,6 +13,9 @@ from .way import slack_m
 GRABS_DEG = (0.0, 30.0, 60.0)
 """Where a boat that sails alone may grab: round the flag, from before it towards its edge."""
 
+WAIT_SHARES = (0.15, 0.5, 0.85, 0.5)
+"""Where a boat that waits for a passage does so, in shares of the field's height."""
+
 
 @dataclass(frozen=True)
 class Chart:
@@ -76,6 +79,10 @@ class Chart:
     def edge(self) -> Point:
         """Where the third boat waits while no opponent stays at home."""
         return self.at(self.sight.line - 2.0, self.sight.size[1] - self.shape.edge_m)
+
+    def wait(self, place: int) -> Point:
+        """Where the third boat waits for a passage: in turn at one edge, in the middle and at the other."""
+        return self.sight.line - 2.0, WAIT_SHARES[place % len(WAIT_SHARES)] * self.sight.size[1]
 
     def dash(self, boat: Boat) -> tuple[Point, float]:
         """Where a boat that sails alone grabs the flag, and by how much opponents would miss it, m."""

@@ -8,14 +8,18 @@ from enum import IntEnum
 from ..plane import distance
 from ..sight import Boat, Sight
 from .chart import Chart
-from .shape import SCRIPTED
+from .passage import Passage, homeward, outward
+from .shape import SCRIPTED, WIDE_M
+from .watch import Watch
+from .waters import Waters
 
 BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
 LONGEST_S, AGAIN_S = 60.0, 15.0
 """Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
-COME_M = 3.0
-"""An opponent so far beyond the dividing line is no guard, m."""
+KEEP_M, MOVES_S = 2.0, 20.0
+"""The third boat sets out when it will keep so far off the reach of opponents that keep a habit, m; and waits elsewhere
+after so long, s."""
 
 
 class Phase(IntEnum):
@@ -36,15 +40,20 @@ class Raid:
         bait_taken: whether the bait was tagged since the second boat set out.
         held: whether the flag was held in this raid.
         kept_s: since when this chart is kept, s.
-        unguarded: whether every opponent has been on the own side by now, so that none stays to guard its flag.
-        shape: its numbers.
+        watch: who stays at home.
+        unguarded: whether nobody stays there to guard the flag.
+        passage: of the third boat past opponents that keep a habit; None while there is none.
+        place: number of the place where it waits for one, see `Chart.wait`.
+        shape: its numbers; the script's for a field of this size, until others are given.
     """
 
     def __init__(self, sight: Sight) -> None:
-        self.shape = SCRIPTED
+        self.shape = SCRIPTED.scaled(sight.size[0] / WIDE_M)
         self.phase, self.upper, self.bait_taken = Phase.GATHER, True, False
         self._since_s, self.kept_s, self.held = sight.time, sight.time, False
-        self.unguarded, self._came = False, set[int]()
+        self.watch, self.unguarded = Watch(sight), False
+        self.passage: Passage | None = None
+        self.place = 0
 
     def memory(self, time_s: float) -> list[float]:
         """What it remembers but for its shape, as numbers; times count from ``time_s``."""
@@ -56,31 +65,28 @@ class Raid:
         self.phase, self.upper = Phase(int(memory[0])), bool(memory[1]) != mirrored
         self.bait_taken, self.held = bool(memory[2]), bool(memory[3])
         self._since_s, self.kept_s = memory[4] + time_s, memory[5] + time_s
-        self.unguarded = bool(memory[6])
+        self.unguarded = self.watch.nobody = bool(memory[6])
 
     def advance(self, sight: Sight) -> Chart:
         """Look at the game, go on to the next phase or give up; where the raid leads."""
-        self._watched(sight)
-        chart = Chart(sight, self.upper, self.shape)
-        if self.unguarded:
-            self._countered(sight, chart)
-        else:
-            self._raided(sight, chart)
-        return Chart(sight, self.upper, self.shape)
-
-    def _watched(self, sight: Sight) -> None:
-        """Note who comes; once all have, a raid that draws a guard away is given up."""
-        if self.unguarded:
-            return
-        self._came |= {number for number, foe in enumerate(sight.foes) if foe.x < sight.line - COME_M}
-        if len(self._came) == len(sight.foes):
-            self.unguarded = True
+        looked = self.watch.look(sight)
+        if self.unguarded != self.watch.unguarded:
+            self.unguarded = self.watch.unguarded
             self._end(sight.time)
+        chart = Chart(sight, self.upper, self.shape)
+        if not self.unguarded:
+            self._raided(sight, chart)
+        elif self.watch.timed:
+            self._timed(sight, looked)
+        else:
+            self._countered(sight, chart)
+        return Chart(sight, self.upper, self.shape)
 
     def _countered(self, sight: Sight, chart: Chart) -> None:
         """The third boat sails alone, while no opponent can cut it off in time."""
         run, shape = sight.own[RUN], self.shape
-        kept_at_home = run.tagged or (sight.taken and run.on_side)
+        kept_at_home = self._kept_at_home(sight)
+        self.passage = None
         if self.phase == Phase.GATHER:
             self.upper = run.y > 0.5 * sight.size[1]
             if not kept_at_home and Chart(sight, self.upper, shape).dash(run)[1] > shape.free_m:
@@ -90,6 +96,33 @@ class Raid:
             if kept_at_home or late or chart.dash(run)[1] < shape.kept_free_m:
                 self._end(sight.time)
         self._brought_home(sight)
+
+    def _timed(self, sight: Sight, looked: bool) -> None:
+        """The third boat sails alone, past opponents that keep a habit when they are elsewhere."""
+        if self._kept_at_home(sight):
+            self.phase, self.passage = Phase.GATHER, None
+        elif looked:
+            self.passage = self._passage(sight)
+            begins = self.phase == Phase.GATHER and self.passage is not None
+            self.held = self.held and not begins
+            self.phase = Phase.GATHER if self.passage is None else Phase.RUN
+            if self.passage is None and sight.time - self.kept_s > MOVES_S:
+                self.place, self.kept_s = self.place + 1, sight.time
+        self._brought_home(sight)
+
+    def _passage(self, sight: Sight) -> Passage | None:
+        """The third boat's best way as things stand; None where it had better not go."""
+        run, shape = sight.own[RUN], self.shape
+        if run.carries:
+            return homeward(Waters(sight, self.watch.habits, KEEP_M, shape.kept_free_m), run)
+        keep_m, free_m = (0.0, shape.kept_free_m) if self.phase == Phase.RUN else (KEEP_M, shape.free_m)
+        found = outward(Waters(sight, self.watch.habits, keep_m, free_m), run)
+        return found if found.room_m > 0.0 else None
+
+    def _kept_at_home(self, sight: Sight) -> bool:
+        """Whether the third boat has no choice, or has to mind the own flag."""
+        run = sight.own[RUN]
+        return run.tagged or (sight.taken and run.on_side and not run.carries)
 
     def _raided(self, sight: Sight, chart: Chart) -> None:
         """Three boats sail, to draw a guard away."""
@@ -143,7 +176,7 @@ class Raid:
             self.phase = Phase.RUN
 
     def _end(self, kept_s: float) -> None:
-        self.phase, self.kept_s = Phase.GATHER, kept_s
+        self.phase, self.passage, self.kept_s = Phase.GATHER, None, kept_s
 
 
 def may_tag(foe: Boat, sight: Sight) -> bool:

@@ -82,8 +82,15 @@ class Shape:
             values[name] = min(max(getattr(self, name) + unit * float(by), low), high)
         return replace(self, **values)
 
+    def scaled(self, factor: float) -> Shape:
+        """With distances so many times as long; times stay."""
+        return replace(self, **{name: factor * getattr(self, name) for name in NAMES if name not in TIMES})
+
 
 NAMES = tuple(field.name for field in fields(Shape))
+TIMES = ("stale_s", "baited_s")
+WIDE_M = 80.0
+"""Width of the field that the script's numbers were chosen on."""
 LIMITS = {
     "post_m": (2.0, 2.0, 15.0),
     "clear_m": (4.0, 0.0, 25.0),

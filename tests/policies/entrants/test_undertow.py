@@ -202,6 +202,16 @@ def test_it_brings_a_flag_home_while_nobody_stays_there():
     assert env.core.captures[0].tolist() == [1, 0]
 
 
+@pytest.mark.parametrize(("preset", "factor"), [("aamas2024", 1.0), ("mctf2025", 2.0)])
+def test_distances_of_a_raid_grow_with_the_field_and_times_do_not(preset, factor):
+    env = MctfEnv(preset)
+    env.reset(seed=1)
+    shape = Raid(look(env.core, 0)).shape
+    assert shape.guard_m == factor * SCRIPTED.guard_m
+    assert shape.free_m == factor * SCRIPTED.free_m
+    assert shape.baited_s == SCRIPTED.baited_s
+
+
 def test_fewer_than_three_boats_are_refused():
     env = MctfEnv(GameConfig.preset("aamas2024", team_size=2))
     env.reset(seed=1)
