@@ -157,11 +157,11 @@ def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> 
 
 
 @lean_kernel
-def _goes_on(k: int, span: Span, ready: Array) -> bool:
-    """Whether sample k is still to be written."""
-    if k > span.samples:
-        return False
-    return k <= span.least or ready[READY_SAMPLE] < 0.0 or k <= ready[READY_SAMPLE] + span.beyond
+def _last_sample(span: Span, ready: Array) -> int:
+    """Last sample of a path, as far as it is known."""
+    if ready[READY_SAMPLE] < 0.0:
+        return span.samples
+    return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
 
 
 @lean_kernel
@@ -184,7 +184,7 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     if span.done == 0:
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
     k, step = _note_done(max(1, span.done), span, row, path, ready)
-    while _goes_on(k, span, ready):
+    while k <= _last_sample(span, ready):
         togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
         step += 1
         if step % span.stride == 0:
@@ -213,7 +213,7 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     k, step = 0, -1
     if span.done > 0:
         k, step = _note_done(span.done, span, row, path, ready)
-    while _goes_on(k, span, ready):
+    while k <= _last_sample(span, ready):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         turn, rudder = 0.0, 0.0
@@ -298,11 +298,18 @@ def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready
         missed_s += left * span.dt_s
     way_m, most_m, gained_m = 0.0, end.speed_mps * at_once * span.dt_s, end.fall_mps * span.dt_s
     short_mps, short_thrust = end.short_mps, end.short_thrust
-    while _goes_on(k, span, ready):
-        for _ in range(span.stride // at_once):
-            way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
-            short_mps, short_thrust = max(0.0, short_mps * left - end.fall_mps), short_thrust * left
+    last = _last_sample(span, ready)
+    while k <= last:
+        if at_once == span.stride:
+            way_m += most_m - short_mps * missed_s
+            short_mps *= left
+        else:
+            for _ in range(span.stride):
+                way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
+                short_mps = max(0.0, short_mps * left - end.fall_mps)
+        short_thrust *= left
         path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
         if _is_ready(k, span, end.thrust - short_thrust, ready):
             _note_ready(k, run.ux, run.uy, end.speed_mps - short_mps, ready)
+            last = _last_sample(span, ready)
         k += 1
