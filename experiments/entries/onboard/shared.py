@@ -7,7 +7,7 @@ such function runs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, TypeVar, cast
 
@@ -17,6 +17,17 @@ Row = TypeVar("Row")
 
 ARRAYS = frozenset({"C", "d", "z", "z0", "z_now"})
 """Fields of the program, which stay arrays: parts of them are handed on and written to."""
+
+
+class Called:
+    """A function of one shared tuple; without a compiler nobody looks at what it is called with."""
+
+    def __init__(self, function: Callable[[Any], None]) -> None:
+        self._function = function
+
+    def __call__(self, row: Any) -> None:
+        """Call it with a shared tuple."""
+        self._function(row)
 
 
 @cache
