@@ -343,7 +343,8 @@ def _check_given(fleet: Fleet) -> None:
         _check_range(fleet, "age_s", ages_s, 0.0, np.full(len(fleet), LARGEST_AGE_S), within)
     most = np.array([get_platform(kind).max_thrust for kind in fleet.platforms])
     within = "give percent up to {:g} either way, not the pulse in us, or NaN where it is unknown"
-    _check_range(fleet, "thrust", np.where(np.isnan(thrusts), 0.0, thrusts), -most, most, within)
+    rounded = most + 1e-6 * most  # of logs and float32
+    _check_range(fleet, "thrust", np.where(np.isnan(thrusts), 0.0, thrusts), -rounded, rounded, within)
 
 
 def _check_range(fleet: Fleet, name: str, values: Array, low: Array | float, high: Array, remedy: str) -> None:

@@ -78,15 +78,15 @@ class Called:
 
     def __init__(self, function: Callable[[Any], None]) -> None:
         self._function: Any = function
-        self._last: tuple[SharedType, Callable[[Any], None]] | None = None
+        self._entries: dict[int, Callable[[Any], None]] = {}  # by type, of which there is one object of a kind
 
     def __call__(self, row: Any) -> None:
         """Call it with a shared tuple."""
-        last, of = self._last, row._type
-        if last is None or last[0] is not of:
+        entry = self._entries.get(id(row._type))
+        if entry is None:
             plain = not hasattr(self._function, "compile")  # where NUMBA_DISABLE_JIT is set
-            self._last = last = of, self._function if plain else self._function.compile((of,))
-        last[1](row)
+            entry = self._entries[id(row._type)] = self._function if plain else self._function.compile((row._type,))
+        entry(row)
 
 
 class SharedType(types.Type):

@@ -38,7 +38,7 @@ class Work(NamedTuple):
         table_m: (n + 1,) the least margin that tables tell where they are looked up first, m.
         pursuers_known: (n + 1,) whether the margins against opponents are all those of the path that is there.
         joint_m: (n + 1,) the least of these runs, m; `FAR` where none were made.
-        fails: (n + 1,) whether one of these is below what must be kept.
+        fails: (n + 1,) whether one of these, or a margin against a pursuer, is below what must be kept.
         short: (n + 1,) whether the margin from some team-mate, or from one that holds its course, is below what must be
             kept.
         target: (n,) margin the boat must keep from boats that are not ours, m.
@@ -56,7 +56,7 @@ class Work(NamedTuple):
         ways: (n, 3, 5) places opponents may be at when tables are looked into, see `barriers.value_function`.
         place: (n + 1, 5) place at which the boat itself is looked up.
         lookup: (n, n, 5) the place of each boat at which each opponent was looked up last, and the margin there, m.
-        sealed: (n + 1,) whether a table alone made the plan fail.
+        sealed: (n + 1,) whether a table alone made the plan fail, by the targets it was asked for.
         outnumbered: (n,) boats that several opponents can come near to, see `barriers.value_function`.
         ready: (n + 1, 3) what is noted of a plan's path, see `backup.paths`.
         pursuer: (5,) where a pursuer is at the end of its run: x, y, m, heading as a unit vector, speed m/s.

@@ -270,10 +270,11 @@ def _settling(
     gained, before, earlier = gains
     if abs(gained) + abs(more_thrust) < STEADY_SPEED:
         return Settling(speed_mps, 0.0, thrust, 0.0, 0.0, 0.0)
-    if more_thrust == 0.0 and gained > 0.0 and abs(gained - before) <= ALIKE * gained:  # all that a boat accelerates by
+    evenly = more_thrust == 0.0 and gained > 0.0 and abs(gained - before) <= ALIKE * gained
+    if evenly and speed_mps < commanded_mps:  # all that a boat accelerates by; at its top speed it is held back
         return Settling(commanded_mps, commanded_mps - speed_mps, thrust, 0.0, 1.0, gained)
     rate = _share_left(gained, before, earlier)
-    left = rate / (1.0 - rate) if rate > 0.0 else math.nan
+    left = rate / (1.0 - rate) if 0.0 < rate < 1.0 else math.nan
     return Settling(
         speed_mps + gained * left, gained * left, thrust + more_thrust * left, more_thrust * left, rate, 0.0
     )
@@ -283,30 +284,27 @@ def _settling(
 def _settles_at(speed_mps: float, end: Settling, params: Array) -> bool:
     """Whether a run settles at that speed, with the thrust that keeps it: else it only seems to settle."""
     off_mps = max(abs(end.speed_mps - speed_mps), abs(speed_of_thrust(params, end.thrust) - speed_mps))
-    return end.short_mps > 0.0 and off_mps < SETTLED_MPS < speed_mps
+    return end.short_mps > 0.0 and off_mps < SETTLED_MPS < speed_mps and end.thrust <= params[L.MAX_THRUST]
 
 
 @lean_kernel
 def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready: Array) -> None:
     """Fill the rest of a path, from sample k, with a straight run as its speed settles: that needs no model."""
-    at_once = (
-        1 if end.fall_mps > 0.0 else span.stride
-    )  # steps: a speed that falls short evenly does so until it is there
-    left, missed_s = 1.0, 0.0
-    for _ in range(at_once):
+    left, missed_s = 1.0, 0.0  # of what it is short of, from sample to sample
+    for _ in range(span.stride):
         left *= end.rate
         missed_s += left * span.dt_s
-    way_m, most_m, gained_m = 0.0, end.speed_mps * at_once * span.dt_s, end.fall_mps * span.dt_s
+    way_m, most_m = 0.0, end.speed_mps * span.stride * span.dt_s
     short_mps, short_thrust = end.short_mps, end.short_thrust
     last = _last_sample(span, ready)
     while k <= last:
-        if at_once == span.stride:
+        if end.fall_mps == 0.0:
             way_m += most_m - short_mps * missed_s
             short_mps *= left
-        else:
+        else:  # evenly, until half of what is left is less
             for _ in range(span.stride):
-                way_m += most_m - max(0.0, short_mps * missed_s - gained_m)
-                short_mps = max(0.0, short_mps * left - end.fall_mps)
+                short_mps = max(0.5 * short_mps, short_mps - end.fall_mps)
+                way_m += (end.speed_mps - short_mps) * span.dt_s
         short_thrust *= left
         path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
         if _is_ready(k, span, end.thrust - short_thrust, ready):

@@ -57,7 +57,8 @@ def begin_program(scene: Scene) -> int:
     count = _pick_pairs(scene)
     for m in range(count):
         copy_row(plan.commands[plan.movers[m]], plan.screened[plan.movers[m]])
-    check(scene)
+    if count > 0:
+        check(scene)
     return count
 
 

@@ -1,6 +1,7 @@
 """Opponents no faster than a boat are followed for half a minute, over a straight run that is not stepped through."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from steerclear.shield.backup.paths import Manoeuvre, Span, sail, trace_path
 from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.opponents import clear_of_pursuer
-from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import PLATFORMS, get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
 from steerclear.shield.setup import CHASE_S, boats_of
@@ -54,23 +55,31 @@ def any_boat(random, params):
     return row, random.choice([top, 0.0, random.uniform(0.0, top)])
 
 
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
-@pytest.mark.parametrize("seed", range(6))
-def test_a_straight_run_whose_speed_settles_is_where_the_model_says(platform, seed):
-    """The speed of what is left of the way settles geometrically: no step of the model is needed for it."""
-    random, params = np.random.default_rng(seed), get_platform(platform).pack()
-    span = Span(0.1, 1, 2, 217, 28, 151, 0, 85.0)
-    for _ in range(80):
+def kinds():
+    """Thrust boats of every kind there is, and one whose thrust ends before its map does."""
+    shipped = [get_platform(name) for name in PLATFORMS]
+    found = {boat.name: boat for boat in shipped if boat.kind == "usv" and boat.rotate_speed_dps == 0.0}
+    return {**found, "held heron": replace(found["heron"], max_thrust=90.0)}
+
+
+@pytest.mark.parametrize(("dt_s", "stride"), [(0.1, 1), (0.1, 2), (0.1, 4), (0.25, 1), (0.5, 1), (0.5, 2)])
+@pytest.mark.parametrize("name", kinds())
+def test_a_straight_run_whose_speed_settles_is_where_the_model_says(name, dt_s, stride):
+    """The speed of what is left of the way settles by a rule: no step of the model is needed for it."""
+    random, params = np.random.default_rng(stride), kinds()[name].pack()
+    samples = min(217, int(60.0 / (stride * dt_s)))
+    span = Span(dt_s, 1, stride, samples, 28, 151, 0, 85.0)
+    for _ in range(40):
         row, speed = any_boat(random, params)
         togo = random.choice([0.0, 30.0, 90.0, 180.0])
         path, ready = np.full((400, 2), np.nan), np.zeros(4)
         trace_path(params, row.copy(), Manoeuvre(1.0, togo, speed), span, path, ready)
-        last = 217 if ready[0] < 0 else min(217, max(28, int(ready[0]) + 151))
+        last = samples if ready[0] < 0 else min(samples, max(28, int(ready[0]) + 151))
         assert np.isfinite(path[: last + 1]).all()
         for k in range(last + 1):
             np.testing.assert_allclose(path[k], row[[L.X, L.Y]], rtol=0, atol=1e-2)
-            for _ in range(2):
-                togo = sail(params, row, 1.0, togo, speed, 0.1)
+            for _ in range(stride):
+                togo = sail(params, row, 1.0, togo, speed, dt_s)
 
 
 def sailed_m(bearing_deg, far_m, lead_s, lasts_s):
