@@ -181,6 +181,23 @@ def test_a_class_is_no_policy_and_a_team_policy_is_not_read():
         Shield().wrap(policies.make("medium"), read=near)
 
 
+def answering(action):
+    """A shielded team in a game, whose policy always gives every boat one action."""
+
+    class Odd:
+        def reset(self, env, agent_ids, seed):
+            pass
+
+        def act(self, observations, infos):
+            return dict.fromkeys(OWN, action)
+
+    env, start = crowd()
+    env.reset(seed=1, options=start)
+    team = Shield().wrap(Odd())
+    team.reset(env, OWN, 0)
+    return team
+
+
 @pytest.mark.parametrize(
     ("action", "text"),
     [
@@ -198,34 +215,14 @@ def test_a_class_is_no_policy_and_a_team_policy_is_not_read():
     ],
 )
 def test_what_is_no_action_is_refused_by_name_of_the_boat(action, text):
-    class Odd:
-        def reset(self, env, agent_ids, seed):
-            pass
-
-        def act(self, observations, infos):
-            return dict.fromkeys(OWN, action)
-
-    env, start = crowd()
-    env.reset(seed=1, options=start)
-    team = Shield().wrap(Odd())
-    team.reset(env, OWN, 0)
+    team = answering(action)
     with pytest.raises(GameError, match=text):
         team.act({}, {})
 
 
 @pytest.mark.parametrize("action", [np.array([1.0, 20.0], np.float16), np.array(4), np.ma.masked_array([1.0, 20.0])])
 def test_numbers_of_any_kind_are_actions(action):
-    class Odd:
-        def reset(self, env, agent_ids, seed):
-            pass
-
-        def act(self, observations, infos):
-            return dict.fromkeys(OWN, action)
-
-    env, start = crowd()
-    env.reset(seed=1, options=start)
-    team = Shield().wrap(Odd())
-    team.reset(env, OWN, 0)
+    team = answering(action)
     assert set(team.act({}, {})) == set(OWN)
 
 
