@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from steerclear.shield import jit
 
 F = TypeVar("F", bound=Callable[..., Any])
-FOLDERS = ("encounters", "reach_guard", "textbook")
+FOLDERS = ("encounters", "baselines/reach_guard", "baselines/textbook")
 """Folders whose compiled functions are called from elsewhere; a function's own folder always counts."""
 
 

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from steerclear.experiments.match import play_match
-from steerclear.experiments.spec import MatchSpec
+from steerclear.experiments.play.match import play_match
+from steerclear.experiments.play.spec import MatchSpec
 
 GAMES, LENGTH_S = 2, 60.0
 off = MatchSpec("aamas2024", own="medium", opponent="rammer", rules={"max_time_s": LENGTH_S})

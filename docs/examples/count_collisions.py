@@ -1,7 +1,7 @@
 """Count collisions, and ask of each whether it was avoidable."""
 
-from steerclear.experiments.match import play_match
-from steerclear.experiments.spec import MatchSpec
+from steerclear.experiments.play.match import play_match
+from steerclear.experiments.play.spec import MatchSpec
 
 spec = MatchSpec("aamas2024", own="easy", opponent="rammer", seed=1, rules={"max_time_s": 60.0}, judge="all")
 row = play_match(spec).row

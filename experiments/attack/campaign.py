@@ -14,11 +14,11 @@ from ..encounters.play import play
 from ..encounters.replays import records_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import scenes_of
-from ..pool import Engine, run_all
-from ..provenance import machine, versions
-from ..replay_html import write_replay
-from ..store import LINES_FILE, ResultStore, write_json
-from ..tables import number_text, titled
+from ..report.replay_html import write_replay
+from ..report.tables import number_text, titled
+from ..runs.pool import Engine, run_all
+from ..runs.provenance import machine, versions
+from ..runs.store import LINES_FILE, ResultStore, write_json
 from .search import Search, run_search
 
 MOST_REPLAYS = 10

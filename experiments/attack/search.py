@@ -25,8 +25,8 @@ from ..encounters.scenes import Conditions
 from ..encounters.start import start_certificate_m
 from ..encounters.tally import Columns, tally
 from ..encounters.verdicts import judge_game, side_name
-from ..spec import check_count, check_seed
-from ..store import key_of
+from ..play.spec import check_count, check_seed
+from ..runs.store import key_of
 from .opponents import Duel
 
 MOST_PLAYED = 10_000

@@ -9,9 +9,9 @@ from typing import Any
 
 from steerclear.shield import ShieldConfig
 
-from ..provenance import machine, versions
-from ..spec import check_seed
-from ..tally import RADII_M
+from ..measure.tally import RADII_M
+from ..play.spec import check_seed
+from ..runs.provenance import machine, versions
 from .batch import BatchSize, batch_memory, steps_per_s
 from .decide import COUNTS, decide_times, scaling
 from .lookups import lookup_times

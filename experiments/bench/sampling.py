@@ -11,8 +11,8 @@ from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, 
 from steerclear.shield.filter.program import Program, Solver, solve
 from steerclear.shield.jit import Array
 
-from ..match import Match
-from ..spec import MatchSpec
+from ..play.match import Match
+from ..play.spec import MatchSpec
 
 REFERENCE = "daqp"
 """The backend that programs are collected with and others are compared with."""

@@ -12,7 +12,7 @@ NAME = "demo_fleet.yaml"
 
 def demo_text() -> str:
     """The file's text, to begin one's own with."""
-    return resources.files("steerclear.experiments").joinpath("templates", NAME).read_text(encoding="utf-8")
+    return resources.files("steerclear.experiments.report").joinpath("templates", NAME).read_text(encoding="utf-8")
 
 
 def demo_fleet() -> FleetFile:

@@ -8,7 +8,7 @@ import numpy as np
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.seat import Seat
+from steerclear.experiments.play.seat import Seat
 from steerclear.policies.registry import ENTRIES
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array

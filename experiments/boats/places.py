@@ -7,7 +7,7 @@ from typing import Any
 
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.experiments.openings import opening
+from steerclear.experiments.play.openings import opening
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 

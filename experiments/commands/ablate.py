@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..ablation import AblationSettings
-from ..ablation import quick as small_version
-from ..conditions import Conditions
-from ..engines import engine_of
-from ..score import DEFAULT_PENALTY
-from ..spec import ANSWER_S
-from ..store import write_json
+from ..measure.ablation import AblationSettings
+from ..measure.ablation import quick as small_version
+from ..measure.score import DEFAULT_PENALTY
+from ..play.conditions import Conditions
+from ..play.spec import ANSWER_S
+from ..runs.engines import engine_of
+from ..runs.store import write_json
 from . import options as o
 from .console import command, finish
 from .games import check_complete, run_games

@@ -13,11 +13,11 @@ from ..attack.campaign import passed, run_searches, searches_of, searches_table,
 from ..attack.search import MOST_PLAYED, Search
 from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
-from ..engines import Workers as Engines
-from ..engines import engine_of
-from ..failed_jobs import end_failed
-from ..spec import check_count
-from ..store import LINES_FILE, ResultStore, write_json
+from ..play.spec import check_count
+from ..runs.engines import Workers as Engines
+from ..runs.engines import engine_of
+from ..runs.failed_jobs import end_failed
+from ..runs.store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
 from .encounters import Current, Delay, Noise, Radius, Workers, platform_pairs

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from ..bench.report import bench_tables
 from ..bench.run import BenchSettings, run_bench
-from ..store import write_json
-from ..tables import bars_table, titled
+from ..report.tables import bars_table, titled
+from ..runs.store import write_json
 from . import options as o
 from .console import command, err, finish, out
 

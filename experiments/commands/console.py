@@ -18,9 +18,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from steerclear.shield.compiled.compiling import told_to
 from steerclear.shield.exceptions import SteerclearError
 
-from ..failed_jobs import JobFault
-from ..faults import fault_words, machine_words
-from ..pool import interrupted_by_sigterm
+from ..runs.failed_jobs import JobFault
+from ..runs.faults import fault_words, machine_words
+from ..runs.pool import interrupted_by_sigterm
 from ..terminal import SafeConsole
 from .files import check_files
 from .plain_progress import PlainProgress

@@ -10,11 +10,11 @@ import typer
 from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, Demonstrator
 from steerclear.shield.exceptions import ConfigError
 
-from ..match import Match
-from ..new_file import NEW
-from ..spec import MatchSpec
-from ..store import write_table
-from ..tables import game_table
+from ..play.match import Match
+from ..play.spec import MatchSpec
+from ..report.tables import game_table
+from ..runs.new_file import NEW
+from ..runs.store import write_table
 from . import options as o
 from .console import command, err, out
 from .files import check_ending

@@ -27,8 +27,8 @@ from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.rules import game_config
 from ..deploy.run import deploy as run_boats
 from ..deploy.tally import distance_words
-from ..spec import check_seed
-from ..store import write_json
+from ..play.spec import check_seed
+from ..runs.store import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

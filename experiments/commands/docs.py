@@ -9,9 +9,9 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import read_table
 
-from ..docs_pages import SOURCES, write_pages
-from ..json_file import read_json
-from ..results import NAMES
+from ..report.docs_pages import SOURCES, write_pages
+from ..runs.json_file import read_json
+from ..runs.results import NAMES
 from .console import command, out
 
 Sources = Annotated[

@@ -16,11 +16,11 @@ from ..encounters.families import FAMILIES
 from ..encounters.guards import parse_guards
 from ..encounters.results import cells_table, heads_legend, results_of, write_all
 from ..encounters.scenes import Conditions
-from ..engines import Workers as Engines
-from ..engines import engine_of
-from ..failed_jobs import end_failed
-from ..store import LINES_FILE, ResultStore, write_json
-from ..tables import bars_table
+from ..report.tables import bars_table
+from ..runs.engines import Workers as Engines
+from ..runs.engines import engine_of
+from ..runs.failed_jobs import end_failed
+from ..runs.store import LINES_FILE, ResultStore, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
 from .games import results_folder

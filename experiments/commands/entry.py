@@ -10,19 +10,19 @@ import typer
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..ablation import AblationSettings, spec_of
-from ..ablation import quick as small_version
 from ..entries.checking import check_entry, headline
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrapping.wrap import wrap_entry
-from ..match import play_match
-from ..new_file import NEW
-from ..pool import check_jobs, run_all
-from ..provenance import machine, versions
-from ..replay_html import write_replay
-from ..spec import ANSWER_S
-from ..store import ResultStore, write_json
+from ..measure.ablation import AblationSettings, spec_of
+from ..measure.ablation import quick as small_version
+from ..play.match import play_match
+from ..play.spec import ANSWER_S
+from ..report.replay_html import write_replay
+from ..runs.new_file import NEW
+from ..runs.pool import check_jobs, run_all
+from ..runs.provenance import machine, versions
+from ..runs.store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
 from .games import check_complete, results_folder, run_games, say_of_distance

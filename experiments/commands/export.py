@@ -13,7 +13,7 @@ from steerclear.policies.entrants.learned.sb3_file import read_sb3
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 
-from ..new_file import NEW
+from ..runs.new_file import NEW
 from ..training.checkpoints import is_checkpoint, network_in
 from ..training.submission import write_submission
 from .console import command, out

@@ -11,8 +11,8 @@ from typing import Any
 from steerclear.shield.exceptions import ConfigError
 from typer.models import OptionInfo
 
-from ..new_file import NEW, check_new, check_place
-from ..store import BESIDE, LINES_FILE, RESULTS_FILE
+from ..runs.new_file import NEW, check_new, check_place
+from ..runs.store import BESIDE, LINES_FILE, RESULTS_FILE
 
 OTHERS = {
     ".mcap": "black boxes",

@@ -11,21 +11,21 @@ from rich.console import Console
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..ablation import AblationSettings
-from ..campaign import Campaign, Played
-from ..conditions import words_of, words_of_settings
-from ..engines import Workers
-from ..failed_jobs import end_failed
-from ..judging import check_judge
-from ..kept_distance import check_shield, words_of_less
-from ..learned_elsewhere import made_of
-from ..results import replay_of, results_of, write_results
-from ..score import check_penalty
-from ..sea import check_current
-from ..store import LINES_FILE, ResultStore
-from ..tables import bars_table, pairing_table, verdict_table
-from ..tally import RADII_M
-from ..warming import WARMED, warm_up
+from ..measure.ablation import AblationSettings
+from ..measure.judging import check_judge
+from ..measure.score import check_penalty
+from ..measure.tally import RADII_M
+from ..play.conditions import words_of, words_of_settings
+from ..play.kept_distance import check_shield, words_of_less
+from ..play.learned_elsewhere import made_of
+from ..play.sea import check_current
+from ..report.tables import bars_table, pairing_table, verdict_table
+from ..runs.campaign import Campaign, Played
+from ..runs.engines import Workers
+from ..runs.failed_jobs import end_failed
+from ..runs.results import replay_of, results_of, write_results
+from ..runs.store import LINES_FILE, ResultStore
+from ..runs.warming import WARMED, warm_up
 from .console import Interrupted, err, out, progress
 from .policies_tried import try_policies
 

@@ -14,11 +14,11 @@ from rich.text import Text
 from steerclear.env.parity import replay_trace
 from steerclear.env.parity_report import ParityReport, Tolerances
 
-from ..failed_jobs import end_failed
-from ..pool import check_jobs, run_all
-from ..provenance import machine, versions
-from ..store import write_json
-from ..tables import titled
+from ..report.tables import titled
+from ..runs.failed_jobs import end_failed
+from ..runs.pool import check_jobs, run_all
+from ..runs.provenance import machine, versions
+from ..runs.store import write_json
 from . import options as o
 from .console import command, finish, out, progress
 

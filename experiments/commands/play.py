@@ -15,17 +15,17 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..conditions import Conditions
-from ..failure_words import held_games
-from ..kept_distance import check_shield
-from ..match import MatchResult, Watcher, play_match
-from ..new_file import NEW
-from ..provenance import machine, versions
-from ..score import DEFAULT_PENALTY, check_penalty
-from ..sea import check_current
-from ..spec import ANSWER_S, MatchSpec
-from ..store import write_json
-from ..tables import game_table
+from ..measure.score import DEFAULT_PENALTY, check_penalty
+from ..play.conditions import Conditions
+from ..play.kept_distance import check_shield
+from ..play.match import MatchResult, Watcher, play_match
+from ..play.sea import check_current
+from ..play.spec import ANSWER_S, MatchSpec
+from ..report.tables import game_table
+from ..runs.failure_words import held_games
+from ..runs.new_file import NEW
+from ..runs.provenance import machine, versions
+from ..runs.store import write_json
 from . import options as o
 from .console import command, err, out, progress
 from .games import say_of_distance

@@ -12,7 +12,7 @@ from steerclear.policies.registry import SB3_PREFIX
 from steerclear.policies.sb3 import check_origin, code_warning
 
 from ..entries.team import is_entry, make_team
-from ..learned_elsewhere import words_of_elsewhere, words_of_shield
+from ..play.learned_elsewhere import words_of_elsewhere, words_of_shield
 from .console import err
 
 

@@ -24,8 +24,8 @@ from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_r
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
-from ..new_file import NEW, check_new
-from ..reach_show import check_picture, draw_sets, show_card
+from ..reach.show import check_picture, draw_sets, show_card
+from ..runs.new_file import NEW, check_new
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 from .plain_progress import PlainProgress

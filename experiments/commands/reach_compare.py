@@ -10,10 +10,10 @@ from steerclear.shield.tables.files import load_table
 from steerclear.shield.tables.make import check_radii
 from steerclear.shield.tables.settings import problem_of
 
-from ..store import write_json
-from ..tables import bars_table, titled
-from ..unsafe_sets import compare_sets, looks_up, places, sets_config
-from ..unsafe_sets_page import HEADS, LOOKED_UP, content_of, rows_of
+from ..reach.unsafe_sets import compare_sets, looks_up, places, sets_config
+from ..reach.unsafe_sets_page import HEADS, LOOKED_UP, content_of, rows_of
+from ..report.tables import bars_table, titled
+from ..runs.store import write_json
 from . import options as o
 from .console import command, finish, out, progress
 

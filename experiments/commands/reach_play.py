@@ -12,13 +12,13 @@ from steerclear.shield.tables.files import load_table
 from steerclear.shield.tables.make import check_radii
 from steerclear.shield.tables.settings import problem_of
 
-from ..failed_jobs import end_failed
-from ..played_sets import PlayedSet, Task, check_settings, play_set, tasks_of
-from ..played_sets_page import HEADS, content_of, rows_of
-from ..pool import check_jobs, run_all
-from ..store import ResultStore, key_of, write_json
-from ..tables import bars_table, titled
-from ..unsafe_sets import places
+from ..reach.played_sets import PlayedSet, Task, check_settings, play_set, tasks_of
+from ..reach.played_sets_page import HEADS, content_of, rows_of
+from ..reach.unsafe_sets import places
+from ..report.tables import bars_table, titled
+from ..runs.failed_jobs import end_failed
+from ..runs.pool import check_jobs, run_all
+from ..runs.store import ResultStore, key_of, write_json
 from . import options as o
 from .console import Interrupted, command, finish, out, progress
 from .reach_compare import OtherBoat, OwnBoat

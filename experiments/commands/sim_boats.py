@@ -24,9 +24,9 @@ from ..boats.incidents import Plan, parse_incident
 from ..boats.off import off_platform
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from ..deploy.lifeline import end_with_parent
-from ..new_file import NEW
-from ..spec import check_seed
-from ..store import write_json
+from ..play.spec import check_seed
+from ..runs.new_file import NEW
+from ..runs.store import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

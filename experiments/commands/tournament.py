@@ -9,16 +9,17 @@ from typing import Annotated, Any
 import typer
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..conditions import CALM
-from ..engines import Workers, engine_of
-from ..failed_jobs import end_failed
-from ..judging import check_judge
-from ..kept_distance import check_shield
-from ..score import DEFAULT_PENALTY, check_penalty
-from ..sea import check_current
-from ..spec import ANSWER_S
-from ..store import LINES_FILE, RESULTS_FILE, ResultStore, write_json, write_table
-from ..tables import bars_table, titled
+from ..measure.judging import check_judge
+from ..measure.score import DEFAULT_PENALTY, check_penalty
+from ..play.conditions import CALM
+from ..play.kept_distance import check_shield
+from ..play.sea import check_current
+from ..play.spec import ANSWER_S
+from ..report.tables import bars_table, titled
+from ..runs.engines import Workers, engine_of
+from ..runs.failed_jobs import end_failed
+from ..runs.store import LINES_FILE, RESULTS_FILE, ResultStore, write_json, write_table
+from ..runs.warming import WARMED, warm_up
 from ..tournament.campaign import Tournament
 from ..tournament.pages import subtitle, write_html
 from ..tournament.paper import SCRIPTED
@@ -26,7 +27,6 @@ from ..tournament.replays import chosen_games, write_replays
 from ..tournament.results import compared_states, results_of, silent_teams
 from ..tournament.settings import FINAL, TournamentSettings, quick
 from ..tournament.tables import agreement_lines, all_tables
-from ..warming import WARMED, warm_up
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
 from .games import KEYBOARD, results_folder, say_of_distance

@@ -11,7 +11,7 @@ import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from steerclear.shield.exceptions import ConfigError
 
-from ..folder_lock import lock_folder
+from ..runs.folder_lock import lock_folder
 from ..training.config_file import read_config
 from .console import Interrupted, command, err, out
 from .plain_progress import PlainProgress

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..folder_lock import lock_folder
-from ..pool import check_jobs
+from ..runs.folder_lock import lock_folder
+from ..runs.pool import check_jobs
 from ..training.config_file import read_config
 from . import options as o
 from .console import Interrupted, command, out, progress

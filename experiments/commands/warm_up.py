@@ -9,7 +9,7 @@ from steerclear.shield.compiled.compiling import COMPILING, told_to
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in
 
-from ..warming import parts_of_all
+from ..runs.warming import parts_of_all
 from .console import command, err, out
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-from ..pool import Engine, run_all
-from ..spec import check_seed
-from ..store import ResultStore, key_of
+from ..play.spec import check_seed
+from ..runs.pool import Engine, run_all
+from ..runs.store import ResultStore, key_of
 from .families import draw, get_family
 from .guards import check_guard
 from .measure import chunk_size, measure_chunk

@@ -13,7 +13,7 @@ from steerclear.shield.platforms import fresh_state, get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracking.tracks import thrust_at
 
-from ..conditions import draw
+from ..play.conditions import draw
 from . import script as S
 from .scenes import Conditions
 

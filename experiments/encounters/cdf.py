@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..page import as_text
-from ..svg import ticks
+from ..report.page import as_text
+from ..report.svg import ticks
 
 WIDTH, HEIGHT = 360, 190
 LEFT, RIGHT, TOP, FOOT = 40, 12, 10, 40

@@ -83,11 +83,11 @@ def check_guard(name: str) -> None:
     if base == SHIELD:
         ShieldConfig.of(**settings)
     elif base == REACH:
-        from ..reach_guard import check_settings
+        from ..baselines.reach_guard import check_settings
 
         check_settings(settings)
     elif base in rollout_names():
-        from ..rollouts import check_settings as check_rollout
+        from ..baselines.rollouts import check_settings as check_rollout
 
         check_rollout(base, settings)
     elif base != NONE and base not in textbook_names():
@@ -100,14 +100,14 @@ def check_guard(name: str) -> None:
 
 def textbook_names() -> tuple[str, ...]:
     """Names of the filters of the literature."""
-    from ..textbook import NAMES
+    from ..baselines.textbook import NAMES
 
     return tuple(NAMES)
 
 
 def rollout_names() -> tuple[str, ...]:
     """Names of the filters that roll manoeuvres out."""
-    from ..rollouts import NAMES
+    from ..baselines.rollouts import NAMES
 
     return tuple(NAMES)
 
@@ -162,16 +162,16 @@ def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions)
     if base == SHIELD:
         return BatchedShield(*fleet, around)
     if base == REACH:
-        from ..reach_guard import ReachGuard, check_settings
+        from ..baselines.reach_guard import ReachGuard, check_settings
 
         check_settings(settings)
         return ReachGuard(*fleet)
     if base in rollout_names():
-        from ..rollouts import RolloutGuard
+        from ..baselines.rollouts import RolloutGuard
 
         return RolloutGuard(base, *fleet, settings)
     if base not in textbook_names():
         check_guard(base)
-    from ..textbook import TextbookGuard
+    from ..baselines.textbook import TextbookGuard
 
     return TextbookGuard(base, *fleet)

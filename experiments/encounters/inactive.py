@@ -16,9 +16,9 @@ from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 
+from ..baselines.reach_guard import ReachGuard
+from ..baselines.reach_guard.values import Setup, ahead, least, margins, near_pairs
 from ..jit import kernel
-from ..reach_guard import ReachGuard
-from ..reach_guard.values import Setup, ahead, least, margins, near_pairs
 from .guards import GuardMaker, build_guard
 from .play import Film
 from .scenes import DT_S, Conditions, Scenes

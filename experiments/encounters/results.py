@@ -9,9 +9,9 @@ from typing import Any
 from rich.console import Group
 from rich.text import Text
 
-from ..provenance import machine, versions
-from ..store import LINES_FILE, write_json
-from ..tables import number_text, titled
+from ..report.tables import number_text, titled
+from ..runs.provenance import machine, versions
+from ..runs.store import LINES_FILE, write_json
 from .campaign import Campaign, cell_summaries
 from .families import FAMILIES
 from .guards import SHIELD

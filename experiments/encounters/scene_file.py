@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
-from ..json_file import read_json
-from ..store import write_json
+from ..runs.json_file import read_json
+from ..runs.store import write_json
 from .scene_check import check_scenes
 from .scenes import Conditions, Scenes
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, IntArray
 
-from ..conditions import MOST as MOST_CONDITIONS
-from ..conditions import check_values
+from ..play.conditions import MOST as MOST_CONDITIONS
+from ..play.conditions import check_values
 
 DT_S = 0.1
 RADIUS_M = 2.5

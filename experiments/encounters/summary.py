@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from ..statistics import CONFIDENCE
+from ..measure.statistics import CONFIDENCE
 from .tally import Columns
 from .verdicts import SIDES
 

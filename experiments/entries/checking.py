@@ -11,8 +11,8 @@ from steerclear.policies.report import PolicyReport
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 
-from ..match import Match
-from ..spec import MatchSpec
+from ..play.match import Match
+from ..play.spec import MatchSpec
 from .imports import imports_of
 from .team import EntryTeam
 

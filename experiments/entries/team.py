@@ -21,7 +21,7 @@ from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.words import plain_text
 
-from ..spec import ANSWER_S
+from ..play.spec import ANSWER_S
 from .answers import from_plain
 from .limits import Limits, unlimited
 from .packing import Packer

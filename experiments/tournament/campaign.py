@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..engines import Workers
-from ..pool import run_all
-from ..store import ResultStore
+from ..runs.engines import Workers
+from ..runs.pool import run_all
+from ..runs.store import ResultStore
 from .play import play_game
 from .results import finalists
 from .settings import GameJob, TournamentSettings, label

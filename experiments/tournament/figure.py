@@ -7,8 +7,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..docs_plots import COLOURS
-from ..plot_text import plot_text
+from ..report.docs_plots import COLOURS
+from ..report.plot_text import plot_text
 
 Results = Mapping[str, Any]
 

@@ -8,10 +8,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..markdown import MADE, bars_table, line, table
-from ..page import as_text, report_page, template, write_page
-from ..report_parts import bars_table as bars_html
-from ..report_parts import replay_links, values_table
+from ..report.ablation_parts import bars_table as bars_html
+from ..report.ablation_parts import replay_links, values_table
+from ..report.markdown import MADE, bars_table, line, table
+from ..report.page import as_text, report_page, template, write_page
 from .figure import can_be_drawn, draw
 from .tables import Table, agreement_lines, all_tables, shown
 

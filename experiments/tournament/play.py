@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from steerclear.policies.protocol import TeamPolicy
 
-from ..match import Match, MatchResult
-from ..seat import Failures
-from ..spec import SIDES, MatchSpec
-from ..tally import breach_column, tally
+from ..measure.tally import breach_column, tally
+from ..play.match import Match, MatchResult
+from ..play.seat import Failures
+from ..play.spec import SIDES, MatchSpec
 from .settings import GameJob, label
 
 KINDS = ("teammate", "opponent")

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..engines import Workers
-from ..match import play_match
-from ..pool import run_all
-from ..replay_html import write_replay
-from ..spec import SIDES
+from ..play.match import play_match
+from ..play.spec import SIDES
+from ..report.replay_html import write_replay
+from ..runs.engines import Workers
+from ..runs.pool import run_all
 from .settings import GameJob, label
 
 Row = Mapping[str, Any]

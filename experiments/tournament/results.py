@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..provenance import machine, versions
-from ..spec import SIDES
-from ..store import told_settings
+from ..play.spec import SIDES
+from ..runs.provenance import machine, versions
+from ..runs.store import told_settings
 from .agreement import agreement
 from .price import prices
 from .settings import ALL, FINAL, OFF, QUALIFYING, TournamentSettings, label

@@ -11,10 +11,10 @@ from typing import Any
 from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
-from ..score import DEFAULT_PENALTY
-from ..spec import ANSWER_S, MatchSpec, near
-from ..store import key_of
-from ..tally import RADII_M
+from ..measure.score import DEFAULT_PENALTY
+from ..measure.tally import RADII_M
+from ..play.spec import ANSWER_S, MatchSpec, near
+from ..runs.store import key_of
 from .paper import SCRIPTED
 
 OFF, ALL = "off", "all"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ..spec import SIDES
+from ..play.spec import SIDES
 
 Row = Mapping[str, Any]
 RESAMPLES = 2000

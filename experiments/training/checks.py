@@ -6,7 +6,7 @@ from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
 
-from ..spec import near
+from ..play.spec import near
 
 
 def choice(name: str, value: Any, known: tuple[str, ...]) -> None:

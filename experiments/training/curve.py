@@ -12,8 +12,8 @@ from typing import Any
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 
-from ..provenance import machine, versions
-from ..store import told_settings, write_table
+from ..runs.provenance import machine, versions
+from ..runs.store import told_settings, write_table
 from .settings import TrainingSettings
 
 CURVE, PARQUET_STEM = "curve.json", "curve"

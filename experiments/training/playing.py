@@ -12,7 +12,7 @@ from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
-from ..statistics import mean_interval
+from ..measure.statistics import mean_interval
 from .games import core_of, shield_of
 from .pool import opponent_of
 from .settings import TrainingSettings

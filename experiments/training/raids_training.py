@@ -17,7 +17,7 @@ from steerclear.policies.entrants.undertow.raid import Phase
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray
 
-from ..spec import near
+from ..play.spec import near
 from .checks import number
 from .curve import write_curve
 from .games import learners_of, set_stage

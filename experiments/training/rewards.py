@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from ..spec import near
+from ..play.spec import near
 
 
 class Sparse:

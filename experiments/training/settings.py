@@ -9,8 +9,8 @@ from typing import Any
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..kept_distance import check_shield
-from ..spec import near
+from ..play.kept_distance import check_shield
+from ..play.spec import near
 from .checks import choice, count, number, span, texts
 
 SHIELDS = ("none", "deployment", "training", "training+intervention")

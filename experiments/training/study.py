@@ -15,11 +15,11 @@ import numpy as np
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
-from ..failed_jobs import end_failed
-from ..json_file import read_json
-from ..pool import run_all
-from ..provenance import machine, versions
-from ..store import finite, write_json
+from ..runs.failed_jobs import end_failed
+from ..runs.json_file import read_json
+from ..runs.pool import run_all
+from ..runs.provenance import machine, versions
+from ..runs.store import finite, write_json
 from .algorithms import training_of
 from .curve import CURVE
 from .playing import play_games, summary_of

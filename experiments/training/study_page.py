@@ -9,8 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from ..markdown import MADE, line, table
-from ..statistics import Interval, count_difference, count_interval, mean_interval, paired_difference, student_interval
+from ..measure.statistics import (
+    Interval,
+    count_difference,
+    count_interval,
+    mean_interval,
+    paired_difference,
+    student_interval,
+)
+from ..report.markdown import MADE, line, table
 from .settings import SHIELDS
 
 HEADS = (

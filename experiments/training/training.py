@@ -15,7 +15,7 @@ from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 
-from ..provenance import versions
+from ..runs.provenance import versions
 from .checkpoints import checkpoints_in, read_checkpoint, write_checkpoint
 from .curve import write_curve
 from .games import Timed, check_sight, learners_of, set_stage, stagger

@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.env.record import load, save
-from steerclear.experiments import campaign, cli, keys
+from steerclear.experiments import cli
 from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.report import keys
+from steerclear.experiments.runs import campaign
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, GameError
 from typer.testing import CliRunner
@@ -192,7 +194,7 @@ def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
 
 def test_bars_decide_the_exit_status_only_when_asked(monkeypatch):
     bar = {"name": "hits", "value": 1.0, "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": False}
-    monkeypatch.setattr("steerclear.experiments.results.ablation_bars", lambda rows, separation_m: [bar])
+    monkeypatch.setattr("steerclear.experiments.runs.results.ablation_bars", lambda rows, separation_m: [bar])
     arguments = ["ablate", "--opponents", "hold", "--games", "1", "--max-time", "1", "--jobs", "1"]
     assert run(*arguments, "--out", "a").exit_code == ExitCode.OK
     assert run(*arguments, "--out", "b", "--check").exit_code == ExitCode.BAR_FAILED

@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
-from steerclear.experiments import cli, markdown, page, plot_text
+from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode, err, out
-from steerclear.experiments.faults import fault_words, machine_words
-from steerclear.experiments.tables import titled
+from steerclear.experiments.report import markdown, page, plot_text
+from steerclear.experiments.report.tables import titled
+from steerclear.experiments.runs.faults import fault_words, machine_words
 from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
 from steerclear.shield.visible import is_drawn, visible
 from typer.testing import CliRunner
@@ -108,7 +109,7 @@ import sys
 from steerclear.experiments.terminal import prepare
 prepare()
 from steerclear.experiments.commands.console import out, err
-from steerclear.experiments.tables import titled
+from steerclear.experiments.report.tables import titled
 for console in (out(), err()):
     console.print(titled("54° → ⚑", ["", "≥"], [["\\u2800\\u28ff", "\\ud800…"]]))
 """
@@ -197,7 +198,7 @@ def test_what_the_machine_refuses_is_no_fault(error, words, monkeypatch):
 
 def test_a_fault_whose_file_cannot_be_written_is_told(monkeypatch):
     monkeypatch.setattr(
-        "steerclear.experiments.faults.tempfile.NamedTemporaryFile", lambda *a, **k: fails(OSError(28, "full"))("")
+        "steerclear.experiments.runs.faults.tempfile.NamedTemporaryFile", lambda *a, **k: fails(OSError(28, "full"))("")
     )
     assert "could not be written (full)" in fault_words(RuntimeError("x"))
     assert machine_words(RuntimeError("x")) == ""

@@ -14,14 +14,14 @@ from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
-from ...new_file import check_new, check_place, make_folder_of
-from ...store import told_settings
+from ...runs.new_file import check_new, check_place, make_folder_of
+from ...runs.store import told_settings
 from ..checking import check_entry
 from ..team import EntryTeam
 from .facts import facts_for
 from .package import code, data, renamed
 
-TEMPLATE = Path(__file__).parent.parent.parent / "templates" / "shielded_solution.txt"
+TEMPLATE = Path(__file__).parent.parent.parent / "report" / "templates" / "shielded_solution.txt"
 PREFIX = "steerclear_"
 """Of private packages' names; the rest tells one content from another, so that two zips can meet in one process."""
 MARK = "crew.py"

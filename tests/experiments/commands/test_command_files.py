@@ -11,7 +11,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.commands.ablate import ablate
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.files import check_apart, check_files, check_json_file, written_by
-from steerclear.experiments.new_file import check_new
+from steerclear.experiments.runs.new_file import check_new
 from steerclear.policies.entrants.learned.entered import FILES
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from steerclear.env.record import read_meta, validate
-from steerclear.experiments import cli, keys
+from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, campaign, draw, play
 from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
@@ -15,6 +15,7 @@ from steerclear.experiments.encounters.replays import record_of, records_of
 from steerclear.experiments.encounters.results import bars_of, cells_table
 from steerclear.experiments.encounters.scene_file import write_scene
 from steerclear.experiments.encounters.worst import worst_encounters
+from steerclear.experiments.report import keys
 from typer.testing import CliRunner
 
 USUAL = Conditions()

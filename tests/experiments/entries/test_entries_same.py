@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steerclear import policies
-from steerclear.experiments import match
 from steerclear.experiments.entries import limits
 from steerclear.experiments.entries import team as entry_team
 from steerclear.experiments.entries.answers import Unreadable, from_plain, to_plain
 from steerclear.experiments.entries.packing import Packer, Unpacker
 from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
-from steerclear.experiments.match import play_match
-from steerclear.experiments.spec import MatchSpec
+from steerclear.experiments.play import match
+from steerclear.experiments.play.match import play_match
+from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield.exceptions import PolicyError
 
 DICE = """

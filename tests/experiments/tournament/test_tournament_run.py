@@ -7,8 +7,8 @@ import textwrap
 import time
 
 import pytest
-from steerclear.experiments.keys import KEYS, undocumented
-from steerclear.experiments.store import ResultStore
+from steerclear.experiments.report.keys import KEYS, undocumented
+from steerclear.experiments.runs.store import ResultStore
 from steerclear.experiments.tournament import campaign as played
 from steerclear.experiments.tournament.campaign import Tournament
 from steerclear.experiments.tournament.keys import TOURNAMENT_GAME

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands import train
-from steerclear.experiments.folder_lock import _HELD
+from steerclear.experiments.runs.folder_lock import _HELD
 from steerclear.experiments.training.ids import make_learners
 from steerclear.experiments.training.settings import settings_of
 from steerclear.policies.submissions.made_for import made_for

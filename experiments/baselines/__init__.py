@@ -1,0 +1,1 @@
+"""Guards of other people's that the shield is compared with."""

@@ -1,0 +1,1 @@
+"""One game: its settings, its seats, its shields, the water it is played on, and what is recorded."""

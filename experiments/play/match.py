@@ -1,0 +1,285 @@
+"""Playing one game and counting what happened in it."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import Record, absolute_commands, find_breaches
+from steerclear.env.record_meta import meta_of
+from steerclear.policies.registry import KEYBOARD
+from steerclear.shield.exceptions import GameError, SteerclearError
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
+
+from ..entries.team import make_team
+from ..measure.judging import StateLog, judge_game
+from ..measure.score import scores
+from ..measure.tally import reason_counts, tally
+from ..measure.verdicts import verdict_columns
+from .openings import opening
+from .playing_env import PlayingEnv, live_view, read_infos
+from .seat import Failures, Seat
+from .shielding import Seen, Shielding, shield_game
+from .spec import SIDES, MatchSpec
+from .tape import Tape
+
+Watcher = Callable[[MctfEnv], bool]
+"""Called after every step with the env; False ends the game early (a closed window)."""
+
+
+@dataclass(frozen=True)
+class MatchResult:
+    """One game.
+
+    Attributes:
+        spec: what was to be played.
+        row: flat columns, as `keys.GAME_COLUMNS` describes them.
+        record: everything that happened, see `steerclear.env.record`.
+    """
+
+    spec: MatchSpec
+    row: dict[str, Any]
+    record: Record
+
+
+class Match:
+    """A game being played.
+
+    Args:
+        spec: what to play.
+        render_mode: of the env; None draws nothing.
+        speedup: times faster than the game that a window goes at most.
+
+    Raises:
+        SteerclearError: a setting or policy of the spec is unusable.
+    """
+
+    def __init__(self, spec: MatchSpec, render_mode: str | None = None, speedup: float = 1.0) -> None:
+        self.spec = spec
+        self.speedup = speedup
+        self.env = PlayingEnv(spec.config(), render_mode=render_mode)
+        self.shielding: Shielding = shield_game(self.env, spec)
+        ids = self.env.possible_agents
+        size = self.env.config.team_size
+        names = [spec.own, spec.opponent] if spec.side == "blue" else [spec.opponent, spec.own]
+        self.names = dict(zip(SIDES, names, strict=True))
+        self.teams = [
+            Seat(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
+        ]
+        self._tape: Tape | None = None
+        self._log = StateLog() if spec.judged else None
+        self._decision_us: list[float] = []
+        self._moment: tuple[Array, Array, Seen] | None = None
+
+    def play(self, watcher: Watcher | None = None) -> MatchResult:
+        """Play to the end.
+
+        Args:
+            watcher: called after every step.
+        """
+        started = time.perf_counter()
+        observations, infos = self._start()
+        while self.env.agents:
+            actions = self.teams[0].act(observations, infos) | self.teams[1].act(observations, infos)
+            observations, _, _, _, infos = self._step(actions)
+            self._record_step()
+            if watcher is not None and not watcher(self.env):
+                break
+        return self._result(time.perf_counter() - started)
+
+    def seat(self, team: int, policy: Any) -> None:
+        """Let a policy object play a team, 0 blue or 1 red, in place of the named one; before the game begins."""
+        size = self.env.config.team_size
+        self.teams[team].close()
+        self.teams[team] = Seat(policy, self.env, self.env.possible_agents[team * size : (team + 1) * size])
+
+    def close(self) -> None:
+        """Close the window and let the policies give back what they hold."""
+        for team in self.teams:
+            team.close()
+        self.env.close()
+
+    def _start(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        spec = self.spec
+        self.env.tells = read_infos(seat.policy for seat in self.teams)
+        options = None if spec.fixed_start else {"init_dict": opening(self.env.config, spec.seed)}
+        answer = self.shielding.env.reset(seed=spec.seed, options=options)
+        self.shielding.listen(self._note_commands)
+        for number, team in enumerate(self.teams):
+            team.reset(self.shielding.env, 2 * spec.seed + number)
+        meta = self._meta()
+        self._tape = Tape(live_view(self.env.core), meta)
+        if self._log is not None:
+            self._log.start(self.env.core)
+        if self.env.renderer is not None:
+            from steerclear.env.render import Arena  # draws with pygame: only where there is a window
+
+            self.env.renderer.describe(replace(Arena.from_meta(meta), steered=self._steered()))
+            self.env.renderer.speedup = self.speedup
+        return answer
+
+    def _step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
+        try:
+            return self.shielding.step(actions)
+        except GameError:  # an answer the game refuses; nothing has moved yet
+            self._moment = None
+            mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
+            return self.shielding.step(mended)
+
+    def _meta(self) -> dict[str, Any]:
+        return meta_of(
+            self.env.config,
+            separation_m=self.shielding.separation_m,
+            policies=self.names,
+            shielded=self.shielding.agent_ids,
+            seed=self.spec.seed,
+            reason_names=self.shielding.reason_names,
+            title=self._title(),
+        )
+
+    def _steered(self) -> frozenset[str]:
+        """Boats that a human steers: the first of a team whose policy is the keyboard."""
+        size = self.env.config.team_size
+        first = zip(self.names.values(), self.env.possible_agents[::size], strict=True)
+        return frozenset(agent for name, agent in first if name == KEYBOARD)
+
+    def _title(self) -> str:
+        """Who plays, under which conditions; the usual title where there are none."""
+        conditions = self.spec.conditions.words
+        return f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else ""
+
+    def _note_commands(self, wanted: Array, sent: Array) -> None:
+        if self._moment is not None:  # an earlier step of motion of the same decision is over
+            self._record_step()
+        heading_deg = self.env.core.state[0, :, L.HEADING]
+        commands = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
+        seen = self.shielding.read()
+        self._moment = (*commands, seen)
+        if self.env.renderer is not None:
+            from steerclear.env.render import Overlay  # draws with pygame: only where there is a window
+
+            self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.certificate_m)
+
+    def _record_step(self) -> None:
+        if self._moment is None or self._tape is None:
+            raise SteerclearError("the game moved without asking for commands; build the Match anew")
+        wanted, sent, seen = self._moment
+        self._tape.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        if self._log is not None:
+            self._log.step(self.env.core)
+        if seen.solve_time_s is not None:
+            self._decision_us.append(1e6 * seen.solve_time_s)
+        self._moment = None
+
+    def _result(self, wall_s: float) -> MatchResult:
+        assert self._tape is not None  # _start() made it
+        record = self._tape.finish()
+        record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
+        return MatchResult(self.spec, self._row(record, wall_s), record)
+
+    def _row(self, record: Record, wall_s: float) -> dict[str, Any]:
+        spec = self.spec
+        counts = {**self._events(), **tally(record, spec.own_team, spec.radii_m)}
+        own, opponent = (self.teams[k].failures() for k in (spec.own_team, 1 - spec.own_team))
+        return {
+            **self._header(record),
+            **counts,
+            **scores(counts, spec.penalty),
+            **self._decision_columns(),
+            **{f"reason_{name}": count for name, count in reason_counts(record, spec.own_team).items()},
+            **_failure_columns(own, opponent),
+            **self._verdict_columns(record),
+            "wall_s": wall_s,
+        }
+
+    def _header(self, record: Record) -> dict[str, Any]:
+        spec, steps = self.spec, len(record["wanted"])
+        return {
+            "pairing": spec.pairing,
+            "game": spec.game,
+            "shielded": spec.shield is not None,
+            **{name: getattr(spec, name) for name in ("preset", "own", "opponent", "side", "seed", "penalty")},
+            **dict(zip(("own_files", "opponent_files"), spec.files, strict=True)),
+            "steps": steps,
+            "duration_s": steps * self.env.config.dt_s,
+        }
+
+    def _events(self) -> dict[str, int]:
+        core, own = self.env.core, self.spec.own_team
+        return {
+            name + suffix: int(getattr(core, name)[0, team])
+            for name in ("captures", "grabs", "tags")
+            for suffix, team in (("", own), ("_against", 1 - own))
+        }
+
+    def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
+        """Judge the breaches of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
+        if self._log is None:
+            return None
+        return judge_game(self._log, self.env.core.params, record, team, self.shielding.motion)
+
+    def _verdict_columns(self, record: Record) -> dict[str, Any]:
+        breaches = self.breaches(record, self.spec.own_team)
+        return {**verdict_columns(breaches, self.shielding.separation_m), "breaches": breaches}
+
+    def _decision_columns(self) -> dict[str, float | None]:
+        timed = self._decision_us[1:]  # the first one loads compiled code
+        if not timed:
+            return {"decision_p50_us": None, "decision_p99_us": None, "decision_max_us": None}
+        p50, p99, most = np.quantile(timed, [0.5, 0.99, 1.0])
+        return {"decision_p50_us": float(p50), "decision_p99_us": float(p99), "decision_max_us": float(most)}
+
+
+def _teams(spec: MatchSpec, names: Sequence[str]) -> list[Any]:
+    """The policies; those built before one that cannot be are closed."""
+    with contextlib.ExitStack() as stack:
+        teams = []
+        for name in names:
+            teams.append(make_team(name, spec.game, spec.trust, spec.answer_s))
+            if hasattr(teams[-1], "close"):
+                stack.callback(teams[-1].close)
+        stack.pop_all()
+    return teams
+
+
+def play_match(
+    spec: MatchSpec, watcher: Watcher | None = None, render_mode: str | None = None, speedup: float = 1.0
+) -> MatchResult:
+    """Play one game.
+
+    Args:
+        spec: what to play.
+        watcher: called after every step with the env; False ends the game.
+        render_mode: "human" shows a window.
+        speedup: times faster than the game that a window goes at most.
+
+    Raises:
+        SteerclearError: a setting or policy of the spec is unusable. A policy that fails later does not end the game.
+    """
+    match = Match(spec, render_mode, speedup)
+    try:
+        return match.play(watcher)
+    finally:
+        match.close()
+
+
+def play_row(spec: MatchSpec) -> dict[str, Any]:
+    """Play one game and return its row alone, small enough to travel between processes by the thousand."""
+    return play_match(spec).row
+
+
+def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:
+    texts = [f"own: {text}" for text in own.texts] + [f"opponent: {text}" for text in opponent.texts]
+    return {
+        "policy_failures": own.count,
+        "opponent_policy_failures": opponent.count,
+        "policy_usable_steps": own.usable_steps,
+        "opponent_policy_usable_steps": opponent.usable_steps,
+        "first_failure": texts[0] if texts else None,
+    }

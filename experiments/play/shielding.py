@@ -1,0 +1,156 @@
+"""Putting shields on a game and reading off what they did."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.core import BatchedMctf
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.record import NOT_COVERED
+from steerclear.shield import Reason, Shield, ShieldConfig, game_facts
+from steerclear.shield.jit import Array
+from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
+
+from ..measure.tally import RADII_M
+from ..oracle import AT_ONCE, Motion
+from .sea import Sea
+from .spec import SIDES, MatchSpec
+
+NOBODY_NEAR_M = 1e5
+"""Margins beyond this say that nobody is near; there is no certificate to show."""
+Listener = Callable[[Array, Array], None]
+"""Called before the boats move with the commands (1, n, 2) wanted and those sent."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the shields did in a step, for all n boats; `solve_time_s` is None where there is no shield."""
+
+    reason: NDArray[np.uint8]
+    intervened: NDArray[np.bool_]
+    certificate_m: NDArray[np.float32]
+    solve_time_s: float | None
+
+
+@dataclass
+class Shielding:
+    """A game's env with its shields.
+
+    Attributes:
+        inner: the game itself.
+        env: what to step: the game or the outermost wrapper.
+        wrappers: one per shielded team.
+        agent_ids: boats that a shield decides for.
+        separation_m: radius the own shield keeps (the default's without one), m.
+        reason_names: names of the reason codes, by code.
+        sea: the conditions at work; None where there are none.
+    """
+
+    inner: MctfEnv
+    env: Any
+    wrappers: list[ShieldedParallelEnv] = field(default_factory=list)
+    agent_ids: list[str] = field(default_factory=list)
+    separation_m: float = RADII_M[0]
+    reason_names: list[str] = field(default_factory=list)
+    sea: Sea | None = None
+    _listener: Listener | None = None
+    _commands: Array | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """What the oracle has to know of the conditions."""
+        return AT_ONCE if self.sea is None else self.sea.motion
+
+    def listen(self, listener: Listener) -> None:
+        """Hear of every step's commands, before and after the shields; call once per game, after reset.
+
+        The conditions come after that: commands are heard when they are given, however late they take effect.
+        """
+        self._listener = listener
+        self.inner.command_filter = self._wanted
+        if self.sea is not None:
+            self.sea.begin()
+
+    def step(self, actions: Mapping[str, Any]) -> tuple[Any, ...]:
+        """One step of the game, with its shields and conditions."""
+        with self.inner.filtered(self._sent):  # the first to be entered is the last to be asked
+            return self.env.step(actions)
+
+    def _wanted(self, core: BatchedMctf, commands: Array) -> Array:
+        """Stands before the shields."""
+        if self.sea is not None:
+            self.sea.look(core)
+        self._commands = commands.copy()
+        return commands
+
+    def _sent(self, core: BatchedMctf, commands: Array) -> Array:
+        """Stands behind them."""
+        if self._listener is not None and self._commands is not None:
+            self._listener(self._commands, commands)
+        return commands if self.sea is None else self.sea.carry(core, commands)
+
+    def read(self) -> Seen:
+        """Collect what the shields decided last."""
+        n = len(self.inner.possible_agents)
+        seen = Seen(np.full(n, NOT_COVERED, np.uint8), np.zeros(n, bool), np.full(n, np.nan, np.float32), None)
+        times_s = []
+        for wrapper in self.wrappers:
+            decisions = wrapper.decisions
+            if decisions is None:
+                continue
+            own = decisions.reason != NOT_COVERED
+            seen.reason[own] = decisions.reason[own]
+            seen.intervened[own] = decisions.intervened[own]
+            margin_m = decisions.certificate_m[own]
+            seen.certificate_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
+            times_s.append(decisions.solve_time_s)
+        return Seen(seen.reason, seen.intervened, seen.certificate_m, max(times_s, default=None))
+
+
+def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
+    """Put the shields of a spec on a game, told of its conditions where their settings do not say otherwise.
+
+    Only the own team's commands come late, so only its shield is told of the delay.
+
+    Raises:
+        ConfigError: a setting of a shield is unknown or out of range, or conditions that the game cannot have.
+    """
+    # the library warns of a shield that keeps less than the game's distance; here hits are counted at both
+    logging.getLogger(game_facts.__name__).setLevel(logging.ERROR)
+    shielding = Shielding(env, env)
+    if not spec.conditions.calm:
+        shielding.sea = Sea(env, spec.conditions, spec.seed, spec.own_team)
+    for side, settings in _settings_by_side(spec).items():
+        if settings is not None:
+            told = spec.conditions if side == spec.side else replace(spec.conditions, delay_s=0.0)
+            _add(shielding, side, {**told.shield_settings(env.config.dt_s), **settings}, spec.shield_autopilot)
+    given = spec.shield if spec.shield is not None else spec.opponent_shield
+    if given is not None:
+        shielding.separation_m = float(given.get("separation_m", RADII_M[0]))
+    return shielding
+
+
+def _settings_by_side(spec: MatchSpec) -> dict[str, Mapping[str, Any] | None]:
+    other = SIDES[1 - spec.own_team]
+    return {spec.side: spec.shield, other: spec.opponent_shield}
+
+
+def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
+    config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, "separation_m": RADII_M[0], **settings})
+    reader = None if shielding.sea is None else shielding.sea.reader()
+    wrapped = ShieldedParallelEnv(shielding.env, Shield(config), side, shield_autopilot, reader=reader)
+    shielding.env = wrapped
+    shielding.wrappers.append(wrapped)
+    shielding.reason_names = [reason.name for reason in Reason]
+    shielding.agent_ids += _boats_of(shielding.inner, side)
+
+
+def _boats_of(env: MctfEnv, side: str) -> Sequence[str]:
+    size = env.config.team_size
+    first = size * SIDES.index(side)
+    return env.possible_agents[first : first + size]

@@ -1,0 +1,147 @@
+"""What a game is to be, complete enough to be played again to the bit: a `MatchSpec`."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from steerclear.env.config import GameConfig
+from steerclear.shield.exceptions import ConfigError
+
+from ..measure.judging import check_judge
+from ..measure.score import DEFAULT_PENALTY
+from ..measure.tally import RADII_M
+from ..runs.store import key_of
+from .conditions import CALM, Conditions
+
+SIDES = ("blue", "red")
+LARGEST_SEED = 2**62
+"""Seeds of games count up from that of a run: all of them are whole numbers of 64 bits, as tables hold."""
+ANSWER_S, MOST_ANSWER_S = 10.0, 86_400.0
+"""Time a policy from a file has for the actions of a step, and the longest that can be given, s."""
+
+
+@dataclass(frozen=True)
+class MatchSpec:
+    """One game between two policies, described by plain values that travel to other processes and into JSON.
+
+    Attributes:
+        preset: rules of the game.
+        own: policy of the team whose results are counted: a registered name or a submission's path.
+        opponent: policy of the other team.
+        game: number of the game within its pairing; the same number is played with and without the shield.
+        seed: of the start places and of both policies.
+        side: colour of the own team.
+        shield: settings of the own team's shield (`ShieldConfig`), None for no shield.
+        opponent_shield: likewise for the other team.
+        shield_autopilot: the shield also covers boats that the game itself drives (tagged, out of bounds).
+        rules: settings of the game that replace the preset's.
+        fixed_start: start on the preset's fixed places instead of random ones.
+        penalty: weight of a collision in the primary score.
+        radii_m: radii at which breaches are counted.
+        judge: whose breaches the oracle judges, see `judging.JUDGE`.
+        conditions: delay, position noise and current, the same with a shield and without.
+        files: digests of both policies' files (`policies.fingerprint`), own and opponent; empty where there are none.
+        trust: also load models that lie among entries of others, see `policies.load_sb3`.
+        answer_s: time a policy from a file has for the actions of a step, s.
+    """
+
+    preset: str
+    own: str
+    opponent: str
+    game: int = 0
+    seed: int = 0
+    side: str = "blue"
+    shield: Mapping[str, Any] | None = None
+    opponent_shield: Mapping[str, Any] | None = None
+    shield_autopilot: bool = True
+    rules: Mapping[str, Any] = field(default_factory=dict)
+    fixed_start: bool = False
+    penalty: float = DEFAULT_PENALTY
+    radii_m: tuple[float, ...] = RADII_M
+    judge: str = "shielded"
+    conditions: Conditions = CALM
+    files: tuple[str, str] = ("", "")
+    trust: bool = False
+    answer_s: float = ANSWER_S
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        check_side(self.side)
+        check_judge(self.judge)
+        if not 0.0 < self.answer_s <= MOST_ANSWER_S:
+            raise ConfigError(f"--answer-time must be above 0 and at most {MOST_ANSWER_S:g} s; got {self.answer_s:g}")
+
+    @property
+    def pairing(self) -> str:
+        """Name of the pairing."""
+        return f"{self.own} vs {self.opponent}"
+
+    @property
+    def own_team(self) -> int:
+        """0 when the own team is blue, 1 when it is red."""
+        return SIDES.index(self.side)
+
+    @property
+    def key(self) -> str:
+        """Short name that two specs share exactly when they describe the same game, however its breaches are judged."""
+        beside = {"judge"}
+        beside |= {"conditions"} if self.conditions.calm else set()
+        beside |= set() if any(self.files) else {"files"}
+        return key_of({name: value for name, value in asdict(self).items() if name not in beside})
+
+    @property
+    def judged(self) -> bool:
+        """Whether the oracle judges this game's breaches."""
+        shielded = self.shield is not None or self.opponent_shield is not None
+        return self.judge == "all" or (self.judge == "shielded" and shielded)
+
+    def config(self) -> GameConfig:
+        """Build the game's settings.
+
+        Raises:
+            ConfigError: the preset or a setting is unknown or out of range.
+        """
+        return GameConfig.preset(self.preset, **self.rules)
+
+
+def check_seed(seed: int) -> None:
+    """Refuse seeds that no random numbers can be drawn from, or whose games' seeds no record or table can hold.
+
+    Raises:
+        ConfigError: a negative one, or one beyond `LARGEST_SEED`.
+    """
+    if seed < 0:
+        raise ConfigError(f"--seed must be 0 or more; got {seed}")
+    if seed > LARGEST_SEED:
+        raise ConfigError(f"--seed must be at most {LARGEST_SEED}; got {seed}")
+
+
+def check_count(option: str, number: int, low: int, high: int) -> None:
+    """Refuse a number of things that are none, or too many to be listed.
+
+    Raises:
+        ConfigError: it is not from ``low`` to ``high``.
+    """
+    if not low <= number <= high:
+        raise ConfigError(f"{option} must be at least {low} and at most {high:,}; got {number:,}")
+
+
+def check_side(side: str) -> str:
+    """Return the side.
+
+    Raises:
+        ConfigError: neither blue nor red.
+    """
+    if side not in SIDES:
+        raise ConfigError(f"unknown side {side!r}; {near(side, SIDES)}")
+    return side
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """Say which known names are like ``name``, or all of them when none is."""
+    names = list(known)
+    matches = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    return f"did you mean {', '.join(matches)}?" if matches else f"choose one of {', '.join(names)}"

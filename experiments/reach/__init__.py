@@ -1,0 +1,1 @@
+"""Sets from which no shield, or not this one, saves a boat: promised, played, shown."""

@@ -1,0 +1,127 @@
+"""Conditions as settings: on the command line, in results, reports and pages, and when a run is resumed."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.experiments import cli
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.measure.ablation import AblationSettings
+from steerclear.experiments.play.conditions import CALM, Conditions, draw, words_of, words_of_settings
+from steerclear.experiments.play.spec import MatchSpec
+from steerclear.experiments.report import keys
+from steerclear.experiments.report.docs_pages import write_pages
+from steerclear.experiments.runs.campaign import Campaign
+from steerclear.experiments.runs.store import ResultStore
+from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
+
+ROUGH = Conditions(delay_s=0.3, noise_m=0.5, current_mps=0.3)
+TINY = ["--opponents", "hold", "--games", "1", "--max-time", "2", "--jobs", "1"]
+GIVEN = ["--delay", "0.3", "--noise", "0.5", "--current", "0.3"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("name", ["delay_s", "noise_m", "current_mps"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -0.1, 1e9, True, "0.3", None])
+def test_values_that_no_game_can_have_are_refused(name, value):
+    with pytest.raises(ConfigError, match=f"{name} is .*; give a number from 0 to "):
+        Conditions(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "steps"), [(0.0, 0), (0.01, 1), (0.1, 1), (0.3, 3), (0.31, 4), (0.7, 7), (2.0, 20)]
+)
+def test_a_delay_is_whole_steps_rounded_up(delay_s, steps):
+    assert Conditions(delay_s=delay_s).delay_steps(0.1) == steps
+
+
+def test_what_a_shield_is_told():
+    assert ROUGH.shield_settings(0.1) == {
+        "delay_s": pytest.approx(0.3),
+        "position_error_m": 0.5,
+        "current_mps": 0.3,
+    }
+    assert CALM.shield_settings(0.1) == {}
+
+
+def test_words():
+    assert ROUGH.words == "0.3 s delay, 0.5 m position noise, 0.3 m/s current"
+    assert (CALM.words, CALM.calm, ROUGH.calm) == ("", True, False)
+    assert words_of({"noise_m": 1, "radius_m": 2.5}) == "1 m position noise"
+
+
+def test_draws_are_a_direction_and_a_seed():
+    first, again, other = (draw(np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert first == again != other
+    assert np.hypot(*first[0]) == pytest.approx(1.0)
+
+
+def test_games_under_other_conditions_are_other_games(tmp_path):
+    spec = MatchSpec("aamas2024", "medium", "easy")
+    others = [Conditions(delay_s=0.3), Conditions(noise_m=0.3), Conditions(current_mps=0.3)]
+    assert len({spec.key, *(replace(spec, conditions=entry).key for entry in others)}) == 4
+    settings = AblationSettings(opponents=("hold",), games=1, rules={"max_time_s": 2.0}, conditions=ROUGH)
+    Campaign(settings.specs(), ResultStore(tmp_path)).run()
+    for conditions, resumed in ((ROUGH, 2), (CALM, 0), (replace(ROUGH, delay_s=0.2), 0)):
+        specs = replace(settings, conditions=conditions).specs()
+        assert Campaign(specs, ResultStore(tmp_path, resume=True)).so_far().resumed == resumed
+
+
+def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run("ablate", *TINY, *GIVEN, "--out", "out")
+    assert done.exit_code == ExitCode.OK, done.output
+    assert f"All games with {ROUGH.words}." in done.stdout
+    content = json.loads(Path("out/results.json").read_text())
+    assert keys.undocumented(content, keys.RESULTS) == []
+    assert content["settings"]["conditions"] == {"delay_s": 0.3, "noise_m": 0.5, "current_mps": 0.3}
+    assert content["replay"]["same_as_played"] is True
+    report = Path("out/report.html").read_text()
+    assert ROUGH.words in report
+    assert ROUGH.words in Path("out/replay.html").read_text()
+    again = run("ablate", *TINY, *GIVEN, "--out", "out", "--resume")
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 2, again.output
+    calm = run("ablate", *TINY, "--out", "out", "--resume")
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 0, calm.output
+    pages = [path.name for path in write_pages([content], tmp_path / "docs")]
+    assert "ablation_aamas2024_delay0.3_noise0.5_current0.3.md" in pages
+    page = tmp_path / "docs" / "ablation_aamas2024_delay0.3_noise0.5_current0.3.md"
+    assert f"under {ROUGH.words}," in page.read_text()
+
+
+def test_evaluate_and_play_take_them_too(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run("evaluate", "medium", *TINY, *GIVEN, "--out", "out", "--shield")
+    assert done.exit_code == ExitCode.OK, done.output
+    played = run("play", "--opponent", "hold", "--max-time", "2", *GIVEN, "--json", "a.json")
+    assert played.exit_code == ExitCode.OK, played.output
+    content = json.loads(Path("a.json").read_text())
+    assert content["settings"]["conditions"]["delay_s"] == 0.3
+    assert keys.undocumented(content, keys.PLAY) == []
+
+
+@pytest.mark.parametrize("command", [["ablate"], ["evaluate", "medium"], ["play"]])
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--delay", "nan"), ("--noise", "-1"), ("--current", "1e9"), ("--delay", "inf"), ("--current", "1.5")],
+)
+def test_bad_input_is_one_error_with_its_remedy(command, option, value, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    done = run(*command, option, value)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert done.stderr.count("error") <= 1
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "; give " in done.stderr
+    assert not (tmp_path / "results").exists()
+
+
+def test_settings_of_a_shield_in_words():
+    assert words_of_settings({}) == ""
+    assert words_of_settings({"separation_m": 4.0, "barriers": ["a", "b"]}) == "separation_m 4.0, barriers a+b"

@@ -1,0 +1,192 @@
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.record import read_meta
+from steerclear.experiments.play.match import Match, play_match
+from steerclear.experiments.play.openings import GAP_M, opening
+from steerclear.experiments.play.spec import MatchSpec
+from steerclear.experiments.runs.store import key_of
+from steerclear.shield.exceptions import ConfigError, SteerclearError
+
+SHORT = {"max_time_s": 6.0}
+
+
+def spec_of(own="medium", opponent="easy", **settings):
+    return MatchSpec("aamas2024", own, opponent, rules=settings.pop("rules", SHORT), **settings)
+
+
+@pytest.fixture
+def custom(monkeypatch):
+    """Policies by name that a test makes up."""
+    made, make = {}, policies.make
+    monkeypatch.setattr(policies, "make", lambda name, **kw: made[name]() if name in made else make(name, **kw))
+    return made
+
+
+class Made:
+    """A policy whose answers a function gives."""
+
+    name = "made"
+
+    def __init__(self, answer):
+        self.answer = answer
+        self.step = 0
+
+    def reset(self, env, agent_ids, seed):
+        self.ids = list(agent_ids)
+
+    def act(self, observations, infos):
+        self.step += 1
+        return {agent_id: self.answer(self.step, agent_id) for agent_id in self.ids}
+
+
+def test_a_game_without_a_shield_is_counted_and_recorded():
+    result = play_match(spec_of())
+    row, meta = result.row, read_meta(result.record)
+    assert (row["steps"], row["duration_s"]) == (60, pytest.approx(6.0))
+    assert (row["shielded"], row["covered_steps"], row["decision_p50_us"]) == (False, 0, None)
+    assert result.record["position"].shape == (61, 6, 2)
+    assert meta["policies"] == {"blue": "medium", "red": "easy"}
+    assert meta["shielded"] == []
+    np.testing.assert_array_equal(result.record["wanted"], result.record["sent"])
+
+
+def test_a_shielded_game_covers_one_team_and_times_its_decisions():
+    result = play_match(spec_of(shield={}, side="red"))
+    reason = result.record["reason"]
+    assert read_meta(result.record)["shielded"] == ["agent_3", "agent_4", "agent_5"]
+    assert (reason[:, :3] == 6).all()
+    assert (reason[:, 3:] != 6).all()
+    assert result.row["covered_steps"] == 3 * 60
+    assert result.row["decision_p50_us"] > 0.0
+    assert sum(count for name, count in result.row.items() if name.startswith("reason_")) == 180
+
+
+def test_the_same_spec_is_the_same_game_to_the_bit_and_another_seed_is_not():
+    first, again = play_match(spec_of(shield={})), play_match(spec_of(shield={}))
+    for name, array in first.record.items():
+        np.testing.assert_array_equal(array, again.record[name])
+    other = play_match(spec_of(shield={}, seed=1))
+    assert not np.array_equal(first.record["position"], other.record["position"])
+
+
+def test_the_record_and_the_game_agree_on_collisions():
+    match = Match(spec_of("rammer", "rammer", rules={"max_time_s": 40.0}))
+    row = match.play().row
+    team = match.env.core.collisions[0, :3]
+    assert row["collisions"] == team.sum() > 0
+
+
+def test_off_and_on_start_from_the_same_places():
+    off, on = play_match(spec_of(seed=3)), play_match(spec_of(seed=3, shield={}))
+    np.testing.assert_array_equal(off.record["position"][0], on.record["position"][0])
+    np.testing.assert_array_equal(off.record["heading_deg"][0], on.record["heading_deg"][0])
+
+
+def test_a_shield_changes_commands_and_keeps_rammers_off():
+    off = play_match(spec_of("rammer", "rammer", rules={"max_time_s": 40.0}))
+    on = play_match(spec_of("rammer", "rammer", rules={"max_time_s": 40.0}, shield={}))
+    assert off.row["breaches_opponent_2.5m"] > on.row["breaches_opponent_2.5m"]
+    assert on.row["changed_steps"] > 0
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (lambda step, agent_id: 1 // (step != 3) * 16, "ZeroDivisionError"),
+        (lambda step, agent_id: (float("nan"), 0.0) if step == 3 else 16, "not finite"),
+        (lambda step, agent_id: 99 if step == 3 else 16, "out of range"),
+        (lambda step, agent_id: "NOWHERE" if step == 3 else 16, "unknown field point"),
+    ],
+)
+def test_a_policy_that_fails_mid_game_does_not_end_it(custom, answer, words, caplog):
+    custom["made"] = lambda: Made(answer)
+    row = play_match(spec_of("made", "made", side="red")).row
+    assert row["steps"] == 60
+    assert row["policy_failures"] >= 1
+    assert row["opponent_policy_failures"] >= 1
+    assert "step 3" in row["first_failure"]
+    assert words in row["first_failure"]
+    assert "its boats hold" in caplog.text
+
+
+def test_a_policy_that_forgets_a_boat_or_answers_no_dict_holds(custom, caplog):
+    custom["made"] = lambda: type("Short", (Made,), {"act": lambda self, observations, infos: {}})(None)
+    custom["none"] = lambda: type("None_", (Made,), {"act": lambda self, observations, infos: None})(None)
+    row = play_match(spec_of("made", "none")).row
+    assert (row["policy_failures"], row["opponent_policy_failures"]) == (60, 60)
+    assert "KeyError" in row["first_failure"]
+
+
+def test_a_submission_that_raises_is_reported(tmp_path, caplog):
+    (tmp_path / "solution.py").write_text(
+        "class solution:\n"
+        "    def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):\n"
+        "        raise RuntimeError('sunk')\n"
+    )
+    row = play_match(spec_of(str(tmp_path), "easy", shield={})).row
+    assert row["policy_failures"] == 3 * 60
+    assert "sunk" in row["first_failure"]
+
+
+def test_a_watcher_may_end_the_game():
+    seen = []
+
+    def watch(env):
+        seen.append(float(env.core.time_s[0]))
+        return len(seen) < 5
+
+    assert play_match(spec_of(), watch).row["steps"] == 5
+    assert seen == sorted(seen)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"own": "nobody"}, {"rules": {"max_tme_s": 3}}, {"shield": {"separation": 3}}, {"shield": {"separation_m": -1.0}}],
+)
+def test_an_unusable_spec_is_refused(settings):
+    with pytest.raises(SteerclearError):
+        play_match(replace(spec_of(), **settings))
+
+
+def test_an_unknown_side_is_refused():
+    with pytest.raises(ConfigError, match="did you mean blue"):
+        spec_of(side="bleu")
+
+
+def test_a_spec_travels_through_json_and_its_key_names_the_game():
+    spec = spec_of(shield={"separation_m": 3.0})
+    beside = ("judge", "conditions", "files")  # which, when there are none, leave a game what it was
+    plain = {name: value for name, value in json.loads(json.dumps(asdict(spec))).items() if name not in beside}
+    assert spec.key == spec_of(shield={"separation_m": 3.0}).key == key_of(plain)
+    assert len({spec.key, spec_of().key, replace(spec, seed=9).key, replace(spec, penalty=0.0).key}) == 4
+    assert replace(spec, judge="all").key == spec.key
+    assert replace(spec, files=("12ab", "")).key not in (spec.key, replace(spec, files=("", "12ab")).key)
+
+
+@pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
+@pytest.mark.parametrize("seed", range(5))
+def test_openings_leave_room(preset, seed):
+    config = GameConfig.preset(preset)
+    start = opening(config, seed)
+    places = np.array(start["agent_position"])
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(6, 1)]
+    middle = config.env_bounds_m[0] / 2
+    assert gaps.min() >= min(GAP_M, config.env_bounds_m[1] / 6)
+    assert (places[:3, 0] < middle).all()
+    assert (places[3:, 0] > middle).all()
+    assert opening(config, seed) == start != opening(config, seed + 1)
+
+
+def test_an_opening_stays_clear_of_obstacles_and_says_when_there_is_no_room():
+    polygon = ((10.0, 5.0), (30.0, 5.0), (30.0, 35.0), (10.0, 35.0))
+    config = GameConfig.preset("aamas2024", obstacles={"polygon": [polygon], "circle": [(4.0, (60.0, 20.0))]})
+    with pytest.raises(ConfigError, match="no start places found"):
+        opening(config, 0)
+    config = GameConfig.preset("aamas2024", team_size=1, obstacles={"circle": [(4.0, (20.0, 20.0))]})
+    place = np.array(opening(config, 0)["agent_position"][0])
+    assert np.linalg.norm(place - [20.0, 20.0]) > 4.0 + GAP_M

@@ -1,0 +1,161 @@
+"""The set from which the shield does not save a boat: what counts as lost, and that it is seen."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from steerclear.experiments import cli
+from steerclear.experiments.reach import played_sets, unsafe_sets
+from steerclear.experiments.reach.played_sets import PlayedSet, duels_lost, games_lost, play_set, tasks_of
+from steerclear.experiments.reach.played_sets_page import HEADS, bars_of, rows_of
+from steerclear.experiments.reach.unsafe_sets import RATIO_BAR, values_m
+from steerclear.experiments.report.docs_pages import write_pages
+from steerclear.experiments.report.keys import PLAYED_SETS, undocumented
+from steerclear.shield import ShieldConfig
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.tables.areas import area_m2
+from steerclear.shield.tables.files import load_table
+from steerclear.shield.tables.margin import full_thrust_state
+from typer.testing import CliRunner
+
+RADIUS_M = 2.5
+HEAD_ON = (180.0, 2.0, 2.0)
+BOATS = ["--own", "heron", "--other", "heron"]
+
+
+@pytest.fixture(scope="module")
+def heron():
+    return load_table("heron", "heron")
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """One pair of speeds, one heading, few positions and short games, all in this process."""
+    monkeypatch.setattr(unsafe_sets, "HEADINGS_DEG", (180.0,))
+    monkeypatch.setattr(unsafe_sets, "SPEED_SHARES", ((1.0, 1.0),))
+    monkeypatch.setattr(played_sets, "RINGS", 40)
+    monkeypatch.setattr(played_sets, "BEARINGS", 12)
+    monkeypatch.setattr(played_sets, "LONGEST_S", 6.0)
+
+
+def meeting(*places):
+    """States of two herons head on at full speed, the opponent at each place, m."""
+    platform = get_platform("heron")
+    own, other = full_thrust_state(platform, 2.0), full_thrust_state(platform, 2.0, 180.0)
+    state = np.tile(np.stack([own, other]), (len(places), 1, 1))
+    state[:, 1, : L.Y + 1] = places
+    return state
+
+
+def play(*arguments):
+    return CliRunner().invoke(cli.app, ["reach", "play", *BOATS, "--jobs", "1", *arguments])
+
+
+def test_boats_head_on_are_saved_until_the_table_says_that_nobody_can(heron):
+    state = meeting((0.0, 3.0), (0.0, 4.0), (0.0, 12.0))
+    assert (values_m(heron, state) < RADIUS_M).tolist() == [True, True, False]
+    assert games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).tolist() == [True, True, False]
+
+
+def test_so_is_a_boat_that_the_table_steers(heron):
+    state = meeting((0.0, 3.0), (0.0, 4.0), (0.0, 12.0))
+    start = state.copy()
+    assert duels_lost(heron, state, RADIUS_M, 8.0).tolist() == [True, True, False]
+    np.testing.assert_array_equal(state, start)
+
+
+@pytest.fixture
+def no_duels(monkeypatch):
+    """Nothing lost by the table itself, at once."""
+    monkeypatch.setattr(played_sets, "duels_lost", lambda values, start, *_: np.zeros(len(start), bool))
+
+
+def test_a_shield_that_fears_nobody_loses_more(heron):
+    state = meeting((1.0, 6.0), (2.0, 5.0))
+    assert games_lost(heron, ShieldConfig(profile="hold-course"), state, RADIUS_M, 8.0).all()
+    assert not games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).any()
+
+
+def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, no_duels, monkeypatch):
+    monkeypatch.setattr(played_sets, "RINGS", 200)
+    monkeypatch.setattr(played_sets, "BEARINGS", 72)
+    monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.zeros(len(start), bool))
+    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    assert one.reach_m2 == pytest.approx(area_m2(heron, RADIUS_M, *HEAD_ON), rel=0.02)
+    assert (one.lost_m2, one.ratio) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("sector", range(6))
+def test_positions_beyond_are_tried_on_all_bearings(heron, no_duels, monkeypatch, sector):
+    """Lost in a sixth of all bearings: about a sixth of those tried must say so."""
+
+    def in_sector(values, config, start, *_):
+        bearing = np.arctan2(start[:, 1, L.X], start[:, 1, L.Y]) % (2.0 * math.pi)
+        return (bearing * 3.0 / math.pi).astype(int) == sector
+
+    monkeypatch.setattr(played_sets, "games_lost", in_sector)
+    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    assert one.tried > 50
+    assert one.tried_lost / one.tried == pytest.approx(1.0 / 6.0, abs=0.06)
+
+
+def test_all_that_is_lost_beside_the_reachability_set_counts_by_its_area(heron, few, no_duels, monkeypatch):
+    monkeypatch.setattr(played_sets, "RINGS", 200)
+    monkeypatch.setattr(played_sets, "BEARINGS", 72)
+    monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.ones(len(start), bool))
+    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    wider = area_m2(heron, RADIUS_M + played_sets.BAND_M, *HEAD_ON)
+    assert one.reach_m2 + one.lost_m2 == pytest.approx(wider, rel=0.03)
+    assert one.tried_lost == one.tried > 0
+
+
+def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few):
+    folder, file = tmp_path / "run", tmp_path / "sets.json"
+    first = play("--out", str(folder), "--json", str(file))
+    assert first.exit_code == 0, first.output
+    content = json.loads(file.read_text())
+    assert content == json.loads((folder / "results.json").read_text())
+    assert undocumented(content, PLAYED_SETS) == []
+    assert content["sets"][0]["played"] > 10
+    refused = play("--out", str(folder))
+    assert refused.exit_code == 2
+    assert "--resume" in refused.output
+    again = play("--out", str(folder), "--resume", "--json", str(file))
+    assert json.loads(file.read_text())["sets"] == content["sets"]
+    assert again.exit_code == 0
+    assert len((folder / "games.jsonl").read_text().splitlines()) == 1
+    write_pages([content], tmp_path)
+    page = (tmp_path / "played_sets.md").read_text()
+    assert "heron meets heron, 2.5 m" in page
+    assert f"| {content['sets'][0]['reach_m2']:.1f} | {content['sets'][0]['lost_m2']:.1f} |" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--shield-set", "separation_m=2"], "--radius"),
+        (["--shield-set", "dt_s=0.5"], "dt_s cannot be set here"),
+        (["--shield-set", "delay_s=0.5"], "delay_s cannot be set here"),
+        (["--shield-set", "coordination=per_boat"], "coordination cannot be set here"),
+        (["--shield-set", "tail=1"], "did you mean 'tail_s'"),
+        (["--radius", "9"], "choose one within"),
+        (["--jobs", "0"], "at least 1"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, arguments, said):
+    result = play("--out", str(tmp_path / "run"), *arguments)
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())
+
+
+def test_the_worst_row_is_judged():
+    fine, large, beyond = (
+        PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 3.0, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
+    )
+    assert [bar["met"] for bar in bars_of([fine])] == [True, True]
+    assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
+    assert [bar["met"] for bar in bars_of([fine, beyond])] == [True, False]
+    row = dict(zip(HEADS, rows_of([large])[0], strict=True))
+    assert (row["ratio"], row["by table"], row["lost beyond"]) == ("1.20", "1.10", "0 of 50")
