@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from importlib.metadata import version
 from pathlib import Path
 
@@ -50,6 +51,12 @@ def test_every_folder_with_code_is_a_package():
     named = PROJECT["tool"]["setuptools"]["package-dir"]
     assert {path.relative_to(ROOT).as_posix() for path in folders} == set(named.values())
     assert set(PROJECT["tool"]["setuptools"]["packages"]) == set(named)
+
+
+@pytest.mark.parametrize("folder", ["shield", "env", "policies", "experiments", "tests"])
+def test_no_folder_holds_fifty_files_side_by_side(folder):
+    counts = Counter(path.parent for path in (ROOT / folder).rglob("*.py"))
+    assert {path.relative_to(ROOT).as_posix(): n for path, n in counts.items() if n >= 50} == {}
 
 
 @pytest.mark.parametrize("folder", ["shield/root", "shield", "env", "policies", "experiments"])

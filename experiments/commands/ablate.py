@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..measure.ablation import AblationSettings
-from ..measure.ablation import quick as small_version
 from ..measure.score import DEFAULT_PENALTY
 from ..play.conditions import Conditions
 from ..play.spec import ANSWER_S
+from ..runs.ablation import AblationSettings
+from ..runs.ablation import quick as small_version
 from ..runs.engines import engine_of
 from ..runs.store import write_json
 from . import options as o

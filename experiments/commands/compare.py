@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..measure.paired import compare_runs, read_run
 from ..report.tables import interval_text, short_limit, titled
+from ..runs.paired import compare_runs, read_run
 from ..runs.provenance import machine, versions
 from ..runs.store import write_json
 from . import options as o

@@ -9,7 +9,7 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import read_table
 
-from ..report.docs_pages import SOURCES, write_pages
+from ..pages.docs_pages import SOURCES, write_pages
 from ..runs.json_file import read_json
 from ..runs.results import NAMES
 from .console import command, out

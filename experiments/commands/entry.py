@@ -14,11 +14,11 @@ from ..entries.checking import check_entry, headline
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrapping.wrap import wrap_entry
-from ..measure.ablation import AblationSettings, spec_of
-from ..measure.ablation import quick as small_version
 from ..play.match import play_match
 from ..play.spec import ANSWER_S
 from ..report.replay_html import write_replay
+from ..runs.ablation import AblationSettings, spec_of
+from ..runs.ablation import quick as small_version
 from ..runs.new_file import NEW
 from ..runs.pool import check_jobs, run_all
 from ..runs.provenance import machine, versions

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..measure.ablation import AblationSettings
-from ..measure.ablation import quick as small_version
 from ..measure.score import DEFAULT_PENALTY
 from ..play.conditions import Conditions
 from ..play.spec import ANSWER_S
+from ..runs.ablation import AblationSettings
+from ..runs.ablation import quick as small_version
 from ..runs.pool import check_jobs
 from . import options as o
 from .ablate import QUICK_GAMES, QUICK_TIME_S, end_run

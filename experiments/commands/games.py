@@ -11,7 +11,6 @@ from rich.console import Console
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..measure.ablation import AblationSettings
 from ..measure.judging import check_judge
 from ..measure.score import check_penalty
 from ..measure.tally import RADII_M
@@ -20,6 +19,7 @@ from ..play.kept_distance import check_shield, words_of_less
 from ..play.learned_elsewhere import made_of
 from ..play.sea import check_current
 from ..report.tables import bars_table, pairing_table, verdict_table
+from ..runs.ablation import AblationSettings
 from ..runs.campaign import Campaign, Played
 from ..runs.engines import Workers
 from ..runs.failed_jobs import end_failed

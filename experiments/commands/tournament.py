@@ -26,7 +26,7 @@ from ..tournament.paper import SCRIPTED
 from ..tournament.replays import chosen_games, write_replays
 from ..tournament.results import compared_states, results_of, silent_teams
 from ..tournament.settings import FINAL, TournamentSettings, quick
-from ..tournament.tables import agreement_lines, all_tables
+from ..tournament.tables import all_tables, cycle_lines
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
 from .games import KEYBOARD, results_folder, say_of_distance
@@ -182,7 +182,7 @@ def _show(results: dict[str, Any], folder: Path) -> None:
     for title, heads, rows in all_tables(results):
         out(WIDE).print(titled(title, heads, rows))
         console.print()
-    for words in agreement_lines(results):
+    for words in cycle_lines(results):
         console.print(f"{words}", markup=False, soft_wrap=True)
     if results["bars"]:
         console.print(bars_table(results["bars"]))

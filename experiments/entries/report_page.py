@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.ablation import AblationSettings, by_pairing
 from ..measure.statistics import Interval, paired_difference
 from ..measure.summary import Row, by_game
 from ..measure.tally import breach_column
 from ..report.page import as_text, html_page, template, write_page
 from ..report.tables import number_text
+from ..runs.ablation import AblationSettings, by_pairing
 
 PAGE = "entry.html"
 

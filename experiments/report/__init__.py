@@ -1,1 +1,1 @@
-"""What people read: tables, plots, HTML pages and the pages of docs that are made of results."""
+"""What results are shown with: tables, plots, HTML pages, replays."""

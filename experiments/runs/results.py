@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..measure.ablation import AblationSettings, ablation_bars, most_instructive, spec_of, summaries
 from ..measure.summary import Row
 from ..measure.tally import breach_column
 from ..measure.verdicts import all_breaches, without_breaches
@@ -15,6 +14,7 @@ from ..play.match import play_match
 from ..play.spec import MatchSpec
 from ..report.ablation_html import write_report
 from ..report.replay_html import write_replay
+from .ablation import AblationSettings, ablation_bars, most_instructive, spec_of, summaries
 from .campaign import Played
 from .failure_words import failure_warnings, held_games
 from .pool import Engine, run_all

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from .paper import SCRIPTED, paper_row
-from .standings import Totals, column, limits, ranks_of, score_of
+from .standings import Totals, limits, ranks_of, score_of
 
 
 def agreement(totals: Totals, penalty: float, free: bool, seed: int) -> dict[str, Any] | None:
@@ -54,7 +54,7 @@ def compared(totals: Totals, known: Sequence[tuple[int, int]], penalty: float, s
 
     Returns:
         ``teams``, ``kendall`` and ``spearman`` (value, low, high), ``disagree`` (pairs that are given the other way
-        round) and ``why``, a sentence for each of those.
+        round, ours first) and ``sure``, the share of resamples that have each of them so (None: one repetition).
     """
     places, theirs = [k for k, _ in known], np.array([rank for _, rank in known], dtype=np.float64)
     ours = ranks_of(totals.sums(), penalty)[places]
@@ -67,7 +67,7 @@ def compared(totals: Totals, known: Sequence[tuple[int, int]], penalty: float, s
         "kendall": _interval(tau_b, ours, theirs, drawn),
         "spearman": _interval(rho, ours, theirs, drawn),
         "disagree": [f"{names[i]} before {names[j]}" for i, j in pairs],
-        "why": [_why(totals, places[i], places[j], scores, (i, j), penalty) for i, j in pairs],
+        "sure": [None if scores is None else float(np.mean(scores[:, i] > scores[:, j] + 1e-9)) for i, j in pairs],
     }
 
 
@@ -97,17 +97,6 @@ def _discordant(ours: Any, theirs: Any) -> list[tuple[int, int]]:
         if (ours[i] - ours[j]) * (theirs[i] - theirs[j]) < 0:
             found.append((i, j) if ours[i] < ours[j] else (j, i))
     return found
-
-
-def _why(totals: Totals, first: int, second: int, scores: Any, pair: tuple[int, int], penalty: float) -> str:
-    """What puts one team before another: net captures, collisions, and how sure it is."""
-    sums = totals.sums()[[first, second]]
-    (a, b), (x, y) = score_of(sums, 0.0), sums[:, column("collisions")]
-    words = f"{totals.teams[first]} before {totals.teams[second]}: net captures {a:+.1f} and {b:+.1f}"
-    words += f", collisions {x:.1f} and {y:.1f}" if penalty else ""
-    if scores is None:
-        return words
-    return f"{words}, so in {100 * np.mean(scores[:, pair[0]] > scores[:, pair[1]] + 1e-9):.0f} % of resamples"
 
 
 def _rank(team: str, free: bool) -> int:

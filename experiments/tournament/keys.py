@@ -63,7 +63,7 @@ _AGREEMENT = {
     **{f"kendall.{k}": f"Kendall's tau-b, {v}" for k, v in _LIMITS.items()},
     **{f"spearman.{k}": f"Spearman's rho, {v}" for k, v in _LIMITS.items()},
     "disagree[]": "pairs in our order that the paper has the other way round",
-    "why[]": "of each such pair: net captures, collisions, share of resamples that have it so",
+    "sure[]": "of each such pair: share of resamples that have it so; null with one repetition",
 }
 _PRICE = {
     "team": "name",

@@ -13,7 +13,7 @@ from ..report.ablation_parts import replay_links, values_table
 from ..report.markdown import MADE, bars_table, line, table
 from ..report.page import as_text, report_page, template, write_page
 from .figure import can_be_drawn, draw
-from .tables import Table, agreement_lines, all_tables, shown
+from .tables import Table, all_tables, cycle_lines, shown
 
 Results = Mapping[str, Any]
 IMAGES = "; img-src data:"
@@ -45,7 +45,7 @@ def write_html(results: Results, path: Path, replays: Sequence[Mapping[str, str]
         "REPLAYS": replay_links(replays),
         "FIGURE": _figure_html(results),
         "NOTE": as_text(NOTE),
-        "AGREEMENT": "".join(f"<li>{as_text(words)}</li>" for words in agreement_lines(results)),
+        "CYCLES": "".join(f"<li>{as_text(words)}</li>" for words in cycle_lines(results)),
         "TABLES": "".join(_table_html(one) for one in all_tables(results)),
         "SETTINGS": values_table(results["settings"]),
         "VERSIONS": values_table({**results["versions"], **results["machine"]}),
@@ -62,8 +62,8 @@ def write_markdown(results: Results, folder: Path) -> tuple[str, str, list[Path]
         pictures = [folder / f"{stem}.png"]
         draw(results, pictures[0])
         lines += [f"![net captures against collisions]({stem}.png)", ""]
-    lines += [line(NOTE), "", *(f"- {line(words)}" for words in agreement_lines(results)), ""]
-    lines += [f"- {line(words)}" for words in results["warnings"]] + [""] * bool(results["warnings"])
+    notes = [*cycle_lines(results), *results["warnings"]]
+    lines += [line(NOTE), "", *(f"- {line(words)}" for words in notes), *[""] * bool(notes)]
     for title, heads, rows in all_tables(results):
         lines += [f"## {line(title)}", "", *table(heads, rows), ""]
     if results["bars"]:

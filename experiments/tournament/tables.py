@@ -23,7 +23,7 @@ def all_tables(results: Results) -> list[Table]:
     for state in results["states"]:
         if state["standings"]:
             found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
-    return found
+    return found + agreement(results)
 
 
 def shown(state: str) -> str:
@@ -151,37 +151,65 @@ def qualifying(results: Results) -> Table:
     return "Qualifying against easy, medium and hidden", ["team", "state", "games", "score a game", "captures"], rows
 
 
-def agreement_lines(results: Results) -> list[str]:
-    """How far the ranks agree with the paper's, in sentences."""
-    found = []
-    for state in results["states"]:
-        for name, words in (("table_3", "Table 3"), ("table_4", "Table 4")):
-            if state[name] is not None:
-                found += [f"{words}, {shown(state['state'])}: {text}" for text in _agreed(state[name])]
-        if state["cycles"]:
-            found.append(f"Cycles, {shown(state['state'])}: {'; '.join(state['cycles'])}.")
-    return found
+def cycle_lines(results: Results) -> list[str]:
+    """Teams each of which beats the next, in sentences."""
+    return [
+        f"Cycles, {shown(state['state'])}: {'; '.join(state['cycles'])}."
+        for state in results["states"]
+        if state["cycles"]
+    ]
 
 
-def _agreed(entry: Mapping[str, Any]) -> list[str]:
-    """A sentence over all of the paper's teams, where others than the scripted ones are among them; then of those."""
+def _compared(results: Results) -> list[tuple[str, Mapping[str, Any]]]:
+    """What ranks are compared with, and how they agree."""
+    return [
+        (f"{words}, {shown(state['state'])}", state[name])
+        for state in results["states"]
+        for name, words in (("table_3", "Table 3"), ("table_4", "Table 4"))
+        if state[name] is not None
+    ]
+
+
+def agreement(results: Results) -> list[Table]:
+    """How far the ranks agree with the paper's, and which pairs do not; none without three of its teams."""
+    compared = _compared(results)
+    if not compared:
+        return []
+    rows = [
+        [name, over, _interval(one["spearman"]), _interval(one["kendall"]), f"{len(one['disagree'])}"]
+        for name, entry in compared
+        for over, one in _agreed(entry)
+    ]
+    heads = ["paper's ranks, our games", "over", "Spearman's rho", "Kendall's tau-b", "pairs turned"]
+    return [("Agreement with the paper's ranks", heads, rows), *_turned(compared)]
+
+
+def _turned(compared: list[tuple[str, Mapping[str, Any]]]) -> list[Table]:
+    """Pairs that some ranking has the other way round than the paper, and how sure that is; no table without any."""
+    sure = [dict(zip(entry["disagree"], entry["sure"], strict=True)) for _, entry in compared]
+    pairs = sorted({pair for one in sure for pair in one})
+    rows = [[pair, *(_share(one[pair]) if pair in one else "-" for one in sure)] for pair in pairs]
+    title = "Pairs that the paper ranks the other way round: share of resamples"
+    return [(title, ["ours", *(name for name, _ in compared)], rows)] if rows else []
+
+
+def _share(value: float | None) -> str:
+    return "yes" if value is None else f"{100.0 * value:.0f} %"
+
+
+def _agreed(entry: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Over all of the paper's teams, where others than the scripted ones are among them; then over those."""
     scripted = entry["scripted"]
+    found = [(f"all {len(entry['teams'])}", entry)]
     if scripted is None:
-        return [_sentence(entry, "")]
-    lines = [] if scripted["all_games"]["teams"] == entry["teams"] else [_sentence(entry, "")]
-    lines.append(_sentence(scripted["all_games"], ""))
+        return found
+    words = f"the {len(scripted['all_games']['teams'])} that do not learn"
+    if scripted["all_games"]["teams"] == entry["teams"]:
+        found = []
+    found.append((words, scripted["all_games"]))
     if scripted["among"] != scripted["all_games"]:
-        lines.append(_sentence(scripted["among"], ", from the games among them alone"))
-    return lines
-
-
-def _sentence(entry: Mapping[str, Any], of: str) -> str:
-    pairs = "; ".join(entry["why"])
-    return (
-        f"Spearman's rho {_interval(entry['spearman'])}, Kendall's tau-b {_interval(entry['kendall'])} over "
-        f"{', '.join(entry['teams'])}{of}; "
-        + (f"the paper has the other way round: {pairs}." if pairs else "no pair is the other way round.")
-    )
+        found.append((f"{words}, games among them", scripted["among"]))
+    return found
 
 
 def _interval(entry: Mapping[str, float | None]) -> str:

@@ -6,14 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from .settings import TrainingSettings
+from .unused import check_used
 
 
 def training_of(settings: TrainingSettings, folder: Path, resume: bool) -> Any:
     """An object with ``run(notice)`` and ``decisions``.
 
     Raises:
-        ConfigError: a setting or checkpoint is unusable.
+        ConfigError: a setting or checkpoint is unusable, or a setting is given that the algorithm has no use for.
     """
+    check_used(settings)
     if settings.algorithm == "qmix":
         from .qmix_training import QmixTraining
 

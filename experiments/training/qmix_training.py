@@ -37,15 +37,15 @@ class QmixTraining:
         resume: refused.
 
     Raises:
-        ConfigError: an unknown option, actions that are no numbers, or ``resume``.
+        ConfigError: an unknown option, or ``resume``.
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
         for name in settings.options:
             if name not in DEFAULTS:
                 raise ConfigError(f"unknown option {name!r} of qmix; choose one of {', '.join(DEFAULTS)}")
-        if resume or settings.actions != "discrete" or settings.net.roles != "shared":
-            raise ConfigError("qmix begins anew (no --resume), with discrete actions and net.roles: shared")
+        if resume:
+            raise ConfigError("qmix begins anew; leave out --resume")
         self.settings, self.folder, self.decisions = settings, folder, 0
         self.options = {**DEFAULTS, **settings.options}
         torch.manual_seed(settings.seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +35,6 @@ DEFAULTS = {
 }
 """Deviations of the numbers in games that moments are recorded from, for each as many as are played at once; how often
 each of `raid_moments.KINDS` comes; deviation of what is drawn at first; see `RaidsLearner`."""
-PASSED_OVER = {name: attrgetter(name)(TrainingSettings()) for name in ("actions", "ppo.value", "net.features")}
-"""Settings of other algorithms that raids have no use for, and how they are when nobody gives them."""
 LONGEST_S = 100.0
 """Time until a game that began in a raid is over, s."""
 RECORDED_SEED = 810_000
@@ -54,7 +51,7 @@ class RaidsTraining:
         resume: refused.
 
     Raises:
-        ConfigError: an option that is unknown or cannot be, several stages, teams not of three boats, or ``resume``.
+        ConfigError: an option that is unknown or cannot be, teams not of three boats, or ``resume``.
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
@@ -221,11 +218,8 @@ def _checked(settings: TrainingSettings, resume: bool) -> dict[str, Any]:
     for name in settings.options:
         if name not in DEFAULTS:
             raise ConfigError(f"unknown option {name!r} of raids; {near(str(name), DEFAULTS)}")
-    if resume or len(settings.stages) > 1 or settings.net.roles != "shared" or settings.shield_every > 1:
-        raise ConfigError("raids begin anew (no --resume), in one stage, with net.roles: shared and shield_every: 1")
-    for name, value in PASSED_OVER.items():
-        if attrgetter(name)(settings) != value:
-            raise ConfigError(f"raids have no use for {name}; leave it out")
+    if resume:
+        raise ConfigError("raids begin anew; leave out --resume")
     if settings.game(settings.stages[0]).team_size != BOATS:
         raise ConfigError(f"raids are for teams of {BOATS} boats; leave out team_size")
     found = {**DEFAULTS, **settings.options}

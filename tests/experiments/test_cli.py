@@ -16,7 +16,7 @@ from steerclear.experiments import cli
 from steerclear.experiments.commands import games as games_command
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.report import keys
+from steerclear.experiments.pages import keys
 from steerclear.experiments.runs import campaign
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, GameError

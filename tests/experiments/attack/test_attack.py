@@ -11,7 +11,7 @@ from steerclear.experiments.encounters import Conditions, play
 from steerclear.experiments.encounters.measure import measure_chunk
 from steerclear.experiments.encounters.scene_file import read_scene, scenes_of
 from steerclear.experiments.encounters.verdicts import NO_VERDICT, SIDES
-from steerclear.experiments.report import keys
+from steerclear.experiments.pages import keys
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 

@@ -10,8 +10,8 @@ from steerclear.experiments.bench.run import BenchSettings, bench_bars, run_benc
 from steerclear.experiments.bench.sampling import programs_of, questions_of_games, scene
 from steerclear.experiments.bench.solvers import solver_times
 from steerclear.experiments.bench.timing import memory_mib, quantiles_us, time_calls
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.keys import BENCH, GAME_COLUMNS, KEYS, undocumented
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.keys import BENCH, GAME_COLUMNS, KEYS, undocumented
 from steerclear.experiments.runs.store import finite, write_json
 from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
 from steerclear.shield import ShieldConfig

@@ -15,7 +15,7 @@ from steerclear.experiments.encounters.replays import record_of, records_of
 from steerclear.experiments.encounters.results import bars_of, cells_table
 from steerclear.experiments.encounters.scene_file import write_scene
 from steerclear.experiments.encounters.worst import worst_encounters
-from steerclear.experiments.report import keys
+from steerclear.experiments.pages import keys
 from typer.testing import CliRunner
 
 USUAL = Conditions()

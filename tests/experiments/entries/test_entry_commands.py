@@ -10,8 +10,8 @@ from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.entry import time_text
 from steerclear.experiments.entries.imports import imports_of
 from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
-from steerclear.experiments.measure.ablation import AblationSettings
-from steerclear.experiments.report.keys import KEYS, undocumented
+from steerclear.experiments.pages.keys import KEYS, undocumented
+from steerclear.experiments.runs.ablation import AblationSettings
 from steerclear.experiments.runs.pool import available_cores
 from steerclear.shield.exceptions import PolicyError
 from typer.testing import CliRunner

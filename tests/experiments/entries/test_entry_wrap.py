@@ -22,7 +22,7 @@ from steerclear.experiments.entries.wrapping.facts import facts_for
 from steerclear.experiments.entries.wrapping.inline import Inliner, small
 from steerclear.experiments.entries.wrapping.package import code
 from steerclear.experiments.entries.wrapping.sources import sources
-from steerclear.experiments.report.keys import KEYS, undocumented
+from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from typer.testing import CliRunner

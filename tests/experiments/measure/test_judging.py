@@ -3,16 +3,16 @@ import math
 
 import numpy as np
 import pytest
-from steerclear.experiments.measure.ablation import AblationSettings, ablation_bars
 from steerclear.experiments.measure.judging import NOT_JUDGED, StateLog, helpless, judge_game
 from steerclear.experiments.measure.summary import summarise
 from steerclear.experiments.measure.verdicts import all_breaches, verdict_columns, verdict_rows, without_breaches
 from steerclear.experiments.oracle import Outcome, Verdict
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.keys import GAME_COLUMNS, RESULTS, undocumented
 from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.experiments.report.ablation_verdicts import breaches_table, verdict_tables
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.keys import GAME_COLUMNS, RESULTS, undocumented
+from steerclear.experiments.runs.ablation import AblationSettings, ablation_bars
 from steerclear.experiments.runs.campaign import Campaign, Played
 from steerclear.experiments.runs.results import results_of, write_results
 from steerclear.experiments.runs.store import ResultStore, finite, write_table

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.measure.ablation import AblationSettings
+from steerclear.experiments.pages import keys
+from steerclear.experiments.pages.docs_pages import write_pages
 from steerclear.experiments.play.conditions import CALM, Conditions, draw, words_of, words_of_settings
 from steerclear.experiments.play.spec import MatchSpec
-from steerclear.experiments.report import keys
-from steerclear.experiments.report.docs_pages import write_pages
+from steerclear.experiments.runs.ablation import AblationSettings
 from steerclear.experiments.runs.campaign import Campaign
 from steerclear.experiments.runs.store import ResultStore
 from steerclear.shield.exceptions import ConfigError

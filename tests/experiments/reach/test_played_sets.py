@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 from steerclear.experiments import cli
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.keys import PLAYED_SETS, undocumented
 from steerclear.experiments.reach import played_sets, unsafe_sets
 from steerclear.experiments.reach.played_sets import PlayedSet, duels_lost, games_lost, play_set, tasks_of
 from steerclear.experiments.reach.played_sets_page import HEADS, bars_of, rows_of
 from steerclear.experiments.reach.unsafe_sets import RATIO_BAR, values_m
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.keys import PLAYED_SETS, undocumented
 from steerclear.shield import ShieldConfig
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L

@@ -6,8 +6,8 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.commands import reach
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.pages.docs_pages import write_pages
 from steerclear.experiments.reach.show import draw_sets, tables_page
-from steerclear.experiments.report.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.tables import make
 from steerclear.shield.tables.files import CACHE_VARIABLE, SHIPPED, read_table, save_table

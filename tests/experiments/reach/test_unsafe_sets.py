@@ -6,6 +6,8 @@ import math
 import numpy as np
 import pytest
 from steerclear.experiments import cli
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.keys import SETS, undocumented
 from steerclear.experiments.reach import unsafe_sets
 from steerclear.experiments.reach.unsafe_sets import (
     MISSED_PERCENT_BAR,
@@ -16,8 +18,6 @@ from steerclear.experiments.reach.unsafe_sets import (
     sets_config,
 )
 from steerclear.experiments.reach.unsafe_sets_page import HEADS, content_of, rows_of, sets_bars
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.keys import SETS, undocumented
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.areas import area_m2

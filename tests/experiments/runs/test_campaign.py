@@ -2,7 +2,10 @@ import json
 from dataclasses import replace
 
 import pytest
-from steerclear.experiments.measure.ablation import (
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.keys import GAME_COLUMNS, RESULTS, undocumented
+from steerclear.experiments.report.tables import interval_text
+from steerclear.experiments.runs.ablation import (
     AblationSettings,
     ablation_bars,
     most_instructive,
@@ -10,9 +13,6 @@ from steerclear.experiments.measure.ablation import (
     spec_of,
     summaries,
 )
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.keys import GAME_COLUMNS, RESULTS, undocumented
-from steerclear.experiments.report.tables import interval_text
 from steerclear.experiments.runs.campaign import Campaign, Played
 from steerclear.experiments.runs.results import replay_of, results_of, same_game, write_results
 from steerclear.experiments.runs.store import ResultStore, finite

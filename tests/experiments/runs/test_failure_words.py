@@ -1,10 +1,10 @@
 """What is said first when policies failed."""
 
 import pytest
-from steerclear.experiments.measure.ablation import AblationSettings
 from steerclear.experiments.play.match import play_row
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.experiments.report.page import as_text
+from steerclear.experiments.runs.ablation import AblationSettings
 from steerclear.experiments.runs.campaign import Played
 from steerclear.experiments.runs.failure_words import failure_warnings, held_games
 from steerclear.experiments.runs.results import results_of, write_results

@@ -7,7 +7,7 @@ import textwrap
 import time
 
 import pytest
-from steerclear.experiments.report.keys import KEYS, undocumented
+from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.experiments.runs.store import ResultStore
 from steerclear.experiments.tournament import campaign as played
 from steerclear.experiments.tournament.campaign import Tournament

@@ -6,7 +6,8 @@ from steerclear.experiments.tournament.agreement import agreement, rho, tau_b
 from steerclear.experiments.tournament.paper import PAPER
 from steerclear.experiments.tournament.price import keeps, prices
 from steerclear.experiments.tournament.standings import Totals, column, score_of, standings
-from steerclear.experiments.tournament.tables import _agreed, _kept
+from steerclear.experiments.tournament.tables import _kept
+from steerclear.experiments.tournament.tables import agreement as agreement_tables
 from steerclear.experiments.tournament.winning import alpha_rank, cycles, win_matrix
 
 PLAIN = {"captures": 0, "grabs": 0, "tags": 0, "collisions": 0, "hits_teammate": 0, "hits_opponent": 0}
@@ -86,12 +87,18 @@ def test_the_scripted_are_compared_on_all_games_and_on_those_among_them():
     assert among["teams"] == over_all["teams"] == ["lucas", "alamer", "meo"]
     assert among["kendall"] == {"value": pytest.approx(1.0), "low": pytest.approx(1.0), "high": pytest.approx(1.0)}
     assert over_all["spearman"]["value"] == pytest.approx(0.5)
-    why = "meo before alamer: net captures +0.0 and -2.5, collisions 3.0 and 1.0, so in 100 % of resamples"
-    assert over_all["why"] == [why]
+    assert (over_all["disagree"], over_all["sure"]) == (["meo before alamer"], [1.0])
     assert "jin" in found["teams"]
-    words = " ".join(_agreed(found))
-    assert "from the games among them alone; no pair is the other way round" in words
-    assert why in words
+    state = {"state": "off", "table_3": found, "table_4": None}
+    (_, _, rows), (_, heads, turned) = agreement_tables({"states": [state]})
+    assert [row[1] for row in rows] == [
+        "all 4",
+        "the 3 that do not learn",
+        "the 3 that do not learn, games among them",
+    ]
+    assert [row[-1] for row in rows] == [f"{len(found['disagree'])}", "1", "0"]
+    assert heads == ["ours", "Table 3, no shields"]
+    assert ["meo before alamer", "100 %"] in turned
 
 
 def test_rank_measures_know_ties():

@@ -1,7 +1,9 @@
+from copy import deepcopy
 from pathlib import Path
 
 import pytest
 import yaml
+from steerclear.experiments.training.unused import NO_USE, NO_USE_IN_STAGE
 
 pytest.importorskip("stable_baselines3", reason="the extra [train]")
 
@@ -25,13 +27,24 @@ def tiny_content():
     return TINY
 
 
+def of_use(algorithm):
+    """The tiny config without what an algorithm has no use for."""
+    content = deepcopy(TINY)
+    for dotted in NO_USE[algorithm]:
+        *parts, name = dotted.split(".")
+        (content.get(parts[0], {}) if parts else content).pop(name, None)
+    if algorithm in NO_USE_IN_STAGE:
+        content["stages"] = [{"opponents": ["hold"]}]
+    return content
+
+
 @pytest.fixture
 def tiny(tmp_path):
     """Write the tiny config, with changes; returns its path."""
 
     def write(name="tiny.yaml", **changes) -> Path:
         path = tmp_path / name
-        path.write_text(yaml.safe_dump({**TINY, **changes}))
+        path.write_text(yaml.safe_dump({**of_use(changes.get("algorithm", "ppo")), **changes}))
         return path
 
     return write

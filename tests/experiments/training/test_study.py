@@ -1,7 +1,7 @@
 import json
 
 import pytest
-from steerclear.experiments.report.docs_pages import write_pages
+from steerclear.experiments.pages.docs_pages import write_pages
 from steerclear.experiments.runs.store import write_json
 from steerclear.experiments.training.settings import settings_of
 from steerclear.experiments.training.study import cells, learning_of, settings_of_cell

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from steerclear import policies
 
+from ..measure.score import DEFAULT_PENALTY
+from ..measure.statistics import count_interval, paired_ratio
+from ..measure.summary import Row, by_game, summarise
+from ..measure.tally import RADII_M, breach_column
 from ..play.conditions import CALM, Conditions
 from ..play.spec import ANSWER_S, SIDES, MatchSpec
-from .score import DEFAULT_PENALTY
-from .statistics import count_interval, paired_ratio
-from .summary import Row, by_game, summarise
-from .tally import RADII_M, breach_column
 
 
 @dataclass(frozen=True)

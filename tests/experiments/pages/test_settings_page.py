@@ -4,7 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from steerclear.experiments.report.settings_page import COSTS, meanings, settings_page
+from steerclear.experiments.pages.settings_page import COSTS, meanings, settings_page
 from steerclear.shield.config import ShieldConfig
 
 PAGE = Path(__file__).parents[3] / "docs" / "settings.md"

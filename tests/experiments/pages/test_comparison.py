@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from steerclear.experiments.report.comparison import cells_of, contests_of
-from steerclear.experiments.report.comparison_page import comparison_page
-from steerclear.experiments.report.comparison_plot import legend_columns, looks_of, plot_contests
-from steerclear.experiments.report.docs_pages import write_pages
+from steerclear.experiments.pages.comparison import cells_of, contests_of
+from steerclear.experiments.pages.comparison_page import comparison_page
+from steerclear.experiments.pages.comparison_plot import legend_columns, looks_of, plot_contests
+from steerclear.experiments.pages.docs_pages import write_pages
 from steerclear.shield.exceptions import ConfigError
 
 SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}

@@ -4,10 +4,10 @@ import json
 import math
 
 import pytest
-from steerclear.experiments.measure.ablation import AblationSettings
-from steerclear.experiments.report import docs_pages
-from steerclear.experiments.report.docs_pages import write_pages
-from steerclear.experiments.report.price_page import is_dial, is_shielded, price_page
+from steerclear.experiments.pages import docs_pages
+from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.pages.price_page import is_dial, is_shielded, price_page
+from steerclear.experiments.runs.ablation import AblationSettings
 from steerclear.experiments.runs.campaign import Played
 from steerclear.experiments.runs.results import results_of
 from steerclear.experiments.runs.store import finite

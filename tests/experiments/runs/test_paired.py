@@ -6,8 +6,8 @@ import math
 import pytest
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.measure.paired import compare_runs, differs, read_run
-from steerclear.experiments.report.keys import COMPARE, undocumented
+from steerclear.experiments.pages.keys import COMPARE, undocumented
+from steerclear.experiments.runs.paired import compare_runs, differs, read_run
 from steerclear.experiments.runs.store import ResultStore, write_json
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner

@@ -10,10 +10,10 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..baselines.rollouts import NAMES
 from ..encounters.summary import upper_bound
+from ..report.markdown import MADE, line, table
+from ..report.tables import number_text
 from .comparison import Cell, Contest, cells_of, contests_of, pool
 from .comparison_plot import plot_contests
-from .markdown import MADE, line, table
-from .tables import number_text
 
 STEM = "comparison"
 LIBRARY_STEM = "library_filters"

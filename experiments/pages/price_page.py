@@ -10,8 +10,8 @@ from typing import Any
 from steerclear.shield.config import ShieldConfig
 
 from ..measure.tally import RADII_M, breach_column
-from .markdown import MADE, line, table
-from .tables import interval_text
+from ..report.markdown import MADE, line, table
+from ..report.tables import interval_text
 
 STEM = "price"
 _DIALS = ("adversary_s", "visitor_s", "profile")

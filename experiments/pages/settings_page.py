@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from steerclear.shield.config import PROFILES, RANGES, ShieldConfig
 
-from .markdown import MADE
+from ..report.markdown import MADE
 
 _METHOD, _STUDY = "[method](shield.md)", "[studies](studies/method.md)"
 

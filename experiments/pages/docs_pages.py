@@ -18,15 +18,15 @@ from ..play.conditions import words_of, words_of_settings
 from ..reach.played_sets_page import played_page
 from ..reach.show import tables_page
 from ..reach.unsafe_sets_page import sets_page
+from ..report.docs_plots import plot_off_on
+from ..report.markdown import MADE, bars_table, line, table
+from ..report.tables import interval_text
 from ..tournament.pages import write_markdown
 from ..training.study_page import learning_page
 from .comparison_page import LIBRARY_STEM, STEM, has_library, write_comparison
-from .docs_plots import plot_off_on
 from .keys import KEYS
-from .markdown import MADE, bars_table, line, table
 from .price_page import is_dial, is_shielded, price_page
 from .settings_page import settings_page
-from .tables import interval_text
 
 Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""

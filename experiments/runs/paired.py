@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.json_file import read_json
-from ..runs.store import LINES_FILE, RESULTS_FILE, read_line
-from .statistics import bootstrap_interval, count_difference, paired_difference
-from .summary import Metric, Row, metrics_of
+from ..measure.statistics import bootstrap_interval, count_difference, paired_difference
+from ..measure.summary import Metric, Row, metrics_of
+from .json_file import read_json
+from .store import LINES_FILE, RESULTS_FILE, read_line
 
 COMMANDS = ("ablate", "evaluate", "entry report")
 SAME = ("preset", "rules", "fixed_start", "penalty")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from steerclear.experiments.report.docs_pages import keys_page
+from steerclear.experiments.pages.docs_pages import keys_page
 
 PAGE = Path(__file__).parents[3] / "docs" / "json_keys.md"
 

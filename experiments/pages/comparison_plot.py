@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..encounters.summary import upper_bound
+from ..report.plot_text import plot_text
 from .comparison import NO_GUARD, Contest
-from .plot_text import plot_text
 
 COLOURS = {NO_GUARD: "#8a8a8a", "shield": "#1f6f8b"}
 MARKS = ("o", "s", "^", "D")
