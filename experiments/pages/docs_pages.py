@@ -31,6 +31,7 @@ from .settings_page import settings_page
 Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
 SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
+_TIMES = ("decision_p50_us", "decision_p99_us")
 _COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
 
 
@@ -232,7 +233,8 @@ def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
     present = [(key, head) for key, head in _COLUMNS if any(key in figures for figures in summary["metrics"].values())]
     rows = [
         [figures["label"], *(interval_text(figures.get(key)) for key, _ in present)]
-        for figures in summary["metrics"].values()
+        for name, figures in summary["metrics"].items()
+        if name not in _TIMES  # of a machine that did other things as well: the page of the benchmark has them
     ]
     return table(["", *(head for _, head in present)], rows)
 
