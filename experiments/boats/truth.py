@@ -122,7 +122,7 @@ class TruthRecord:
         return {**record, "state": self._log.states, "commanded": self._marks.commanded(record["position"].shape[1])}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """What the oracle says of the breaches that a team's boats were in, see `experiments.keys.BREACH`.
+        """What the oracle says of the breaches that a team's boats were in, see `experiments.pages.keys.BREACH`.
 
         With what held the boats then, see `marks.Marks.of`.
         """

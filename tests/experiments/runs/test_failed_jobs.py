@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 TRACE = Path(__file__).parents[2] / "data" / "traces" / "heron_random.npz"
 COMMANDS = {
-    "evaluate": ("evaluate medium --opponents hold --games 1 --max-time 1 --jobs 1", "match.Match.play"),
+    "evaluate": ("evaluate medium --opponents hold --games 1 --max-time 1 --jobs 1", "play.match.Match.play"),
     "tournament": ("tournament --quick --jobs 1", "tournament.campaign.play_game"),
     "encounters": ("encounters --platform heron --family head_on --n 1 --workers 1", "encounters.campaign.play_job"),
     "attack": ("attack --restarts 1 --generations 1 --population 8 --workers 1", "attack.campaign.run_search"),
