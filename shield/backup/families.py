@@ -1,6 +1,6 @@
 """The certificates by name: which backup manoeuvres they look at, and whether opponents are run through or looked up.
 
-A certificate of this kind is a family of manoeuvres; h is as in `manoeuvre`. Each row of a family is
+A certificate of this kind is a family of manoeuvres; h is as in `barriers.boats`. Each row of a family is
 (side, turn deg, speed): side clockwise when > 0, its size the share of full rudder; speed a fraction of top speed or
 `COMMANDED`.
 """

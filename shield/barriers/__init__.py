@@ -1,8 +1,9 @@
 """Barriers h: margins, m, that are >= 0 while a boat on its backup manoeuvre keeps clear.
 
-Each is asked about the path of a manoeuvre. All but `value_function`, which tells a margin alone, write one row
-(`clearance`): the margin h, m, the sample of the path where it is least, and dh/dx, dh/dy there (`registered` only
-where the program asks). `filter.rows` makes of `boats` and `static` the slopes by the commands of this step.
+Each is asked about the path of a manoeuvre. `opponents`, `pursuit` and `value_function` tell a margin alone, the others
+write one row (`clearance`): the margin h, m, the sample of the path where it is least, and dh/dx, dh/dy there
+(`registered` only where the program asks). `filter.rows` makes of `boats` and `static` the slopes by the commands of
+this step.
 
     boats             team-mates on their manoeuvres, opponents that hold their course
     pursuit           an opponent that pursues; `opponents` asks for the worst of them

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from ..backup.paths import READY_SAMPLE
-from ..jit import BoolArray, copy_row, lean_kernel
+from ..jit import BoolArray, lean_kernel
 from ..platforms import layout as L
 from ..scene import Boats, Scene
 from ..tables.lookup import WHOLE_S
 from ..work import Work
-from .clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Search
+from .clearance import FAR, MARGIN, Search
 from .feared import feared_for
 from .foreseen import may_pursue
 from .pursuit import Pursuer, Pursuit, roll_out_pursuer, stays_away
@@ -43,8 +43,8 @@ def closing(i: int, j: int, scene: Scene) -> float:
 
 
 @lean_kernel
-def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, cap_m: float) -> None:
-    """Clearance of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
+def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, cap_m: float) -> float:
+    """Margin, m, of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
     The worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. The one that
     came below its floor last is looked at first. They are followed until the boat's thrust is full and as long beyond
@@ -59,22 +59,22 @@ def clear_of_pursuer(i: int, j: int, slot: int, scene: Scene, floor_m: float, ca
         closely = min(closely, ready + boats.pursuit_samples[i])
     lasts = closely + (0 if till_ready else boats.chase_samples[i, j])
     if not till_ready and _never_near(i, j, slot, lasts, scene, cap_m):
-        work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = cap_m, lasts, 1.0, 0.0
-        return
+        return cap_m
     pursuit = pursuit_of(i, j, slot, lasts, closely, till_ready, scene)
-    work.out[MARGIN] = FAR
+    worst_m = FAR
     manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
     first = min(work.first_manner[i, j], manners - 1)
     for number in range(manners):
         manner = first_then_rest(first, number)
-        weight = _run_pursuer(i, j, slot, manner, pursuit, scene, floor_m, cap_m)
-        if till_ready and work.spare[MARGIN] >= floor_m:
-            _value_at_end(i, j, slot, weight, boats, work)
-        if work.spare[MARGIN] < work.out[MARGIN]:
-            copy_row(work.out, work.spare)
-            if work.out[MARGIN] < floor_m:
+        margin_m, weight = _run_pursuer(i, j, slot, manner, pursuit, scene, floor_m, cap_m)
+        if till_ready and margin_m >= floor_m:
+            margin_m = min(margin_m, _value_at_end(i, j, slot, weight, boats, work))
+        if margin_m < worst_m:
+            worst_m = margin_m
+            if worst_m < floor_m:
                 work.first_manner[i, j] = manner
-                return
+                break
+    return worst_m
 
 
 @lean_kernel
@@ -108,8 +108,8 @@ def pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, till_ready: 
 @lean_kernel
 def _run_pursuer(
     i: int, j: int, slot: int, manner: int, pursuit: Pursuit, scene: Scene, floor_m: float, cap_m: float
-) -> float:
-    """Clearance from opponent j pursuing in one manner, into ``work.spare``; returns what negative margins faded by."""
+) -> tuple[float, float]:
+    """Margin, m, from opponent j pursuing in one manner, and what negative margins have faded by."""
     state, boats, work = scene.state, scene.boats, scene.work
     course = work.course[j]
     turn = math.radians(boats.granted_turn_dps[j]) * boats.sample_s  # also from rest: thrust, and turn, comes soon
@@ -127,23 +127,14 @@ def _run_pursuer(
         manner % 2 == 1,
     )
     search = Search(closing(i, j, scene), work.radius[i, j], floor_m, cap_m)
-    return roll_out_pursuer(work.path[slot], pursuer, pursuit, search, work.pursuer, work.spare)
+    return roll_out_pursuer(work.path[slot], pursuer, pursuit, search, work.pursuer)
 
 
 @lean_kernel
-def _value_at_end(i: int, j: int, slot: int, weight: float, boats: Boats, work: Work) -> None:
-    """Lower the clearance in ``work.spare`` to the value where the boat's thrust is full and the pursuer's run ends."""
-    path, ready, pursuer = work.path[slot], work.ready[slot], work.pursuer
+def _value_at_end(i: int, j: int, slot: int, weight: float, boats: Boats, work: Work) -> float:
+    """Margin, m, that the table tells of where thrust is full and the pursuer's run ends; faded where negative."""
     margin = margin_when_ready(i, j, slot, boats, work)
-    if margin < 0.0:
-        margin *= weight
-    if margin < work.spare[MARGIN]:
-        k = int(ready[READY_SAMPLE])
-        dx, dy = path[k, 0] - pursuer[0], path[k, 1] - pursuer[1]
-        distance = math.sqrt(dx * dx + dy * dy)
-        work.spare[MARGIN], work.spare[SAMPLE] = margin, k
-        if distance > 1e-9:
-            work.spare[NORMAL_X], work.spare[NORMAL_Y] = dx / distance, dy / distance
+    return margin * weight if margin < 0.0 else margin
 
 
 @lean_kernel
@@ -169,38 +160,37 @@ def _forget_threats(slot: int, work: Work) -> None:
 
 
 @lean_kernel
-def _note_threat(j: int, slot: int, work: Work) -> None:
-    """Note the margin from boat j in ``work.out`` if it is the least."""
-    margin = work.out[MARGIN]
-    if margin < work.threat_m[slot]:
-        work.threat_m[slot], work.threat_by[slot] = margin, j
+def _note_threat(margin_m: float, j: int, slot: int, work: Work) -> None:
+    """Note a margin from boat j if it is the least."""
+    if margin_m < work.threat_m[slot]:
+        work.threat_m[slot], work.threat_by[slot] = margin_m, j
 
 
 @lean_kernel
-def _clear_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> None:
-    """Margin from opponent j where a table is looked up first, into ``work.out``."""
-    margin = worst_at_once(i, j, slot, boats, work)
-    work.out[MARGIN], work.out[SAMPLE], work.out[NORMAL_X], work.out[NORMAL_Y] = margin, 0.0, 1.0, 0.0
-    work.table_m[slot] = min(work.table_m[slot], margin)
-    if margin < work.threat_target_m[i, j]:
+def _clear_by_table(i: int, j: int, slot: int, boats: Boats, work: Work) -> float:
+    """Margin, m, from opponent j where a table is looked up first."""
+    margin_m = worst_at_once(i, j, slot, boats, work)
+    work.table_m[slot] = min(work.table_m[slot], margin_m)
+    if margin_m < work.threat_target_m[i, j]:
         work.sealed[slot] = True
+    return margin_m
 
 
 @lean_kernel
-def _clear_by_run(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> None:
-    """Clearance of an outnumbered boat from opponent j, run through for a while and looked up from there.
+def _clear_by_run(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> float:
+    """Margin, m, of an outnumbered boat from opponent j, run through for a while and looked up from there.
 
-    It is written into ``work.out``. At most the cap; on a manoeuvre on which thrust never is full the boat is lost.
+    At most the cap; on a manoeuvre on which thrust never is full the boat is lost.
     """
     tuning, work = scene.tuning, scene.work
-    work.out[SAMPLE] = 0.0
     if work.ready[slot, READY_SAMPLE] < 0.0:
-        work.out[MARGIN] = -work.radius[i, j]
+        margin_m = -work.radius[i, j]
     elif out_of_reach(i, j, slot, closing(i, j, scene), scene):
-        work.out[MARGIN] = tuning.margin_cap_m
+        margin_m = tuning.margin_cap_m
     else:
-        clear_of_pursuer(i, j, slot, scene, floor_m, tuning.margin_cap_m)
-    work.joint_m[slot] = min(work.joint_m[slot], work.out[MARGIN])
+        margin_m = clear_of_pursuer(i, j, slot, scene, floor_m, tuning.margin_cap_m)
+    work.joint_m[slot] = min(work.joint_m[slot], margin_m)
+    return margin_m
 
 
 @lean_kernel
@@ -209,18 +199,18 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) ->
     boats, tuning, work = scene.boats, scene.tuning, scene.work
     floor_m, by_table = min(work.threat_target_m[i, j], level_m), table_answers(i, j, slot, boats, work)
     if by_table:
-        _clear_by_table(i, j, slot, boats, work)
+        margin_m = _clear_by_table(i, j, slot, boats, work)
     else:
         # one cap for all: a pursuer's steps depend on it, and must not depend on who is looked at before
-        clear_of_pursuer(i, j, slot, scene, floor_m, tuning.margin_cap_m)
-    work.threats_m[slot, j] = work.out[MARGIN]
-    _note_threat(j, slot, work)
-    if not work.out[MARGIN] >= floor_m or not by_table or not work.outnumbered[i]:
-        return work.out[MARGIN] >= floor_m
+        margin_m = clear_of_pursuer(i, j, slot, scene, floor_m, tuning.margin_cap_m)
+    work.threats_m[slot, j] = margin_m
+    _note_threat(margin_m, j, slot, work)
+    if not margin_m >= floor_m or not by_table or not work.outnumbered[i]:
+        return margin_m >= floor_m
     floor_m = min(work.joint_target_m[i], level_m)
-    _clear_by_run(i, j, slot, floor_m, scene)
-    _note_threat(j, slot, work)
-    return work.out[MARGIN] >= floor_m
+    margin_m = _clear_by_run(i, j, slot, floor_m, scene)
+    _note_threat(margin_m, j, slot, work)
+    return margin_m >= floor_m
 
 
 @lean_kernel

@@ -9,18 +9,20 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
+import re
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 from numba.core import cgutils, config
-from numba.core.errors import NumbaError
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import intrinsic
 
 from .registry import Barrier
 
 LOG = logging.getLogger(__name__)
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 INTERPRETED = bool(getattr(config, "DISABLE_JIT", False))
 MARGIN, SLOPE_X, SLOPE_Y = range(3)
 DIFFERENCE_M = 0.05
@@ -47,14 +49,21 @@ def _compiled(barrier: Barrier) -> tuple[int, Any] | None:
         return None
     try:
         made = cfunc(_SIGNATURE)(_parts_of(barrier))
-    except (NumbaError, TypeError, ValueError, NotImplementedError) as error:
+    except (NumbaError, UnsupportedBytecodeError, TypeError, ValueError, NotImplementedError) as error:
         LOG.warning(
             "barrier %r runs as plain Python, some microseconds a call: the compiler does not take it (%s)",
             barrier.name,
-            type(error).__name__,
+            _why(error),
         )
         return None
     return int(made.address or 0), made
+
+
+def _why(error: Exception) -> str:
+    """Kind of error and the line of its message that says most: numba's begin with the stage that failed."""
+    lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines() if line.strip()]
+    telling = [line for line in lines if "not" in line.lower() or "unknown" in line.lower()]
+    return ": ".join([type(error).__name__, *(telling or lines)[:1]])
 
 
 def _parts_of(barrier: Barrier) -> Any:

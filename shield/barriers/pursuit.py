@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from ..jit import Array, lean_kernel
-from .clearance import MARGIN, NORMAL_X, NORMAL_Y, SAMPLE, Leg, Search, nearest_on
+from .clearance import Leg, Search, nearest_on
 
 LONGEST_STRIDE = 6
 """Samples a pursuer far away is moved on at once."""
@@ -68,24 +68,17 @@ class Pursuit(NamedTuple):
 
 
 @lean_kernel
-def _note_faded(out: Array, worst: float, weight: float, radius_m: float, leg: Leg, k: int, span: int) -> float:
-    """Least margin over a leg of so many samples, weighted when negative; noted in ``out`` when below ``worst``."""
+def _faded(worst: float, weight: float, radius_m: float, leg: Leg) -> float:
+    """Least margin over a leg, weighted when negative, where that is below ``worst``; else that."""
     limit = radius_m + (worst if worst >= 0.0 else worst / weight)
     if limit <= 0.0:
         return worst
-    part, x, y = nearest_on(leg)
+    _, x, y = nearest_on(leg)
     square = x * x + y * y
     if square >= limit * limit:
         return worst
-    distance = math.sqrt(square)
-    margin = distance - radius_m
-    worst = margin if margin >= 0.0 else margin * weight
-    out[MARGIN], out[SAMPLE] = worst, k - span * (1.0 - part)
-    if distance > 1e-9:
-        out[NORMAL_X], out[NORMAL_Y] = x / distance, y / distance
-    else:
-        out[NORMAL_X], out[NORMAL_Y] = 1.0, 0.0
-    return worst
+    margin = math.sqrt(square) - radius_m
+    return margin if margin >= 0.0 else margin * weight
 
 
 @lean_kernel
@@ -161,7 +154,7 @@ def stays_away(
 
 
 @lean_kernel
-def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Search, end: Array, out: Array) -> float:
+def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Search, end: Array) -> tuple[float, float]:
     """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
 
     Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
@@ -172,11 +165,11 @@ def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Sea
         pursuer: the neighbour.
         pursuit: how long it is followed.
         search: how closely it is looked at.
-        end: where it is then, shape (5,): x, y, m, heading as a unit vector, speed m/s.
-        out: the result row.
+        end: where it is then, shape (5,): x, y, m, heading as a unit vector, speed m/s; written where the search comes
+            to the end.
 
     Returns:
-        The factor that negative margins have faded by at the end.
+        The margin, m, and the factor that negative margins have faded by at the end.
     """
     x, y, ux, uy, speed_mps = pursuer.x, pursuer.y, pursuer.ux, pursuer.uy, pursuer.speed_mps
     closing_m, samples, adverse, turn_rad = search.closing_m, pursuit.samples, pursuit.adverse, pursuer.turn_rad
@@ -185,7 +178,6 @@ def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Sea
     worst = search.cap_m
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
     weight = 1.0
-    out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = search.cap_m, samples, 1.0, 0.0
     c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
     x0, y0 = own[0, 0] - x, own[0, 1] - y
     k = 0
@@ -221,9 +213,9 @@ def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Sea
         x1, y1 = own[k, 0] - x, own[k, 1] - y
         for _ in range(stride):
             weight *= pursuit.fade
-        worst = _note_faded(out, worst, weight, search.radius_m, Leg(x0, y0, x1, y1), k, stride)
+        worst = _faded(worst, weight, search.radius_m, Leg(x0, y0, x1, y1))
         if worst < search.floor_m:
-            return weight
+            return worst, weight
         x0, y0 = x1, y1
     end[0], end[1], end[2], end[3], end[4] = x, y, ux, uy, speed_mps
-    return weight
+    return worst, weight

@@ -13,8 +13,7 @@ from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..scene import Scene
 from .exact_check import check
-from .least_change import before_opponent
-from .verified import SPEED, TURN, costs_at_most, go_back, keeps_all
+from .verified import SPEED, TURN, before_opponent, costs_at_most, go_back, keeps_all
 
 TRIALS = 3
 """Looks for the least share of a backup, the first at none of it: to a quarter of the way."""

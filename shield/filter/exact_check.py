@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from ..backup.assign import recheck
-from ..jit import lean_kernel
+from ..jit import Array, copy_row, lean_kernel
+from ..platforms.step import step_boat
 from ..scene import Scene
-from .screening import predict
+
+
+@lean_kernel
+def predict(i: int, commands: Array, scene: Scene) -> None:
+    """State of boat i one step after its command, by the full boat and autopilot model."""
+    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
+    copy_row(work.next_state[i], state[i])
+    copy_row(work.command[i], commands[i])
+    step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
 
 
 @lean_kernel

@@ -10,18 +10,12 @@ from ..jit import Array, copy_row, lean_kernel
 from ..plan import QP
 from ..scene import Scene
 from .exact_check import check
-from .linearised import build, list_movers, take_answer
-from .verified import LITTLE_M, costs_at_most, go_back, keeps_all, note_verified
+from .linearised import build, take_answer
+from .switching import list_movers
+from .verified import LITTLE_M, before_opponent, costs_at_most, go_back, keeps_all, note_verified
 
 ROUNDS = 2
 """Times the program is linearised and solved anew before the backups stand."""
-
-
-@lean_kernel
-def before_opponent(i: int, scene: Scene) -> bool:
-    """Whether an opponent is in the way of what boat i wants."""
-    cause = scene.plan.cause[i]
-    return cause >= 0 and not scene.ours[cause]
 
 
 @lean_kernel

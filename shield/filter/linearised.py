@@ -1,11 +1,10 @@
-"""The quadratic program about candidate commands: who takes part, its rows, its answer."""
+"""The quadratic program, linearised about candidate commands: its rows, and commands made of its answer."""
 
 from __future__ import annotations
 
 import math
 
 from ..backup.effort import ROW_COST
-from ..backup.rank import ALL
 from ..jit import Array, copy_row, lean_kernel
 from ..plan import Plan
 from ..platforms import layout as L
@@ -16,32 +15,6 @@ from .rows import build_rows, inputs_of
 
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the wanted one is sent."""
-
-
-@lean_kernel
-def pick_movers(scene: Scene) -> int:
-    """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
-    ours, work, plan = scene.ours, scene.work, scene.plan
-    n = ours.shape[0]
-    for i in range(n):
-        if ours[i] and work.kept[i] < ALL:
-            plan.moving[i] = True
-            j = work.bound[i]
-            if j >= 0 and ours[j]:
-                plan.moving[j] = True
-    return list_movers(plan)
-
-
-@lean_kernel
-def list_movers(plan: Plan) -> int:
-    """List the boats marked as movers, and number them; returns how many they are."""
-    count = 0
-    for i in range(plan.moving.shape[0]):
-        plan.place[i] = -1
-        if plan.moving[i]:
-            plan.movers[count], plan.place[i] = i, count
-            count += 1
-    return count
 
 
 @lean_kernel

@@ -6,24 +6,15 @@ from ..backup.assign import assign_plans
 from ..barriers.clearance import FAR
 from ..barriers.neighbours import find_neighbours
 from ..barriers.registered import unknown_at
-from ..jit import Array, copy_row, lean_kernel
+from ..jit import copy_row, lean_kernel
 from ..liveness.right_of_way import apply_right_of_way
 from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
 from ..platforms import layout as L
-from ..platforms.step import step_boat
 from ..platforms.usv import wrap_degrees
 from ..scene import Boats, Scene
 from ..tables.grid import CAP
 from ..work import Work
-
-
-@lean_kernel
-def predict(i: int, commands: Array, scene: Scene) -> None:
-    """State of boat i one step after its command, by the full boat and autopilot model."""
-    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
-    copy_row(work.next_state[i], state[i])
-    copy_row(work.command[i], commands[i])
-    step_boat(boats.params[i], work.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
+from .exact_check import predict
 
 
 @lean_kernel
@@ -33,6 +24,12 @@ def _most_known(i: int, j: int, boats: Boats, work: Work) -> float:
     if table < 0:
         return FAR
     return boats.tables.axes[table, CAP] - work.radius[i, j] - boats.table_margin_m
+
+
+@lean_kernel
+def _asked(decay: float, was_m: float, cap_m: float) -> float:
+    """Margin, m, that is asked for of one that was ``was_m``, capped: the class-K rate of a step, but never below 0."""
+    return decay * max(0.0, min(was_m, cap_m))
 
 
 @lean_kernel
@@ -52,15 +49,15 @@ def set_targets(scene: Scene) -> None:
         work.joint_target_m[i] = 0.0
         work.static_target_m[i] = 0.0
         if ours[i] and memory.has_backup[i]:
-            least_m = max(0.0, memory.margin_m[i])
-            work.target[i] = boats.decay[i] * min(least_m, boats.cap_m[i])
-            work.mate_target_m[i] = boats.decay[i] * min(least_m, tuning.mate_cap_m, boats.cap_m[i])
-            work.joint_target_m[i] = boats.joint_decay * max(0.0, min(memory.joint_m[i], boats.cap_m[i]))
-            work.static_target_m[i] = tuning.static_decay * max(0.0, min(memory.static_m[i], tuning.margin_cap_m))
+            decay, cap_m = boats.decay[i], boats.cap_m[i]
+            work.target[i] = _asked(decay, memory.margin_m[i], cap_m)
+            work.mate_target_m[i] = _asked(decay, memory.margin_m[i], min(tuning.mate_cap_m, cap_m))
+            work.joint_target_m[i] = _asked(boats.joint_decay, memory.joint_m[i], cap_m)
+            work.static_target_m[i] = _asked(tuning.static_decay, memory.static_m[i], tuning.margin_cap_m)
             for j in range(ours.shape[0]):
-                most = min(boats.cap_m[i], _most_known(i, j, boats, work))
-                kept = boats.decay[i] * max(0.0, min(memory.threat_m[i, j], most))
-                work.threat_target_m[i, j] = most if memory.dwell_s[i] > 0.0 else kept
+                most_m = min(cap_m, _most_known(i, j, boats, work))
+                kept_m = _asked(decay, memory.threat_m[i, j], most_m)
+                work.threat_target_m[i, j] = most_m if memory.dwell_s[i] > 0.0 else kept_m
 
 
 @lean_kernel

@@ -27,12 +27,37 @@ from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
 from ..jit import lean_kernel
-from ..plan import BACKUP, BEST_EFFORT
+from ..plan import BACKUP, BEST_EFFORT, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..scene import Scene
 from .exact_check import check
-from .linearised import list_movers, pick_movers
+
+
+@lean_kernel
+def pick_movers(scene: Scene) -> int:
+    """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
+    ours, work, plan = scene.ours, scene.work, scene.plan
+    n = ours.shape[0]
+    for i in range(n):
+        if ours[i] and work.kept[i] < ALL:
+            plan.moving[i] = True
+            j = work.bound[i]
+            if j >= 0 and ours[j]:
+                plan.moving[j] = True
+    return list_movers(plan)
+
+
+@lean_kernel
+def list_movers(plan: Plan) -> int:
+    """List the boats marked as movers, and number them; returns how many they are."""
+    count = 0
+    for i in range(plan.moving.shape[0]):
+        plan.place[i] = -1
+        if plan.moving[i]:
+            plan.movers[count], plan.place[i] = i, count
+            count += 1
+    return count
 
 
 @lean_kernel

@@ -53,6 +53,13 @@ def keeps_all(i: int, scene: Scene) -> bool:
 
 
 @lean_kernel
+def before_opponent(i: int, scene: Scene) -> bool:
+    """Whether an opponent is in the way of what boat i wants."""
+    cause = scene.plan.cause[i]
+    return cause >= 0 and not scene.ours[cause]
+
+
+@lean_kernel
 def go_back(i: int, scene: Scene) -> None:
     """Make boat i's command the verified one again."""
     plan = scene.plan

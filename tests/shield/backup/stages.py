@@ -6,7 +6,7 @@ import numpy as np
 from steerclear.shield import Surroundings, plan
 from steerclear.shield.backup.assign import assign_plans
 from steerclear.shield.barriers.neighbours import find_neighbours
-from steerclear.shield.filter import flow, least_change, linearised, screening
+from steerclear.shield.filter import exact_check, flow, least_change, screening, switching
 from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.kept_barriers import KeptBarriers
 from steerclear.shield.memory import new_memory
@@ -75,7 +75,7 @@ def screened_with_all_pairs(at, wanted):
         at.plan.slack_m[i], at.plan.moving[i] = 0.0, False
         at.plan.reason[i] = plan.PASSED if at.ours[i] else plan.NOT_COVERED
         if at.ours[i]:
-            screening.predict(i, at.plan.commands, at.scene)
+            exact_check.predict(i, at.plan.commands, at.scene)
             turn = at.work.next_state[i, L.HEADING] - at.state[i, L.HEADING]
             at.plan.wanted_turn[i] = (turn + 180.0) % 360.0 - 180.0
     at.plan.screened[:] = at.plan.commands
@@ -85,7 +85,7 @@ def screened_with_all_pairs(at, wanted):
 
 def built(at):
     """Pick the movers and build their rows: number of movers, number of rows."""
-    count = linearised.pick_movers(at.scene)
+    count = switching.pick_movers(at.scene)
     return count, least_change.linearise(count, at.scene)
 
 

@@ -9,7 +9,6 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.backup.paths import Manoeuvre, Span, sail, trace_path
-from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.opponents import clear_of_pursuer
 from steerclear.shield.platforms import PLATFORMS, get_platform
@@ -116,8 +115,7 @@ def table_m(bearing_deg, far_m, **settings):
     at = stages_of(ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, **settings}), rows, ["heron"] * 2, [0, 1])
     find_neighbours(at.scene)
     lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
-    clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
-    return float(at.work.out[MARGIN])
+    return clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
 
 
 @pytest.mark.parametrize(

@@ -98,8 +98,8 @@ def run_and_looked_up(at, j, tables):
     lasts = int(ready[READY_SAMPLE] + at.boats.pursuit_samples[0])
     pursuit = pursuit_of(0, j, 0, lasts, lasts, True, at.scene)
     for manner in range(6):
-        faded = _run_pursuer(0, j, 0, manner, pursuit, at.scene, -FAR, 2.0)
-        least = min(least, at.work.spare[MARGIN])
+        margin_m, faded = _run_pursuer(0, j, 0, manner, pursuit, at.scene, -FAR, 2.0)
+        least = min(least, margin_m)
         pursuer = at.work.pursuer
         there = pursuer[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
         headings = ready[READY_HEADING], math.atan2(pursuer[2], pursuer[3])

@@ -7,7 +7,6 @@ import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.laying import lay_path
-from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.opponents import clear_of_pursuer
 from steerclear.shield.platforms import get_platform
@@ -61,8 +60,8 @@ def modelled(name, own, pursuer, side, turn_deg):
     find_neighbours(at.scene)
     top = get_platform(name).max_speed_mps
     lay_path(0, 0, side, turn_deg, top, 0, at.scene)
-    clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
-    return at.work.out[MARGIN], int(at.boats.pursuit_samples[0]) * at.boats.stride
+    margin_m = clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+    return margin_m, int(at.boats.pursuit_samples[0]) * at.boats.stride
 
 
 def scenes(name, count, seed):

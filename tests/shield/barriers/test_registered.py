@@ -15,7 +15,7 @@ from steerclear.experiments.entries.wrapping.facts import facts_for
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, hints
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
-from steerclear.shield.barriers.pointer import _interpreted, address_of
+from steerclear.shield.barriers.pointer import _compiled, _interpreted, address_of
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError
 
@@ -294,6 +294,27 @@ def test_what_is_no_plain_function_is_interpreted(odd):
     decision = Shield(barriers=("odd",)).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
     assert decision.intervened
     assert decision.binding == ("odd",)
+
+
+def squared(value):
+    return value * value
+
+
+def calling(x_m, y_m, ahead_s, ferry):
+    return squared(x_m) - 25.0
+
+
+def importing(x_m, y_m, ahead_s, ferry):
+    import math as own
+
+    return own.hypot(x_m, y_m) - 5.0
+
+
+@pytest.mark.parametrize(("odd", "why"), [(calling, "Untyped global name 'squared'"), (importing, "IMPORT_NAME")])
+def test_why_a_function_is_interpreted_is_told(odd, why, caplog):
+    assert _compiled(Barrier("told", odd, values=NEAR)) is None
+    assert why in caplog.text
+    assert "\x1b" not in caplog.text
 
 
 def test_what_is_seen_too_late_or_raises_does_not_conform():

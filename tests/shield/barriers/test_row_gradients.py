@@ -9,7 +9,7 @@ from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.barriers.boats import clear_of_boat
 from steerclear.shield.barriers.clearance import FAR, MARGIN
 from steerclear.shield.barriers.static import clear_of_near_obstacles, clear_of_static
-from steerclear.shield.filter import rows, screening
+from steerclear.shield.filter import exact_check, rows
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -50,7 +50,7 @@ class Linearised:
             speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
             turn = z[2 * m] * at.plan.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
-            screening.predict(i, commands, at.scene)
+            exact_check.predict(i, commands, at.scene)
             lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
 
     def margin(self, z):

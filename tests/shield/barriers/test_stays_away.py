@@ -8,7 +8,7 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.backup.paths import READY_SAMPLE
-from steerclear.shield.barriers.clearance import MARGIN, Search
+from steerclear.shield.barriers.clearance import Search
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.opponents import (
     FORGOTTEN_LOSS,
@@ -54,8 +54,7 @@ def margins_of_all_runs(at):
     closely, lasts = followed(at)
     pursuit, rudders = pursuit_of(0, 1, 0, lasts, closely, False, at.scene), len(RUDDERS) - 1
     for manner in range(2 * (rudders if at.boats.granted_loss[1] > FORGOTTEN_LOSS else 1)):
-        _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, CAP_M)
-        yield at.work.spare[MARGIN]
+        yield _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, CAP_M)[0]
 
 
 def meetings(own, other, seed):
@@ -90,8 +89,8 @@ def test_the_clearance_from_a_pursuer_is_the_least_of_all_runs(own, other):
     """Also where no run is made: over the whole pursuit, not a part of it."""
     short, late = 0, 0
     for at in meetings(own, other, seed=9):
-        clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M)
-        told, least = at.work.out[MARGIN], min(margins_of_all_runs(at))
+        told = clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M)
+        least = min(margins_of_all_runs(at))
         assert told == least
         short += least < CAP_M
         late += least < CAP_M and is_away(at, int(at.boats.pursuit_samples[0]) // 2)
@@ -107,10 +106,10 @@ def test_a_stride_that_cuts_off_a_way_round_the_pursuer_counts():
     own = far_m * np.column_stack([np.cos(angles), np.sin(angles)])
     assert (np.linalg.norm(np.diff(own, axis=0), axis=1) < closing_m).all()
     assert (np.linalg.norm(own, axis=1) > radius_m + CAP_M + closing_m).all()
-    at_rest, out, end = Pursuer(0.0, 0.0, 0.0, 1.0, *(0.0,) * 6, False), np.zeros(4), np.zeros(5)
+    at_rest, end = Pursuer(0.0, 0.0, 0.0, 1.0, *(0.0,) * 6, False), np.zeros(5)
     pursuit = Pursuit(0.2, CHASE_STRIDE, CHASE_STRIDE, 0, 1.0, 1.0, False)
-    roll_out_pursuer(own, at_rest, pursuit, Search(closing_m, radius_m, -1e6, CAP_M), end, out)
-    assert out[MARGIN] < CAP_M
+    margin_m, _ = roll_out_pursuer(own, at_rest, pursuit, Search(closing_m, radius_m, -1e6, CAP_M), end)
+    assert margin_m < CAP_M
     assert not stays_away(own, 0.0, 0.0, 0.0, CHASE_STRIDE, closing_m, radius_m, CAP_M)
 
 
@@ -119,8 +118,7 @@ def test_who_may_come_near_is_run_through():
     at = scene("heron", "surveyor", np.random.default_rng(1))
     at.state[1, [L.X, L.Y]] = at.state[0, [L.X, L.Y]] + [0.0, 4.0]
     find_neighbours(at.scene)
-    clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M)
-    assert at.work.out[MARGIN] < CAP_M
+    assert clear_of_pursuer(0, 1, 0, at.scene, -1e6, CAP_M) < CAP_M
     assert not is_away(at, int(at.boats.pursuit_samples[0]))
 
 

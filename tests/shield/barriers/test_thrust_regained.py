@@ -10,7 +10,6 @@ from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.laying import NO_PURSUERS, PURSUERS, PURSUERS_TILL_READY, lay_path, pursuers_run
 from steerclear.shield.backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
-from steerclear.shield.barriers.clearance import MARGIN
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.opponents import _run_pursuer, clear_of_pursuer, pursuit_of
 from steerclear.shield.batch import BatchedShield
@@ -90,13 +89,12 @@ def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends()
         lasts = int(at.boats.pursuit_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
         runs, values, pursuit = [], [], pursuit_of(0, 1, 0, lasts, lasts, True, at.scene)
         for manner in range(6):
-            faded = _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, 1e6)
-            runs.append(at.work.spare[MARGIN])
+            margin_m, faded = _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, 1e6)
+            runs.append(margin_m)
             margin = value_margin(at, tables)
             if margin is not None:
                 values.append(margin if margin >= 0.0 else margin * faded)
-        clear_of_pursuer(0, 1, 0, at.scene, -1e6, 1e6)
-        assert at.work.out[MARGIN] == pytest.approx(min(runs + values), abs=1e-9)
+        assert clear_of_pursuer(0, 1, 0, at.scene, -1e6, 1e6) == pytest.approx(min(runs + values), abs=1e-9)
         from_value += bool(values) and min(values) < min(runs)
         from_run += not values or min(runs) < min(values)
     assert from_value > 2 < from_run
@@ -150,8 +148,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
     for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
         at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
         laid(at, 1.0, 0.0, 2.0)
-        clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
-        assert (at.work.out[MARGIN] < 0.0) == fails
+        assert (clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0) < 0.0) == fails
 
 
 @pytest.mark.parametrize("wanted_mps", [2.0, 0.0])
@@ -198,7 +195,7 @@ def test_margins_of_long_pursuits_fade_as_much_by_their_end():
         pursuit, build = herons_samples(at)
         lasts = min(int(at.work.ready[0, READY_SAMPLE]) + pursuit, pursuit + build)
         pursuit = pursuit_of(0, 1, 0, lasts, lasts, False, at.scene)
-        faded.append(_run_pursuer(0, 1, 0, 0, pursuit, at.scene, -1e6, 1e6))
+        faded.append(_run_pursuer(0, 1, 0, 0, pursuit, at.scene, -1e6, 1e6)[1])
     np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
 
 
@@ -206,8 +203,7 @@ def test_a_boat_that_never_gets_its_thrust_back_is_run_through_to_the_end():
     at = stages(slow_boat(), opponent(0.0, 30.0, 180.0))
     laid(at, 1.0, 0.0, 0.0)
     assert at.work.ready[0, READY_SAMPLE] == -1.0
-    clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
-    assert at.work.out[MARGIN] < 0.0
+    assert clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0) < 0.0
 
 
 def chased(certificate, count=40, steps=500):
