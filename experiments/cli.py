@@ -20,6 +20,7 @@ from .commands.encounters import encounters
 from .commands.entry import app as entry_app
 from .commands.evaluate import evaluate
 from .commands.export import export
+from .commands.once import App
 from .commands.parity import parity
 from .commands.platform import app as platform_app
 from .commands.play import play
@@ -33,7 +34,7 @@ from .optional import optional_command
 from .runs.provenance import package_version
 from .terminal import prepare
 
-app = typer.Typer(
+app = App(
     name="steerclear",
     help="A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.",
     no_args_is_help=True,

@@ -26,9 +26,10 @@ from ..runs.store import ResultStore, write_json
 from . import options as o
 from .console import command, err, finish, out, progress
 from .games import check_complete, results_folder, run_games, say_of_distance
+from .once import App
 from .policies_tried import say_of_elsewhere
 
-app = typer.Typer(
+app = App(
     help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
     no_args_is_help=True,
 )

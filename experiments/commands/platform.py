@@ -19,8 +19,9 @@ from ..fit.words import about_the_boat, promise
 from ..runs.new_file import NEW, check_new, make_folder_of
 from .console import command, out
 from .files import check_ending
+from .once import App
 
-app = typer.Typer(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
+app = App(no_args_is_help=True, help="Platforms: boats behind their autopilots, as files.")
 Named = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")]
 Begin = Annotated[str, typer.Option("--from", metavar="NAME", help="The platform to begin with.")]
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,31}")

@@ -28,11 +28,12 @@ from ..reach.show import check_picture, draw_sets, show_card
 from ..runs.new_file import NEW, check_new
 from . import options as o
 from .console import Interrupted, command, err, finish, out
+from .once import App
 from .plain_progress import PlainProgress
 from .reach_compare import OtherBoat, OwnBoat, compare
 from .reach_play import play
 
-app = typer.Typer(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
+app = App(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
 
 OtherMay = Annotated[str, typer.Option(metavar="MODE", help="What the other boat may do: worst-case or cooperative.")]
 Radius = Annotated[

@@ -80,7 +80,8 @@ def subtitle(results: Results) -> str:
         f"{settings['preset']}, {results['games_played']} games"
         + (f" of {length:g} s" if length else "")
         + f", {repetitions} repetition{'' if repetitions == 1 else 's'} of every pair on both sides in every state, "
-        + f"seeds {settings['seed']} to {settings['seed'] + repetitions - 1}, penalty {settings['penalty']:g}"
+        + f"seeds {settings['seed']} to {settings['seed'] + repetitions - 1}, penalty {settings['penalty']:g}, "
+        + f"steerclear {results['versions']['steerclear']}"
         + ("" if results["complete"] else f"; not complete: {_there(results)}")
     )
 
