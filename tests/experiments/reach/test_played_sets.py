@@ -50,7 +50,8 @@ def meeting(*places):
 
 
 def play(*arguments):
-    return CliRunner().invoke(cli.app, ["reach", "play", *BOATS, "--jobs", "1", *arguments])
+    jobs = [] if "--jobs" in arguments else ["--jobs", "1"]
+    return CliRunner().invoke(cli.app, ["reach", "play", *BOATS, *jobs, *arguments])
 
 
 def test_boats_head_on_are_saved_until_the_table_says_that_nobody_can(heron):
