@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 from steerclear.shield import jit
 
 F = TypeVar("F", bound=Callable[..., Any])
-FOLDERS = ("encounters", "baselines/reach_guard", "baselines/textbook")
-"""Folders whose compiled functions are called from elsewhere; a function's own folder always counts."""
+FOLDERS = ("encounters", "baselines/reach_guard", "baselines/textbook", "measure")
+"""Folders whose compiled functions or constants are used elsewhere; a function's own folder always counts."""
 
 
 def digest_of(folders: set[Path]) -> str:

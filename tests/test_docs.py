@@ -106,3 +106,8 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert "arithmatex" not in pages["shield.html"]
     assert "ShieldedParallelEnv" in pages["api.html"]
     assert "check_platform(" in pages["extend.html"]
+
+
+def test_times_of_decisions_stand_where_a_quiet_machine_measured_them():
+    for page in sorted(DOCS.glob("ablation_*.md")):
+        assert "decision p" not in page.read_text(encoding="utf-8"), page

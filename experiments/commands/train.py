@@ -13,6 +13,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..runs.folder_lock import lock_folder
 from ..training.config_file import read_config
+from ..training.unused import check_used
 from .console import Interrupted, command, err, out
 from .plain_progress import PlainProgress
 
@@ -32,6 +33,7 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     Exit status: 0 done, 2 bad input or a loss that is not finite, 130 interrupted (all is kept, --resume goes on).
     """
     settings = read_config(config)
+    check_used(settings)
     folder = out_folder or Path("trainings") / config.stem
     if settings.algorithm != "cloning":
         check_extra()

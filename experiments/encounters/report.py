@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..report.ablation_parts import bars_table, legend, replay_links, values_table
 from ..report.page import as_text, report_page, template, write_page
+from ..report.parts import bars_table, legend, replay_links, values_table
 from ..report.tables import number_text
 from .cdf import Curve, distribution_plot
 from .families import FAMILIES

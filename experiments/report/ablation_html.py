@@ -11,7 +11,11 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..measure.tally import RADII_M, breach_column
 from ..play.conditions import words_of
-from .ablation_parts import (
+from .ablation_plots import closest_plot, figure_plot, reason_plot, reasons_of, words
+from .ablation_verdicts import breaches_table, verdict_tables
+from .meanings import reasons_told
+from .page import as_text, report_page, template, write_page
+from .parts import (
     bars_table,
     games_table,
     headlines,
@@ -21,10 +25,6 @@ from .ablation_parts import (
     replay_links,
     values_table,
 )
-from .ablation_plots import closest_plot, figure_plot, reason_plot, reasons_of, words
-from .ablation_verdicts import breaches_table, verdict_tables
-from .meanings import reasons_told
-from .page import as_text, report_page, template, write_page
 
 REQUIRED = ("settings", "versions", "pairings", "games")
 PAIRING_KEYS = ("pairing", "games_off", "games_on", "metrics", "reasons")

@@ -24,10 +24,12 @@ PACKAGES = (
     "kairos-planner",
 )
 
+SOURCES = ("*.py", "*.npz", "shipped/*.yaml")
+"""Code, tables and weights, boats."""
 NO_GAME = (
     "shield/bridge",
     "env/render",
-    *(f"experiments/{name}" for name in ("boats", "commands", "deploy", "report")),
+    *(f"experiments/{name}" for name in ("boats", "commands", "pages", "report")),
 )
 """Folders whose code changes no result that is kept on disk."""
 
@@ -43,9 +45,9 @@ def code_digest() -> str:
     root = Path(__file__).parents[2]
     digest = hashlib.sha256(str(sorted(versions().items())).encode())
     for folder in ("shield", "env", "policies", "experiments"):
-        for path in sorted((*(root / folder).rglob("*.py"), *(root / folder).rglob("*.npz"))):
+        for path in sorted(path for ending in SOURCES for path in (root / folder).rglob(ending)):
             name = path.relative_to(root).as_posix()
-            if not name.startswith(NO_GAME):
+            if not name.startswith(tuple(f"{left_out}/" for left_out in NO_GAME)):
                 digest.update(name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

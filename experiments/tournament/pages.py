@@ -8,10 +8,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..report.ablation_parts import bars_table as bars_html
-from ..report.ablation_parts import replay_links, values_table
 from ..report.markdown import MADE, bars_table, line, table
 from ..report.page import as_text, report_page, template, write_page
+from ..report.parts import bars_table as bars_html
+from ..report.parts import replay_links, values_table
 from .figure import can_be_drawn, draw
 from .tables import Table, all_tables, cycle_lines, shown
 
@@ -45,7 +45,7 @@ def write_html(results: Results, path: Path, replays: Sequence[Mapping[str, str]
         "REPLAYS": replay_links(replays),
         "FIGURE": _figure_html(results),
         "NOTE": as_text(NOTE),
-        "CYCLES": "".join(f"<li>{as_text(words)}</li>" for words in cycle_lines(results)),
+        "CYCLES": "".join(f'<p class="note">{as_text(words)}</p>' for words in cycle_lines(results)),
         "TABLES": "".join(_table_html(one) for one in all_tables(results)),
         "SETTINGS": values_table(results["settings"]),
         "VERSIONS": values_table({**results["versions"], **results["machine"]}),

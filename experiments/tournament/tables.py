@@ -23,7 +23,7 @@ def all_tables(results: Results) -> list[Table]:
     for state in results["states"]:
         if state["standings"]:
             found += [table_3(state), table_4(state), counts(state), wins(state), alpha(state)]
-    return found + agreement(results)
+    return found + agreement_tables(results)
 
 
 def shown(state: str) -> str:
@@ -170,7 +170,7 @@ def _compared(results: Results) -> list[tuple[str, Mapping[str, Any]]]:
     ]
 
 
-def agreement(results: Results) -> list[Table]:
+def agreement_tables(results: Results) -> list[Table]:
     """How far the ranks agree with the paper's, and which pairs do not; none without three of its teams."""
     compared = _compared(results)
     if not compared:
@@ -181,15 +181,19 @@ def agreement(results: Results) -> list[Table]:
         for over, one in _agreed(entry)
     ]
     heads = ["paper's ranks, our games", "over", "Spearman's rho", "Kendall's tau-b", "pairs turned"]
-    return [("Agreement with the paper's ranks", heads, rows), *_turned(compared)]
+    among = [(name, entry["scripted"]["among"]) for name, entry in compared if entry["scripted"] is not None]
+    return [
+        ("Agreement with the paper's ranks", heads, rows),
+        *_turned("Pairs that the paper ranks the other way round: share of resamples", compared),
+        *_turned("The same of the scripted teams, games among them", among),
+    ]
 
 
-def _turned(compared: list[tuple[str, Mapping[str, Any]]]) -> list[Table]:
+def _turned(title: str, compared: list[tuple[str, Mapping[str, Any]]]) -> list[Table]:
     """Pairs that some ranking has the other way round than the paper, and how sure that is; no table without any."""
     sure = [dict(zip(entry["disagree"], entry["sure"], strict=True)) for _, entry in compared]
     pairs = sorted({pair for one in sure for pair in one})
     rows = [[pair, *(_share(one[pair]) if pair in one else "-" for one in sure)] for pair in pairs]
-    title = "Pairs that the paper ranks the other way round: share of resamples"
     return [(title, ["ours", *(name for name, _ in compared)], rows)] if rows else []
 
 
@@ -203,7 +207,7 @@ def _agreed(entry: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     found = [(f"all {len(entry['teams'])}", entry)]
     if scripted is None:
         return found
-    words = f"the {len(scripted['all_games']['teams'])} that do not learn"
+    words = f"the {len(scripted['all_games']['teams'])} scripted"
     if scripted["all_games"]["teams"] == entry["teams"]:
         found = []
     found.append((words, scripted["all_games"]))

@@ -67,12 +67,16 @@ def set_stage(batch: TeamBatch, settings: TrainingSettings, stage: Stage, guard:
         stage: what is to be.
         guard: shield and command filter of the stages that have one.
     """
-    core = batch.core
-    wanted = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
-    core.rules = share(core.rules._replace(tag_probability=float(wanted)))
+    set_tags(batch.core, stage)
     batch.shield, batch._filter = guard if stage.shielded else (None, None)
     batch.reward = WeightedSum(settings.reward_weights(stage))
-    batch.reward.begin(batch, np.ones(core.n_games, np.bool_))
+    batch.reward.begin(batch, np.ones(batch.core.n_games, np.bool_))
+
+
+def set_tags(core: BatchedMctf, stage: Stage) -> None:
+    """Let tags succeed as often as a stage says."""
+    wanted = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
+    core.rules = share(core.rules._replace(tag_probability=float(wanted)))
 
 
 def check_sight(settings: TrainingSettings) -> None:

@@ -14,9 +14,8 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 
 from .each_game import EachGame
-from .settings import League, Stage
+from .settings import SELF, League, Stage
 
-SELF = "self"
 LAST = 50
 """Games that a mean score is over."""
 

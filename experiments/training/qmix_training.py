@@ -15,7 +15,7 @@ from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
 from .curve import write_curve
-from .games import learners_of, set_stage, stagger
+from .games import check_sight, learners_of, set_stage, stagger
 from .learner import DivergedError
 from .networks import TeamFeatures, features_of
 from .playing import evaluation_of
@@ -46,6 +46,7 @@ class QmixTraining:
                 raise ConfigError(f"unknown option {name!r} of qmix; choose one of {', '.join(DEFAULTS)}")
         if resume:
             raise ConfigError("qmix begins anew; leave out --resume")
+        check_sight(settings)
         self.settings, self.folder, self.decisions = settings, folder, 0
         self.options = {**DEFAULTS, **settings.options}
         torch.manual_seed(settings.seed)
@@ -66,6 +67,14 @@ class QmixTraining:
 
     def run(self, notice: Any = lambda done, words: None) -> None:
         """Train to the end."""
+        threads = torch.get_num_threads()
+        torch.set_num_threads(self.settings.threads)
+        try:
+            self._train(notice)
+        finally:
+            torch.set_num_threads(threads)
+
+    def _train(self, notice: Any) -> None:
         seen = self.batch.reset(self.settings.seed)
         stagger(self.batch, self.settings.seed)
         began, losses, nets = time.perf_counter(), [0.0], [0.0]

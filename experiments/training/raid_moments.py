@@ -18,7 +18,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from .games import core_of, shield_of
+from .games import core_of, set_tags, shield_of
 from .pool import Pool
 from .settings import TrainingSettings
 
@@ -129,13 +129,16 @@ class _Drawn:
 
 def recorded(settings: TrainingSettings, spread: float, seed: int) -> list[Moment]:
     """Moments of as many games as a training plays at once, with its rules and shield, against its opponents."""
-    core = core_of(settings, settings.games, seed, settings.stages[0])
+    stage = settings.stages[0]
+    core = core_of(settings, settings.games, seed, stage)
+    set_tags(core, stage)
     core.reset(seed=seed)
-    foe = Pool(settings.stages[0], settings.league, seed, settings.entrants_every)
+    foe = Pool(stage, settings.league, seed, settings.entrants_every)
     recorder = Recorder(settings.interval, spread, seed, foe)
     recorder.reset(core, 0, seed)
     foe.reset(core, 1, seed + 1)
-    command_filter = shield_of(settings, core).filter_for(0) if settings.shielded_training else None
+    shielded = settings.shielded_training and stage.shielded
+    command_filter = shield_of(settings, core).filter_for(0) if shielded else None
     commands = np.zeros((core.n_games, core.n_boats, 2))
     own, others = np.flatnonzero(core.team == 0), np.flatnonzero(core.team == 1)
     while not (core.terminated | core.truncated).all():

@@ -16,6 +16,8 @@ from .checks import choice, count, number, span, texts
 SHIELDS = ("none", "deployment", "training", "training+intervention")
 ALGORITHMS = ("ppo", "qmix", "qmix+ppo", "cloning", "raids")
 DEVICES = ("auto", "cpu", "cuda")
+SELF = "self"
+"""Among opponents: snapshots of the learner."""
 INTERVENTION_WEIGHT = 0.02
 """Cost of a game step in which the shield changed a boat's command, where the shield mode asks for one."""
 
@@ -144,6 +146,8 @@ class Evaluation:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "opponents", texts("opponents", self.opponents))
+        if SELF in self.opponents:
+            raise ConfigError(f"evaluation.opponents names {SELF!r}, which is no policy; name held-out opponents")
         count("every", self.every, 1, 10**6)
         count("games", self.games, 1, 10_000)
         count("seed", self.seed, 0, 2**40)

@@ -21,9 +21,9 @@ from .curve import write_curve
 from .games import Timed, check_sight, learners_of, set_stage, stagger
 from .learner import Learner
 from .playing import evaluation_of, keep_best
-from .pool import SELF, Pool
+from .pool import Pool
 from .rewards import WeightedSum
-from .settings import Stage, TrainingSettings
+from .settings import SELF, Stage, TrainingSettings
 from .state import live_arrays, pool_facts, put_arrays, put_pool, put_rng, rng_facts
 
 BEST, FINAL, MODEL, SNAPSHOTS = "best.npz", "final.npz", "model.zip", "snapshots"

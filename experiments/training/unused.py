@@ -7,8 +7,7 @@ from operator import attrgetter
 
 from steerclear.shield.exceptions import ConfigError
 
-from .pool import SELF
-from .settings import Evaluation, League, Net, Ppo, Stage, TrainingSettings
+from .settings import SELF, Evaluation, League, Net, Ppo, Stage, TrainingSettings
 
 
 def _all(part: str, kind: type, but: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -20,7 +19,7 @@ _SNAPSHOTS = ("league.every", "league.keep")
 _NO_CHECKPOINTS = ("checkpoint_every",)
 NO_USE: dict[str, tuple[str, ...]] = {
     "ppo": (),
-    "qmix+ppo": (),
+    "qmix+ppo": ("actions",),
     "qmix": (
         *_all("ppo", Ppo, but=("discount",)),
         *_SNAPSHOTS,
@@ -28,8 +27,6 @@ NO_USE: dict[str, tuple[str, ...]] = {
         "actions",
         "net.roles",
         "evaluation.every",
-        "device",
-        "threads",
         "start",
     ),
     "cloning": (
@@ -45,7 +42,7 @@ NO_USE: dict[str, tuple[str, ...]] = {
         "shield_settings",
         "shield_every",
         "entrants_every",
-        "device",
+        "decisions",
         "threads",
         "start",
     ),
@@ -60,6 +57,7 @@ NO_USE: dict[str, tuple[str, ...]] = {
     ),
 }
 """By algorithm, dotted names."""
+ON_CPU = ("qmix", "cloning")
 _PROMOTION = ("net", "games", "most")
 NO_USE_IN_STAGE: dict[str, tuple[str, ...]] = {
     "qmix": _PROMOTION,
@@ -76,6 +74,8 @@ def check_used(settings: TrainingSettings) -> None:
         ConfigError: one does, or there are stages or opponents that no game would have.
     """
     algorithm, first = settings.algorithm, settings.stages[0]
+    if algorithm in ON_CPU and settings.device == "cuda":
+        raise ConfigError(f"algorithm {algorithm} learns on the CPU; leave device out")
     _refuse(algorithm, settings, TrainingSettings(), NO_USE[algorithm], "")
     if algorithm in NO_USE_IN_STAGE:
         if len(settings.stages) > 1:

@@ -1,7 +1,10 @@
 """Compiled functions of the experiments are compiled again when a source beside them changes."""
 
+from pathlib import Path
+
 import pytest
 from steerclear.experiments import jit
+from test_imports import FILES, GRAPH
 
 
 def test_a_changed_added_or_renamed_source_gives_another_digest(tmp_path):
@@ -24,10 +27,27 @@ def test_the_stamp_of_a_kernel_holds_the_digest_of_its_folder_and_of_those_it_ma
     asked = []
     monkeypatch.setattr(jit, "digest_of", lambda folders: asked.append(folders) or "digest")
     assert stamp()[-1] == "digest"
-    assert {folder.name for folder in asked[0]} == {"experiments", "encounters", "reach_guard", "textbook"}
+    here = Path(jit.__file__).parent
+    assert asked[0] == {Path(__file__).parent, *(here / folder for folder in jit.FOLDERS)}
     monkeypatch.setattr(jit, "digest_of", lambda folders: "another")
     assert stamp()[-1] == "another"
     jit._digest_beside.cache_clear()
+
+
+PLAIN = {"baselines.batch_guard"}
+"""Modules of which compiled functions get nothing."""
+
+
+def test_what_compiled_functions_get_from_elsewhere_is_in_the_folders():
+    prefix, kernels = "steerclear.experiments.", "steerclear.experiments.jit"
+    strangers = set()
+    for name, others in GRAPH.items():
+        if kernels in others and name.startswith(prefix):
+            own = FILES[name].parent
+            beside = {own, *(Path(jit.__file__).parent / folder for folder in jit.FOLDERS)}
+            ours = {other for other in others if other.startswith(prefix) and other != kernels}
+            strangers |= {other.removeprefix(prefix) for other in ours if FILES[other].parent.resolve() not in beside}
+    assert strangers - PLAIN == set()
 
 
 def one_more(x):

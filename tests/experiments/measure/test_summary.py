@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 from steerclear.experiments.measure.summary import metrics_of, summarise
-from steerclear.experiments.report.ablation_parts import bars_table as bars_html
 from steerclear.experiments.report.markdown import bars_table as bars_lines
+from steerclear.experiments.report.parts import bars_table as bars_html
 from steerclear.experiments.report.tables import bars_table, interval_text, measured_text, number_text, pairing_table
 
 

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 from steerclear.experiments.report.ablation_html import write_report
-from steerclear.experiments.report.ablation_parts import headlines
+from steerclear.experiments.report.parts import headlines
 from steerclear.experiments.report.svg import Bar, bar_plot, dot_plot, share_plot, ticks
 from steerclear.shield.exceptions import ConfigError
 

@@ -118,9 +118,15 @@ def test_the_digest_of_the_code_changes_with_sources_tables_and_versions(tmp_pat
     monkeypatch.setattr(provenance, "versions", lambda: {"numpy": "0"})
     seen.append(digest())
     assert len(set(seen)) == 6
-    (tmp_path / "experiments" / "commands").mkdir()
-    (tmp_path / "experiments" / "commands" / "words.py").write_text("1")
-    assert digest() == seen[-1], "what only shows results changes none"
+    for name in ("experiments/commands/words.py", "experiments/report/page.py", "shield/bridge/loop.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1")
+        assert digest() == seen[-1], "what only shows results changes none"
+    for name in ("shield/platforms/shipped/heron.yaml", "experiments/deploy/worker.py", "experiments/report_of.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+        seen.append(digest())
+    assert len(set(seen)) == 9
 
 
 def test_a_whole_last_line_without_its_end_is_counted_and_stays(tmp_path):

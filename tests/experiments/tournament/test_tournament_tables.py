@@ -6,8 +6,7 @@ from steerclear.experiments.tournament.agreement import agreement, rho, tau_b
 from steerclear.experiments.tournament.paper import PAPER
 from steerclear.experiments.tournament.price import keeps, prices
 from steerclear.experiments.tournament.standings import Totals, column, score_of, standings
-from steerclear.experiments.tournament.tables import _kept
-from steerclear.experiments.tournament.tables import agreement as agreement_tables
+from steerclear.experiments.tournament.tables import _kept, agreement_tables
 from steerclear.experiments.tournament.winning import alpha_rank, cycles, win_matrix
 
 PLAIN = {"captures": 0, "grabs": 0, "tags": 0, "collisions": 0, "hits_teammate": 0, "hits_opponent": 0}
@@ -93,8 +92,8 @@ def test_the_scripted_are_compared_on_all_games_and_on_those_among_them():
     (_, _, rows), (_, heads, turned) = agreement_tables({"states": [state]})
     assert [row[1] for row in rows] == [
         "all 4",
-        "the 3 that do not learn",
-        "the 3 that do not learn, games among them",
+        "the 3 scripted",
+        "the 3 scripted, games among them",
     ]
     assert [row[-1] for row in rows] == [f"{len(found['disagree'])}", "1", "0"]
     assert heads == ["ours", "Table 3, no shields"]
