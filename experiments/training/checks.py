@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
@@ -67,3 +68,24 @@ def texts(name: str, value: Any) -> tuple[str, ...]:
     if isinstance(value, str) or not value or not all(isinstance(one, str) and one for one in value):
         raise ConfigError(f"{name} is {value!r}; give a list of names, such as [medium]")
     return tuple(value)
+
+
+def check_options(algorithm: str, given: Mapping[str, Any], ranges: Mapping[str, tuple[type, float, float]]) -> None:
+    """Refuse options of an algorithm that are unknown or cannot be.
+
+    Args:
+        algorithm: whose they are, as the config names it.
+        given: by name.
+        ranges: of each that is known: int or float, and limits.
+
+    Raises:
+        ConfigError: one is.
+    """
+    for name, value in given.items():
+        if name not in ranges:
+            raise ConfigError(f"unknown option {name!r} of {algorithm}; choose one of {', '.join(ranges)}")
+        kind, low, high = ranges[name]
+        if kind is int:
+            count(f"options.{name}", value, int(low), int(high))
+        else:
+            number(f"options.{name}", value, low, high)

@@ -16,11 +16,19 @@ from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, 
 from steerclear.policies.entrants.learned.teacher import Teacher
 from steerclear.shield.exceptions import ConfigError
 
+from .checks import check_options
 from .curve import write_curve
 from .games import core_of
 from .settings import TrainingSettings
 
-KNOWN = ("demonstrations", "epochs", "rate", "hidden", "batch")
+DEMONSTRATIONS = "demonstrations"
+RANGES = {
+    "epochs": (int, 1, 10**6),
+    "rate": (float, 1e-9, 1e3),
+    "hidden": (int, 1, 4096),
+    "batch": (int, 1, 10**7),
+}
+"""Options beside the demonstrations."""
 HELD_OUT = 0.2
 
 
@@ -34,19 +42,20 @@ class CloningTraining:
         resume: is not looked at: it takes seconds.
 
     Raises:
-        ConfigError: an unknown option, or demonstrations that are none.
+        ConfigError: an option that is unknown or cannot be, or demonstrations that are none.
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
-        for name in settings.options:
-            if name not in KNOWN:
-                raise ConfigError(f"unknown option {name!r} of cloning; choose one of {', '.join(KNOWN)}")
+        numbers = {name: value for name, value in settings.options.items() if name != DEMONSTRATIONS}
+        check_options("cloning", numbers, RANGES)
+        if not isinstance(settings.options.get(DEMONSTRATIONS, ""), str):
+            raise ConfigError("options.demonstrations is no name of a file; give one of steerclear demonstrate")
         self.settings, self.folder, self.decisions = settings, folder, 0
 
     def run(self, notice: Any = lambda done, words: None) -> None:
         """Play or read, learn, write."""
         options = self.settings.options
-        source = options.get("demonstrations")
+        source = options.get(DEMONSTRATIONS)
         rows = _read(Path(source)) if source else self._played(notice)
         chooser, curve = fitted(
             rows,

@@ -178,7 +178,10 @@ def _one_network(network: Network, places: int) -> list[tuple[Any, Any]]:
     shared = [(w, b) for w, b in zip(network.weights, network.biases, strict=True)]
     same = all((w == w[:1]).all() and (k == 0 or (b == b[:1]).all()) for k, (w, b) in enumerate(shared))
     if network.roles not in (1, places) or not same:
-        raise ValueError(f"it has {network.roles} networks, one per role, and start takes one; leave start out")
+        raise ValueError(
+            f"it has {network.roles} networks, or one that is told places, and start takes one; give net.roles: placed "
+            "if it is told places, or leave start out"
+        )
     first_w, first_b = shared[0]
     if places:
         rows = np.broadcast_to(first_b, (places, first_b.shape[1]))

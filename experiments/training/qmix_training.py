@@ -14,6 +14,7 @@ from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
+from .checks import check_options
 from .curve import write_curve
 from .games import check_sight, learners_of, set_stage, stagger
 from .learner import DivergedError
@@ -24,6 +25,14 @@ from .qmix import MonotoneMixer, Qmix, Transitions
 from .settings import TrainingSettings
 
 DEFAULTS = {"replay": 50_000, "batch": 256, "updates": 4, "explore_end": 0.05, "explore_share": 0.5, "rate": 5e-4}
+RANGES = {
+    "replay": (int, 1, 10**8),
+    "batch": (int, 1, 10**7),
+    "updates": (int, 1, 1000),
+    "explore_end": (float, 0.0, 1.0),
+    "explore_share": (float, 1e-6, 1.0),
+    "rate": (float, 1e-9, 1e3),
+}
 """Moments kept, moments an update, updates a decision of all games, last share of random actions, share of the
 training until then, rate of Adam."""
 
@@ -37,13 +46,11 @@ class QmixTraining:
         resume: refused.
 
     Raises:
-        ConfigError: an unknown option, or ``resume``.
+        ConfigError: an option that is unknown or cannot be, or ``resume``.
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
-        for name in settings.options:
-            if name not in DEFAULTS:
-                raise ConfigError(f"unknown option {name!r} of qmix; choose one of {', '.join(DEFAULTS)}")
+        check_options("qmix", settings.options, RANGES)
         if resume:
             raise ConfigError("qmix begins anew; leave out --resume")
         check_sight(settings)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from .checkpoints import checkpoints_in, read_checkpoint
-from .qmix_training import QmixTraining
+from .checks import check_options
+from .qmix_training import RANGES, QmixTraining
 from .settings import TrainingSettings
 from .taking_over import FIRST
 from .training import Training
@@ -30,6 +31,7 @@ class TwoPartTraining:
     """
 
     def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
+        check_options(settings.algorithm, settings.options, {SHARE: (float, 0.0, 1.0), **RANGES})
         options = dict(settings.options)
         share = float(options.pop(SHARE, 0.5))
         first = max(1, int(share * settings.decisions))

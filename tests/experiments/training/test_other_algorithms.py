@@ -152,6 +152,23 @@ def test_the_first_part_decides_where_nobody_holds_the_flag(tiny):
     assert asked == [[3] * 6, [3, 3, 3, 16, 16, 16]]
 
 
+@pytest.mark.parametrize(
+    ("algorithm", "options", "why"),
+    [
+        ("cloning", {"epochs": -1}, "options.epochs is -1; give a whole number from 1"),
+        ("cloning", {"demonstrations": 3}, "no name of a file"),
+        ("qmix", {"rate": -3}, "options.rate is -3; give a number from"),
+        ("qmix", {"updates": "many"}, "options.updates is 'many'"),
+        ("qmix", {"explore_share": 7}, "options.explore_share is 7"),
+        ("qmix+ppo", {"play_share": 1.6}, "options.play_share is 1.6; give a number from 0 to 1"),
+        ("qmix+ppo", {"foo": 1}, r"unknown option 'foo' of qmix\+ppo; choose one of play_share"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(tiny, tmp_path, algorithm, options, why):
+    with pytest.raises(ConfigError, match=why):
+        training_of(read_config(tiny(algorithm=algorithm, options=options)), tmp_path, False)
+
+
 def test_unknown_options_are_refused(tiny, tmp_path):
     for algorithm in ("qmix", "cloning"):
         config = read_config(tiny(algorithm=algorithm, options={"epoch": 3}))
