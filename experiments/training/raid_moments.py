@@ -76,7 +76,8 @@ class RaidMoments:
         missing = [name for number, name in enumerate(KINDS) if shares[number] and number not in kinds]
         if missing:
             raise ConfigError(
-                f"no raid came to {missing[0]!r} in the games recorded; give more games, longer ones (max_time_s), or 0 as its share (options.shares)"
+                f"no raid came to {missing[0]!r} in the games recorded; give more games, longer ones (max_time_s), "
+                "or 0 as its share (options.shares)"
             )
         places, memory, _, opponents = zip(*found, strict=True)
         games = {name: np.array([place[name] for place in places]) for name in PLACE}
