@@ -110,4 +110,5 @@ def _table_html(one: Table) -> str:
     title, heads, rows = one
     head = "".join(f"<th>{as_text(text)}</th>" for text in heads)
     body = "".join("<tr>" + "".join(f"<td>{as_text(text)}</td>" for text in row) + "</tr>" for row in rows)
-    return f'<section class="card"><h3>{as_text(title)}</h3><table><tr>{head}</tr>{body}</table></section>'
+    table = f'<div class="scroll"><table><tr>{head}</tr>{body}</table></div>'  # many teams are wider than a card
+    return f'<section class="card"><h3>{as_text(title)}</h3>{table}</section>'
