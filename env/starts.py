@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from steerclear.shield.exceptions import GameError
-from steerclear.shield.jit import Array, BoolArray, kernel
+from steerclear.shield.jit import Array, BoolArray, copy_row, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
@@ -104,7 +104,8 @@ def clear_game(rules: Rules, games: Games, b: int) -> None:
         games.contacts[b, i] = 0
     games.touching[b] = False
     games.contact[b] = False
-    games.flag_position[b] = rules.flag_home
+    for team in range(2):
+        copy_row(games.flag_position[b, team], rules.flag_home[team])
     games.flag_taken[b] = False
     games.captures[b] = 0
     games.grabs[b] = 0
@@ -149,8 +150,9 @@ def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, 
     Returns:
         False when a boat found no place.
     """
-    placed = ~np.isnan(given[:, 0])
+    placed = np.zeros(rules.n_boats, np.bool_)
     for i in range(rules.n_boats):
+        placed[i] = not math.isnan(given[i, 0])
         if placed[i]:
             games.state[b, i, L.X], games.state[b, i, L.Y] = given[i, 0], given[i, 1]
     for i in range(rules.n_boats):

@@ -5,7 +5,7 @@ All see a fleet of the same n boats and share one scene; each has its own memory
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from .plan import HELD, NOT_COVERED, PASSED, new_plan
 from .platforms import layout as L
 from .scene import Boats, Registered, Scene, Static, new_scene, path_samples
 from .setup import tuning_of
-from .shared import Called, share
+from .shared import share
 from .tracking.fears import note_fears, one_of_one_team, told_fear
 from .tracking.tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
@@ -198,9 +198,6 @@ def decide_all(desk: Desk) -> None:
         hand_over(b, desk)
 
 
-_DECIDE_ALL = Called(decide_all)
-
-
 class Deciders:
     """B deciders of the same fleet.
 
@@ -227,7 +224,8 @@ class Deciders:
         self._boats, self._registered, self._tuning = boats, registered, tuning_of(config)
         self._scratch = new_memory(n), new_work(n, path_samples(boats)), new_plan(n, min(n * (n + 6) + 2, MOST_ROWS))
         self._solver = solver
-        self._desk: Desk | None = None
+        self._desk: Any = None
+        self._decide_all: Any = None
 
     def forget(self, which: slice | BoolArray) -> None:
         """Forget the backups of some deciders, and the commands on their way."""
@@ -241,8 +239,10 @@ class Deciders:
         if desk is None or desk.scene.static is not static:
             scene = new_scene(self._boats, (static, self._registered), self._tuning, *self._scratch)
             self._desk = desk = share(Desk(self.asked, self.decided, self.memory, self.pending, scene))
+            made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
+            self._decide_all = decide_all if made is None else made((desk._type,))
         if self._solver is None:
-            _DECIDE_ALL(desk)
+            self._decide_all(desk)  # past numba's look at what it is called with, 3 us
             return
         for b in range(len(self.asked.state)):
             take_up(b, desk)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import Array, BoolArray, IntArray, kernel
+from .jit import Array, BoolArray, IntArray, copy_row, lean_kernel
 from .shared import share
 
 
@@ -77,41 +77,43 @@ def part_of(memory: Memory, which: int) -> Memory:
     return Memory(*(values[which] for values in memory))
 
 
-@kernel
+@lean_kernel
 def take_memory(all_memory: Memory, which: int, own: Memory) -> None:
     """Copy the memory of one of many deciders."""
-    own.has_backup[:] = all_memory.has_backup[which]
-    own.side[:] = all_memory.side[which]
-    own.target_deg[:] = all_memory.target_deg[which]
-    own.speed_mps[:] = all_memory.speed_mps[which]
-    own.margin_m[:] = all_memory.margin_m[which]
-    own.threat_m[:] = all_memory.threat_m[which]
-    own.joint_m[:] = all_memory.joint_m[which]
-    own.static_m[:] = all_memory.static_m[which]
-    own.backing_up[:] = all_memory.backing_up[which]
-    own.dwell_s[:] = all_memory.dwell_s[which]
-    own.pressed_s[:] = all_memory.pressed_s[which]
-    own.pressed_deg[:] = all_memory.pressed_deg[which]
-    own.free_s[:] = all_memory.free_s[which]
-    own.blocked_by[:] = all_memory.blocked_by[which]
-    own.gives_way[:] = all_memory.gives_way[which]
+    for i in range(own.side.shape[0]):
+        own.has_backup[i] = all_memory.has_backup[which, i]
+        own.side[i] = all_memory.side[which, i]
+        own.target_deg[i] = all_memory.target_deg[which, i]
+        own.speed_mps[i] = all_memory.speed_mps[which, i]
+        own.margin_m[i] = all_memory.margin_m[which, i]
+        own.joint_m[i] = all_memory.joint_m[which, i]
+        own.static_m[i] = all_memory.static_m[which, i]
+        own.backing_up[i] = all_memory.backing_up[which, i]
+        own.dwell_s[i] = all_memory.dwell_s[which, i]
+        own.pressed_s[i] = all_memory.pressed_s[which, i]
+        own.pressed_deg[i] = all_memory.pressed_deg[which, i]
+        own.free_s[i] = all_memory.free_s[which, i]
+        own.blocked_by[i] = all_memory.blocked_by[which, i]
+        own.gives_way[i] = all_memory.gives_way[which, i]
+        copy_row(own.threat_m[i], all_memory.threat_m[which, i])
 
 
-@kernel
+@lean_kernel
 def put_memory(own: Memory, which: int, all_memory: Memory) -> None:
     """Copy the memory of one decider back to its place among many."""
-    all_memory.has_backup[which] = own.has_backup
-    all_memory.side[which] = own.side
-    all_memory.target_deg[which] = own.target_deg
-    all_memory.speed_mps[which] = own.speed_mps
-    all_memory.margin_m[which] = own.margin_m
-    all_memory.threat_m[which] = own.threat_m
-    all_memory.joint_m[which] = own.joint_m
-    all_memory.static_m[which] = own.static_m
-    all_memory.backing_up[which] = own.backing_up
-    all_memory.dwell_s[which] = own.dwell_s
-    all_memory.pressed_s[which] = own.pressed_s
-    all_memory.pressed_deg[which] = own.pressed_deg
-    all_memory.free_s[which] = own.free_s
-    all_memory.blocked_by[which] = own.blocked_by
-    all_memory.gives_way[which] = own.gives_way
+    for i in range(own.side.shape[0]):
+        all_memory.has_backup[which, i] = own.has_backup[i]
+        all_memory.side[which, i] = own.side[i]
+        all_memory.target_deg[which, i] = own.target_deg[i]
+        all_memory.speed_mps[which, i] = own.speed_mps[i]
+        all_memory.margin_m[which, i] = own.margin_m[i]
+        all_memory.joint_m[which, i] = own.joint_m[i]
+        all_memory.static_m[which, i] = own.static_m[i]
+        all_memory.backing_up[which, i] = own.backing_up[i]
+        all_memory.dwell_s[which, i] = own.dwell_s[i]
+        all_memory.pressed_s[which, i] = own.pressed_s[i]
+        all_memory.pressed_deg[which, i] = own.pressed_deg[i]
+        all_memory.free_s[which, i] = own.free_s[i]
+        all_memory.blocked_by[which, i] = own.blocked_by[i]
+        all_memory.gives_way[which, i] = own.gives_way[i]
+        copy_row(all_memory.threat_m[which, i], own.threat_m[i])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import inspect
 import logging
@@ -13,9 +12,7 @@ from typing import Any, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
-from rich.errors import LiveError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from steerclear.shield.compiled.compiling import told_to
 from steerclear.shield.exceptions import SteerclearError
 
 from ..runs.failed_jobs import JobFault
@@ -26,7 +23,6 @@ from .files import check_files
 from .plain_progress import PlainProgress
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-COMPILING_WORDS = "compiling for this machine, once: a minute or two (steerclear warm-up does it beforehand)"
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
 
@@ -65,7 +61,7 @@ def command(function: Command) -> Command:
         logging.captureWarnings(True)
         try:
             check_files(function, kwargs)
-            with interrupted_by_sigterm(), told_to(CompilingBar()):
+            with interrupted_by_sigterm():
                 return function(*args, **kwargs)
         except SteerclearError as error:
             _leave(f"error: {error}", ExitCode.BAD_INPUT)
@@ -88,38 +84,6 @@ def unbroken(text: str) -> str:
     """Paragraphs on one line each: help is broken where the terminal ends, not where the source does."""
     paragraphs = (" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
     return "\n\n".join(part.replace("``", "") for part in paragraphs)
-
-
-class CompilingBar:
-    """Shows on stderr that machine code is being made: a bar on a terminal, else one line."""
-
-    def __init__(self) -> None:
-        self._bar: Progress | None = None
-        self._said = False
-
-    def goes_on(self, done: int, of: int) -> None:
-        """See `steerclear.shield.compiled.compiling.Listener`."""
-        if not err().is_terminal:
-            self._say()
-            return
-        if self._bar is None:
-            columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-            self._bar = Progress(*columns, console=err(), transient=True)
-            self._bar.add_task("compiling, once: a minute or two", total=of)
-            with contextlib.suppress(LiveError):  # another bar has the screen: it is enough that this was said
-                self._bar.start()
-        self._bar.update(self._bar.task_ids[0], completed=done, total=of)
-
-    def ends(self) -> None:
-        """See `steerclear.shield.compiled.compiling.Listener`."""
-        if self._bar is not None:
-            self._bar.stop()
-            self._bar = None
-
-    def _say(self) -> None:
-        if not self._said:
-            err().print(COMPILING_WORDS, soft_wrap=True)
-        self._said = True
 
 
 def _leave(text: str, code: ExitCode) -> NoReturn:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from steerclear.shield.compiled.compiling import COMPILING, told_to
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in
 
@@ -15,7 +13,7 @@ from .console import command, err, out
 
 @command
 def warm_up() -> None:
-    """Compile everything for this machine, with a bar, and say where it is kept: one to three minutes, once.
+    """Compile everything for this machine and say where it is kept: about a minute, once.
 
     Without it the first decision, game or command on a machine does so. Run it again after an update.
 
@@ -24,36 +22,7 @@ def warm_up() -> None:
     place, started = kept_in(), time.perf_counter()
     if not place:
         raise ConfigError("compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written to")
-    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    console = err()
-    if not console.is_terminal:
-        console.print("compiling everything: one to three minutes of an idle machine", soft_wrap=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        shown = _Shown(bar)
-        with told_to(shown):
-            for name, compile_it in parts_of_all():
-                shown.begin(name)
-                compile_it()
-    seconds = time.perf_counter() - started
-    done = COMPILING.compiled
-    words = f"{done} functions were compiled ({seconds:.0f} s)" if done else "everything had been compiled before"
-    out().print(f"{words}; kept in {place}", soft_wrap=True)
-
-
-class _Shown:
-    """The bar: which part, and how many functions have machine code."""
-
-    def __init__(self, bar: Progress) -> None:
-        self._bar = bar
-        self._task = bar.add_task("", total=None)
-
-    def begin(self, name: str) -> None:
-        """A part comes next."""
-        self._bar.update(self._task, description=f"compiling {name}", refresh=True)
-
-    def goes_on(self, done: int, of: int) -> None:
-        """See `steerclear.shield.compiled.compiling.Listener`."""
-        self._bar.update(self._task, completed=done, total=of, refresh=True)
-
-    def ends(self) -> None:
-        """See `steerclear.shield.compiled.compiling.Listener`."""
+    for name, compile_it in parts_of_all():
+        err().print(f"compiling {name}", soft_wrap=True)
+        compile_it()
+    out().print(f"done ({time.perf_counter() - started:.0f} s); kept in {place}", soft_wrap=True)

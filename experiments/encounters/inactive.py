@@ -41,7 +41,9 @@ def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> N
     for b in range(len(state)):
         pairs = near_pairs(setup, state[b], ours)
         h = margins(setup, pairs, ahead(setup, state[b], ours, np.empty((len(ours), 2)), 0))
-        safe[b] = ours & (least(pairs, h, len(ours)) >= 0.0)
+        low = least(pairs, h, len(ours))
+        for i in range(len(ours)):
+            safe[b, i] = ours[i] and low[i] >= 0.0
 
 
 def safe_boats(scenes: Scenes, state: Array, conditions: Conditions) -> BoolArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from steerclear.env.randomness import next_uniform
-from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.jit import Array, IntArray, copy_row
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
@@ -33,7 +33,7 @@ def observe(state: Array, error: Array, seeds: Array, bound_m: float, first: boo
     fresh = 0.5 * bound_m * math.sqrt(1.0 - keep * keep)
     for b in range(state.shape[0]):
         for i in range(state.shape[1]):
-            seen[b, i] = state[b, i]
+            copy_row(seen[b, i], state[b, i])
             if bound_m <= 0.0:
                 continue
             size = fresh * math.sqrt(-2.0 * math.log(uniform(seeds, b)))
@@ -42,7 +42,8 @@ def observe(state: Array, error: Array, seeds: Array, bound_m: float, first: boo
             error[b, i, 1] = keep * error[b, i, 1] + size * math.sin(angle)
             length = math.hypot(error[b, i, 0], error[b, i, 1])
             if length > bound_m:
-                error[b, i] *= bound_m / length
+                error[b, i, 0] *= bound_m / length
+                error[b, i, 1] *= bound_m / length
             seen[b, i, L.X] += error[b, i, 0]
             seen[b, i, L.Y] += error[b, i, 1]
 

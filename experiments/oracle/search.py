@@ -121,7 +121,8 @@ def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
     s = np.empty(layer.shape[1])
     for node in range(layer.shape[0]):
         for action in range(N_SPEEDS * rudders.size):
-            s[:] = layer[node]
+            for c in range(s.size):
+                s[c] = layer[node, c]
             choice, rudder = action // rudders.size, rudders[action % rudders.size]
             if not clear_after(task, s, choice, rudder, steps, k):
                 continue
@@ -135,10 +136,34 @@ def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
                 table[place] = row
             elif rates[row] >= rate:
                 continue
-            made[row] = s
+            for c in range(s.size):
+                made[row, c] = s[c]
             keys[row], rates[row] = key, rate
             origin[row, 0], origin[row, 1] = node, action
     return count
+
+
+@compiled
+def _nth(a: Array, k: int) -> float:
+    low, high = 0, a.size - 1
+    while low < high:
+        pivot, i, j = a[(low + high) // 2], low, high
+        while i <= j:
+            while a[i] < pivot:
+                i += 1
+            while a[j] > pivot:
+                j -= 1
+            if i <= j:
+                a[i], a[j] = a[j], a[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            high = j
+        elif k >= i:
+            low = i
+        else:
+            break
+    return a[k]
 
 
 @compiled
@@ -147,7 +172,7 @@ def _choose(rates: Array, width: int) -> Array:
     if rates.size <= width:
         return np.arange(rates.size)
     best = max(1, width - width // 4)
-    border = np.partition(rates, rates.size - best)[rates.size - best]
+    border = _nth(rates.copy(), rates.size - best)
     chosen = np.empty(width, dtype=np.int64)
     rest = np.empty(rates.size, dtype=np.int64)
     kept = left = 0
@@ -221,8 +246,12 @@ def search(task: Task, start: Array, lengths: Array, width: int, actions: Array)
             return False, whole
         chosen = _choose(rates[:count], width)
         whole = whole and chosen.size == count
-        layer, layer_rates = made[chosen], rates[chosen]
-        history[n, : chosen.size] = origin[chosen]
+        layer, layer_rates = np.empty((chosen.size, start.size)), np.empty(chosen.size)
+        for j in range(chosen.size):
+            for c in range(start.size):
+                layer[j, c] = made[chosen[j], c]
+            layer_rates[j] = rates[chosen[j]]
+            history[n, j, 0], history[n, j, 1] = origin[chosen[j], 0], origin[chosen[j], 1]
         k += steps
     _trace(history, lengths.size, int(np.argmax(layer_rates)), actions)
     return True, whole

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ..jit import Array, IntArray, kernel
+from ..jit import Array, IntArray, copy_row, kernel
 
 OPTIMAL = 0
 INFEASIBLE = 1
@@ -107,9 +107,10 @@ def _make_active(
     for _ in range(n + 2):
         if not _dual_direction(C, entering, active, count, gram, rhs, r):
             return STALLED, count
-        direction[:] = C[entering]
+        copy_row(direction, C[entering])
         for i in range(count):
-            direction -= r[i] * C[active[i]]
+            for k in range(n):
+                direction[k] -= r[i] * C[active[i], k]
         slope = _dot(direction, C[entering])
         leaving, dual_step = _first_to_leave(dual, r, count)
         full_step = np.inf
@@ -119,8 +120,10 @@ def _make_active(
         if step == np.inf:
             return INFEASIBLE, count
         if full_step != np.inf:
-            z += step * direction
-        dual[:count] -= step * r[:count]
+            for k in range(n):
+                z[k] += step * direction[k]
+        for i in range(count):
+            dual[i] -= step * r[i]
         own += step
         if step == full_step:
             active[count], dual[count] = entering, own
@@ -145,7 +148,7 @@ def project(C: Array, d: Array, z0: Array, z: Array) -> int:
         (numerical trouble: do not use).
     """
     rows, n = C.shape
-    z[:] = z0
+    copy_row(z, z0)
     active, dual, gram = np.zeros(n + 1, np.int64), np.zeros(n + 1), np.zeros((n + 1, n + 1))
     count = 0
     for _ in range(10 * (rows + n) + 10):

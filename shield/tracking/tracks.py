@@ -9,7 +9,7 @@ import numpy as np
 from ..config import ShieldConfig
 from ..exceptions import FleetError
 from ..fleet import Fleet
-from ..jit import Array, BoolArray, kernel
+from ..jit import Array, BoolArray, copy_row, kernel
 from ..plan import LARGEST_COMMAND
 from ..platforms import layout as L
 from ..platforms.step import step_boat
@@ -78,7 +78,8 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
     """Put commands (n, 2), speed m/s and heading deg relative to ``state``, at the end of the queue, in place."""
     last = pending.shape[0] - 1
     for k in range(last):
-        pending[k] = pending[k + 1]
+        for i in range(state.shape[0]):
+            copy_row(pending[k, i], pending[k + 1, i])
     for i in range(state.shape[0]):
         pending[last, i, 0] = commands[i, 0]
         pending[last, i, 1] = state[i, L.HEADING] + commands[i, 1]

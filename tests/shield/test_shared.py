@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit, typeof, types
+from numba import njit, typeof
 from numba.core.errors import TypingError
-from numba.core.registry import cpu_target
-from steerclear.shield import shared
 from steerclear.shield.jit import kernel, lean_kernel
-from steerclear.shield.shared import Called, Shared, share
+from steerclear.shield.shared import Shared, share
 
 
 class Inner(NamedTuple):
@@ -110,11 +108,6 @@ def test_what_compiled_code_writes_is_seen():
     assert plain.row[0] == plain.table[1, 1] == 42.0
 
 
-def test_fields_are_read_in_order():
-    plain = outer()
-    assert all(a is b for a, b in zip(share(plain), plain, strict=True))
-
-
 def test_arrays_live_as_long_as_what_shares_them():
     expected = read(outer(5))
     shared = share(outer(5))
@@ -197,15 +190,6 @@ def test_arrays_lie_where_they_lie(a):
     assert described(share(Array(a))) == (a.size, a.itemsize, a.nbytes, a.ndim, a.shape, a.strides, a.ctypes.data)
 
 
-def test_arrays_name_no_owner():
-    """An owner would be counted by code that counts, and freed by one count too few."""
-    a = np.arange(4.0)
-    words = np.frombuffer(share(Array(a))._copy, np.int64)
-    fields = cpu_target.target_context.data_model_manager[typeof(a)]._fields
-    assert words[fields.index("meminfo")] == words[fields.index("parent")] == 0
-    assert words[fields.index("data")] == a.ctypes.data
-
-
 def test_tuples_of_one_name_are_told_apart():
     """Compiled code would read one's fields in the order of the other's."""
 
@@ -232,29 +216,6 @@ def test_a_field_stays_what_it_is():
         shared_array.a = np.zeros(3)
 
 
-def test_an_unknown_layout_is_refused(monkeypatch):
-    """Of a numba that keeps arrays or tuples another way nothing is guessed."""
-    monkeypatch.setattr(shared, "_KINDS", {})
-    monkeypatch.setitem(shared._NUMBERS, types.int64, "i")
-    with pytest.raises(TypeError, match="not known"):
-        share(Inner(True, 1, FROZEN))
-    monkeypatch.undo()
-    monkeypatch.setattr(shared, "_KINDS", {})
-    model = cpu_target.target_context.data_model_manager[typeof(FROZEN)]
-    monkeypatch.setattr(model, "_fields", (*model._fields, "more"))
-    with pytest.raises(TypeError, match="not known"):
-        share(Array(FROZEN))
-
-
-def test_numba_is_asked_once_for_tuples_of_a_kind(monkeypatch):
-    first = share(outer())
-    monkeypatch.setattr(shared, "typeof", None)
-    assert typeof(share(outer(3, 7, 2))) is typeof(first)
-    for other in (outer()._replace(row=FROZEN), outer()._replace(speed=2), outer()._replace(table=DRAWN)):
-        with pytest.raises(TypeError, match="not callable"):
-            share(other)
-
-
 def test_a_field_that_is_not_there_is_an_error():
     shared = share(outer())
     with pytest.raises(TypingError, match="nothing"):
@@ -267,14 +228,3 @@ def test_a_field_that_is_not_there_is_an_error():
 def count_up(of):
     """Write how often it was called into an array of a tuple."""
     of.row[0] += 1.0
-
-
-def test_a_compiled_function_called_past_numbas_look_takes_tuples_of_several_kinds():
-    """One call after another of one kind, of another, and of the first again."""
-    called = Called(count_up)
-    first, second = share(outer()), share(outer(of=Twin))
-    for of, times in ((first, 2), (second, 3), (first, 1)):
-        before = of.row[0]
-        for _ in range(times):
-            called(of)
-        assert of.row[0] == before + times

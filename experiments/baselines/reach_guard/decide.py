@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
 from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn, thrust_after
@@ -59,28 +59,34 @@ def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array,
         for other in x[j, first:last]:
             slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
             row = C[r]
-            row[:] = 0.0
+            for c in range(len(z)):
+                row[c] = 0.0
             row[2 * i], row[2 * i + 1] = slope.own_heading * math.radians(effect[i, 0]), slope.own_speed * effect[i, 1]
             if first == WAYS:
                 row[2 * j], row[2 * j + 1] = (
                     slope.other_heading * math.radians(effect[j, 0]),
                     slope.other_speed * effect[j, 1],
                 )
-            length, lack, most = math.sqrt((row * row).sum()), need_m[m] - slope.value_m, 0.0
+            square, lack, most = 0.0, need_m[m] - slope.value_m, 0.0
+            for c in range(len(z)):
+                square += row[c] * row[c]
+            length = math.sqrt(square)
             d[r] = lack
             for c in range(len(z)):
                 d[r] += row[c] * z[c]
                 most += abs(row[c]) * (2.0 if c % 2 == 0 else math.sqrt(setup.speed_weight))
             if length >= 1e-9 and lack + most >= 0.0:  # else no inputs can break or change it
                 d[r] /= length
-                row /= length
+                for c in range(len(z)):
+                    row[c] /= length
                 r += 1
     for c in range(len(z)):
-        C[r : r + 2] = 0.0
+        for k in range(len(z)):
+            C[r, k] = C[r + 1, k] = 0.0
         C[r, c], C[r + 1, c] = 1.0, -1.0
         d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -math.sqrt(setup.speed_weight))
         r += 2
-    return C[:r], d[:r]
+    return C[:r, : len(z)], d[:r]
 
 
 @kernel
@@ -88,24 +94,34 @@ def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: A
     """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
     state, ours, sent, n = game.state, game.ours, game.sent, len(game.ours)
     z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
+    need = np.zeros(len(target))
     for attempt in range(ROUNDS):
         x = ahead(setup, state, ours, sent, 1)
-        for i in np.flatnonzero(ours):
+        for i in range(n):
+            if not ours[i]:
+                continue
             found = _effects(setup, int(i), state[i], sent[i], x[i, WAYS], now[2 * i : 2 * i + 2])
             effect[i, 0], effect[i, 1] = found
         if attempt == 0:
-            z0[:] = now
-        C, d = _rows(setup, pairs, setup.radius_m + target + AIM_M, x, effect, now)
+            copy_row(z0, now)
+        for m in range(len(target)):
+            need[m] = setup.radius_m + target[m] + AIM_M
+        C, d = _rows(setup, pairs, need, x, effect, now)
         if project(C, d, z0, z) != OPTIMAL:
             return False
-        for i in np.flatnonzero(ours):
-            sent[i] = asked[i]
-            if np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
+        for i in range(n):
+            if not ours[i]:
+                continue
+            copy_row(sent[i], asked[i])
+            if max(abs(z[2 * i] - z0[2 * i]), abs(z[2 * i + 1] - z0[2 * i + 1])) > SAME:
                 speed = clamp(z[2 * i + 1] / math.sqrt(setup.speed_weight), 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
                 turn = z[2 * i] * effect[i, 0]
                 sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
-        h[:] = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
-        if (h >= target).all():
+        copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
+        kept = True
+        for m in range(len(target)):
+            kept = kept and h[m] >= target[m]
+        if kept:
             return True
     return False
 
@@ -130,52 +146,85 @@ def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray)
     state, sent, side = game.state, game.sent, game.memory[:, 0]
     x = ahead(setup, state, game.ours, sent, setup.look)
     for sweep in range(SWEEPS):
-        for i in np.flatnonzero(movers):
+        for i in range(len(movers)):
+            if not movers[i]:
+                continue
             best, chosen = -math.inf, 0
-            mine = pairs[(pairs[:, 0] == i) | ((pairs[:, 1] == i) & (pairs[:, 2] == WAYS))]
+            mine, many = np.empty_like(pairs), 0
+            for m in range(len(pairs)):
+                if pairs[m, 0] == i or (pairs[m, 1] == i and pairs[m, 2] == WAYS):
+                    for c in range(4):
+                        mine[many, c] = pairs[m, c]
+                    many += 1
+            mine = mine[:many]
             for k in range(len(BACKUPS)):
-                x[i, WAYS] = state[i]
+                copy_row(x[i, WAYS], state[i])
                 _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
-                value = margins(setup, mine, x).min()
+                value = math.inf
+                for margin in margins(setup, mine, x):
+                    value = min(value, margin)
                 value -= HYSTERESIS_M if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
                 if value > best:
                     best, chosen = value, k
-            x[i, WAYS] = state[i]
+            copy_row(x[i, WAYS], state[i])
             speed, heading = _follow(setup, int(i), BACKUPS[chosen], x[i, WAYS])
             if sweep == SWEEPS - 1:
-                sent[i, 0], sent[i, 1], side[i] = speed, heading, np.sign(BACKUPS[chosen, 0])
+                turn = BACKUPS[chosen, 0]
+                sent[i, 0], sent[i, 1] = speed, heading
+                side[i] = 1.0 if turn > 0.0 else (-1.0 if turn < 0.0 else 0.0)
 
 
 @kernel
-def decide_game(setup: Setup, game: Games) -> None:
+def _short(pairs: IntArray, h: Array, target: Array, movers: BoolArray) -> bool:
+    """Add the boats that fall short of a target to the movers; whether there were any."""
+    left, more = h.copy(), False
+    for m in range(len(h)):
+        left[m] -= target[m]
+    low = least(pairs, left, len(movers))
+    for i in range(len(movers)):
+        if not movers[i] and not low[i] >= 0.0:
+            movers[i] = more = True
+    return more
+
+
+@kernel
+def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of rows, in loops that compile quickly
     """Decide for the boats of ours in one game, (n, ...) each."""
     state, wanted, ours, memory, sent, reason, certificate_m = game
-    reason[:] = np.where(ours, PASSED, NOT_COVERED)
-    for i in np.flatnonzero(ours):
-        if not (np.abs(wanted[i]) <= LARGEST_COMMAND).all():
-            sent[i], reason[i] = 0.0, HELD
-    n, asked, pairs = len(ours), sent.copy(), near_pairs(setup, state, ours)
-    now = margins(setup, pairs, ahead(setup, state, ours, sent, 0))
-    target = np.maximum(0.0, setup.decay * np.minimum(now, setup.cap_m))
+    n = len(ours)
+    for i in range(n):
+        reason[i] = PASSED if ours[i] else NOT_COVERED
+        if ours[i] and not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
+            sent[i, 0] = sent[i, 1] = 0.0
+            reason[i] = HELD
+    asked, pairs = sent.copy(), near_pairs(setup, state, ours)
+    target = margins(setup, pairs, ahead(setup, state, ours, sent, 0))
+    for m in range(len(target)):
+        target[m] = max(0.0, setup.decay * min(target[m], setup.cap_m))
     h = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
-    movers = ~(least(pairs, h - target, n) >= 0.0)
-    if movers.any() and _program(setup, game, pairs, target, asked, h):
-        movers[:] = False
-        for i in np.flatnonzero(ours):
-            reason[i] = QP if (sent[i] != asked[i]).any() else reason[i]
-    elif movers.any():
-        sent[:], added = asked, movers
-        while added.any():  # who falls short by what others do now backs away, too
+    movers = np.zeros(n, np.bool_)
+    moved = _short(pairs, h, target, movers)
+    if moved and _program(setup, game, pairs, target, asked, h):
+        for i in range(n):
+            movers[i] = False
+            if ours[i] and (sent[i, 0] != asked[i, 0] or sent[i, 1] != asked[i, 1]):
+                reason[i] = QP
+    elif moved:
+        for i in range(n):
+            copy_row(sent[i], asked[i])
+        while moved:  # who falls short by what others do now backs away, too
             _take_backups(setup, game, pairs, movers)
-            h[:] = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
-            added = ~((least(pairs, h - target, n) >= 0.0) | movers)
-            movers = movers | added
-    certificate_m[:] = least(pairs, h, n)
-    for i in np.flatnonzero(ours):
+            copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
+            moved = _short(pairs, h, target, movers)
+    copy_row(certificate_m, least(pairs, h, n))
+    for i in range(n):
+        if not ours[i]:
+            continue
         if movers[i]:
             reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
         elif reason[i] != QP:
-            memory[i] = 0.0
+            for c in range(memory.shape[1]):
+                memory[i, c] = 0.0
 
 
 @kernel

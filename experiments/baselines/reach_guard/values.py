@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate
 from steerclear.shield.platforms.step import step_boat
@@ -64,7 +64,8 @@ def ahead(setup: Setup, state: Array, ours: BoolArray, commands: Array, steps: i
     """States (n, WAYS + 1, N_STATE) of boats after some steps: as opponents, and, of ours, under their commands."""
     x = np.empty((len(state), WAYS + 1, L.N_STATE))
     for j, way in np.ndindex(x.shape[:2]):
-        x[j, way], params = state[j], setup.params[j]
+        params = setup.params[j]
+        copy_row(x[j, way], state[j])
         turn = float(setup.full_deg[j]) * (0.0 if way == 0 else 2.0 * way - 3.0)
         speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
         for _ in range(steps):
@@ -90,7 +91,9 @@ def margins(setup: Setup, pairs: IntArray, x: Array) -> Array:
         i, j, first, last = pairs[r, 0], pairs[r, 1], pairs[r, 2], pairs[r, 3]
         for other in x[j, first:last]:
             value = table_value(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
-            h[r] = np.minimum(h[r], value - setup.radius_m)
+            margin = value - setup.radius_m
+            if math.isnan(margin) or margin < h[r]:
+                h[r] = margin
     return h
 
 
@@ -100,5 +103,6 @@ def least(pairs: IntArray, h: Array, boats: int) -> Array:
     low = np.full(boats, np.inf)
     for r in range(len(pairs)):
         for i in pairs[r, : 2 if pairs[r, 2] == WAYS else 1]:
-            low[i] = np.minimum(low[i], h[r])
+            if math.isnan(h[r]) or h[r] < low[i]:
+                low[i] = h[r]
     return low

@@ -1,1 +1,0 @@
-"""Where machine code is kept, and who compiles it."""
