@@ -171,7 +171,8 @@ def _stamp(file: str) -> str:
     elif not Path(file).is_relative_to(root):  # somebody's barrier
         paths |= set(Path(file).parent.rglob("*.py"))
     for path in sorted(paths):
-        digest.update(str(path).encode() + path.read_bytes())
+        name = path.relative_to(root) if path.is_relative_to(root) else path
+        digest.update(str(name).encode() + path.read_bytes())
     return digest.hexdigest()
 
 
