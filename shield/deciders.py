@@ -22,7 +22,7 @@ from .plan import HELD, NOT_COVERED, PASSED, new_plan
 from .platforms import layout as L
 from .scene import Boats, Registered, Scene, Static, new_scene, path_samples
 from .setup import tuning_of
-from .shared import share
+from .shared import share, type_of
 from .tracking.fears import note_fears, one_of_one_team, told_fear
 from .tracking.tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
 from .work import new_work
@@ -240,7 +240,7 @@ class Deciders:
             scene = new_scene(self._boats, (static, self._registered), self._tuning, *self._scratch)
             self._desk = desk = share(Desk(self.asked, self.decided, self.memory, self.pending, scene))
             made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
-            self._decide_all = decide_all if made is None else made((desk._type,))
+            self._decide_all = decide_all if made is None else made((type_of(desk),))
         if self._solver is None:
             self._decide_all(desk)  # past numba's look at what it is called with, 3 us
             return

@@ -1,13 +1,11 @@
 """The one way compiled functions are made here.
 
-numba makes machine code of every function with all it calls linked in, and again in each of its callers. Here what
-compiled code calls is typed and lowered only; machine code is made of the whole, for what Python calls, and kept on
-disk. Fast-math stays off: results must be the same bits everywhere, and NaN tests must work.
+Machine code is made of what Python calls with all that calls, see `whole_program`, and kept on disk. Fast-math stays
+off: results must be the same bits everywhere, and NaN tests must work.
 """
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import logging
 import os
@@ -21,12 +19,8 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import compiler, config, sigutils, types, typing
+from numba.core import compiler, config
 from numba.core.caching import NullCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.environment import lookup_environment
-from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numpy.typing import NDArray
 
@@ -40,109 +34,6 @@ COMPILE_NOTHING = ("shield/bridge", "shield/wrappers", "env/render", "policies/s
 """Folders that hold no compiled function, nor anything that one uses: changes there leave machine code as it is."""
 
 
-class _Flags(compiler.Flags):  # type: ignore[misc]
-    """numba's options; theirs are hashed one by one at every step of typing."""
-
-    __slots__ = ()
-
-    def __hash__(self) -> int:
-        return len(self._values)
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is _Flags and self._values == other._values
-
-
-class _Part(JITCodeLibrary):  # type: ignore[misc]
-    """What a function is lowered to, and the libraries of all it calls; no machine code is made of it."""
-
-    def __init__(self, *args: Any) -> None:
-        super().__init__(*args)
-        self._linking_libraries: dict[Any, None] = {}
-
-    def finalize(self) -> None:
-        """Leave it to the whole."""
-        self._finalized = True
-
-    def add_linking_library(self, library: Any) -> None:
-        """Note what is called, and what that calls."""
-        library._ensure_finalized()
-        self._linking_libraries |= {library: None} | (library._linking_libraries if isinstance(library, _Part) else {})
-
-
-class _Whole(JITCodeLibrary):  # type: ignore[misc]
-    """All parts of what Python calls."""
-
-    def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
-            if function.linkage.name == "linkonce_odr" and not function.is_declaration:
-                function.linkage = "internal"
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
-
-
-class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A function that is compiled for each kind of arguments: as a part for compiled code, as a whole for Python."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._parts: dict[Any, Any] = {}
-        self._cache = _Kept(f"{self.py_func.__module__}.{self.py_func.__qualname__}", self.py_func.__code__.co_filename)
-
-    @global_compiler_lock  # type: ignore[untyped-decorator]
-    def _part(self, args: Any) -> Any:
-        if args not in self._parts:
-            flags, library = _Flags(), _Part(self.targetctx.codegen(), self.py_func.__qualname__)
-            self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
-            flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
-            contexts = self.typingctx, self.targetctx
-            part = compiler.compile_extra(*contexts, self.py_func, args, None, flags, {}, library)
-            self.targetctx.insert_user_function(part.fndesc, part.fndesc, (library, *library._linking_libraries))
-            self._parts[args] = part
-        return self._parts[args]
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """What a compiled caller asks for; not for each value of a constant anew."""
-        kws = {name: types.unliteral(kind) for name, kind in kws.items()}
-        python_signature, args = self._compiler.fold_argument_types(tuple(map(types.unliteral, args)), kws)
-        signatures = [self._part(tuple(args)).signature]
-        return typing.make_concrete_template("Call", self.py_func.__name__, signatures), python_signature, args, {}
-
-    def get_overload(self, sig: Any) -> Any:
-        """What a compiled caller's code is found by."""
-        return self._part(tuple(sigutils.normalize_signature(sig)[0])).fndesc
-
-    @global_compiler_lock  # type: ignore[untyped-decorator]
-    def compile(self, sig: Any) -> Any:
-        """What Python calls."""
-        args = tuple(sigutils.normalize_signature(sig)[0])
-        if args not in self.overloads:
-            self.add_overload(self._cache.load_overload(args, self.targetctx) or self._whole(args))
-        return self.overloads[args].entry_point
-
-    def _whole(self, args: Any) -> Any:
-        collecting, context = gc.isenabled(), self.targetctx
-        gc.disable()  # a sixth of the time, and next to nothing to collect
-        try:
-            part = self._part(args)
-            library = _Whole(context.codegen(), part.library.name)
-            library.enable_object_caching()
-            context.create_cpython_wrapper(library, part.fndesc, part.environment, part.call_helper, release_gil=True)
-            for each in (part.library, *part.library._linking_libraries):
-                library.add_linking_library(each)
-            entry = context.get_executable(library, part.fndesc, part.environment)
-        finally:
-            gc.freeze()
-            gc.unfreeze()  # what was made is old, and not looked through at the next turn
-            if collecting:
-                gc.enable()
-        for name in (variable.name for variable in library._final_module.global_variables):
-            if name.startswith("_ZN08NumbaEnv") and lookup_environment(name) is not None:
-                library.codegen.set_env(name, lookup_environment(name))
-        whole = part._replace(library=library, entry_point=entry, target_context=context)
-        self._cache.save_overload(args, whole)
-        return whole
-
-
 def kernel(function: F) -> F:
     """Compile a function with numba: cached on disk, without the GIL, IEEE division (no ZeroDivisionError)."""
     return _compiled(function, counted=True)
@@ -154,10 +45,30 @@ def lean_kernel(function: F) -> F:
 
 
 def _compiled(function: F, counted: bool) -> F:
-    if config.DISABLE_JIT:
+    if getattr(config, "DISABLE_JIT", False):
         return function
-    options = {"nopython": True, "nogil": True, "error_model": "numpy", "_nrt": counted}
-    return cast(F, Kernel(function, targetoptions=options))
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": counted}
+    if _whole_program() is None:
+        return cast(F, numba.njit(**options)(function))
+    options["nopython"] = True
+    name = f"{function.__module__}.{function.__qualname__}"
+    kept = _Kept(name, function.__code__.co_filename)
+    return cast(F, _whole_program().Kernel(function, targetoptions=options, kept=kept))
+
+
+@cache
+def _whole_program() -> Any:
+    """The module of that name; None where this numba differs from the one that it is written for."""
+    try:
+        from . import whole_program
+
+        differs = whole_program.unlike()
+    except (ImportError, AttributeError) as error:
+        differs = str(error)
+    if not differs:
+        return whole_program
+    _say(f"numba {numba.__version__} is not as expected ({differs}): all is compiled at every start, some minutes")
+    return None
 
 
 @cache
@@ -192,7 +103,7 @@ def kept_in() -> Path | None:
     return None
 
 
-class _Kept(NullCache):  # type: ignore[misc]
+class _Kept(NullCache):
     """Machine code on disk, a sealed file each; never a reason to stop."""
 
     def __init__(self, name: str, file: str) -> None:

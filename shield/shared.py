@@ -58,6 +58,12 @@ def share(row: Row) -> Row:
     return cast(Row, Shared(row))
 
 
+def type_of(row: Any) -> SharedType:
+    """numba's type of a shared tuple."""
+    kind: SharedType = row._type
+    return kind
+
+
 class SharedType(types.Type):
     """numba's type of a shared tuple; its name, which symbols hold, tells classes and fields apart."""
 

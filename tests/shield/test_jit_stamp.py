@@ -36,3 +36,11 @@ def test_the_stamp_reads_all_other_sources(monkeypatch):
     _stamp.__wrapped__(str(ROOT / "shield" / "jit.py"))
     assert {path for path in SOURCES if not _left_out(path)} <= set(read)
     assert not any(path.is_relative_to(ROOT) and _left_out(path) for path in read)
+
+
+def test_kernels_of_experiments_and_of_others_hang_on_what_is_beside_them_too(tmp_path):
+    (tmp_path / "barrier.py").write_text("x = 1")
+    first = _stamp.__wrapped__(str(tmp_path / "barrier.py"))
+    (tmp_path / "beside.py").write_text("x = 2")
+    own = {_stamp.__wrapped__(str(ROOT / folder / "jit.py")) for folder in ("shield", "experiments")}
+    assert len({first, _stamp.__wrapped__(str(tmp_path / "barrier.py")), *own}) == 4

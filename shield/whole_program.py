@@ -1,0 +1,152 @@
+"""Machine code made once, of the whole call tree: what of numba's inside that is built on stands here.
+
+numba makes machine code of every function with all it calls linked in, and again in each of its callers. Here what
+compiled code calls is typed and lowered only; machine code is made of the whole, for what Python calls. `unlike` says
+where a version of numba differs from what is built on; `jit` then compiles by numba's own means.
+"""
+
+# mypy: disable-error-code="attr-defined,assignment,misc,untyped-decorator,unused-ignore"
+
+from __future__ import annotations
+
+import gc
+import inspect
+from typing import Any
+
+from numba.core import compiler, sigutils, types, typing
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
+
+USED = {
+    "get_call_template": (CPUDispatcher, ("self", "args", "kws")),
+    "get_overload": (CPUDispatcher, ("self", "sig")),
+    "compile": (CPUDispatcher, ("self", "sig")),
+    "add_overload": (CPUDispatcher, ("self", "cres")),
+    "compile_extra": (
+        compiler,
+        ("typingctx", "targetctx", "func", "args", "return_type", "flags", "locals", "library", "pipeline_class"),
+    ),
+    "_reduce": (compiler.CompileResult, ("self",)),
+    "finalize": (JITCodeLibrary, ("self",)),
+    "add_linking_library": (JITCodeLibrary, ("self", "library")),
+    "_optimize_final_module": (JITCodeLibrary, ("self",)),
+    "make_concrete_template": (typing, ("name", "key", "signatures")),
+}
+"""What is called and overridden: by name, where it is found, and its parameters."""
+
+
+def unlike() -> str:
+    """What of numba's inside is not as it is built on here; empty: nothing."""
+    for name, (owner, expected) in USED.items():
+        found = getattr(owner, name, None)
+        if found is None:
+            return f"{owner.__name__} has no {name}"
+        parameters = tuple(inspect.signature(found).parameters)
+        if parameters != expected:
+            return f"{owner.__name__}.{name} takes {', '.join(parameters)}"
+    return ""
+
+
+class _Flags(compiler.Flags):
+    """numba's options; theirs are hashed one by one at every step of typing."""
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is _Flags and self._values == other._values
+
+
+class _Part(JITCodeLibrary):
+    """What a function is lowered to, and the libraries of all it calls; no machine code is made of it."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._linking_libraries: dict[Any, None] = {}
+
+    def finalize(self) -> None:
+        """Leave it to the whole."""
+        self._finalized = True
+
+    def add_linking_library(self, library: Any) -> None:
+        """Note what is called, and what that calls."""
+        library._ensure_finalized()
+        self._linking_libraries |= {library: None} | (library._linking_libraries if isinstance(library, _Part) else {})
+
+
+class _Whole(JITCodeLibrary):
+    """All parts of what Python calls."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage.name == "linkonce_odr" and not function.is_declaration:
+                function.linkage = "internal"
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class Kernel(CPUDispatcher):
+    """A function that is compiled for each kind of arguments: as a part for compiled code, as a whole for Python."""
+
+    def __init__(self, *args: Any, kept: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._parts: dict[Any, Any] = {}
+        self._cache = kept
+
+    @global_compiler_lock
+    def _part(self, args: Any) -> Any:
+        if args not in self._parts:
+            flags, library = _Flags(), _Part(self.targetctx.codegen(), self.py_func.__qualname__)
+            self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
+            flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+            contexts = self.typingctx, self.targetctx
+            part = compiler.compile_extra(*contexts, self.py_func, args, None, flags, {}, library)
+            self.targetctx.insert_user_function(part.fndesc, part.fndesc, (library, *library._linking_libraries))
+            self._parts[args] = part
+        return self._parts[args]
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What a compiled caller asks for; not for each value of a constant anew."""
+        kws = {name: types.unliteral(kind) for name, kind in kws.items()}
+        python_signature, args = self._compiler.fold_argument_types(tuple(map(types.unliteral, args)), kws)
+        signatures = [self._part(tuple(args)).signature]
+        return typing.make_concrete_template("Call", self.py_func.__name__, signatures), python_signature, args, {}
+
+    def get_overload(self, sig: Any) -> Any:
+        """What a compiled caller's code is found by."""
+        return self._part(tuple(sigutils.normalize_signature(sig)[0])).fndesc
+
+    @global_compiler_lock
+    def compile(self, sig: Any) -> Any:
+        """What Python calls."""
+        args = tuple(sigutils.normalize_signature(sig)[0])
+        if args not in self.overloads:
+            self.add_overload(self._cache.load_overload(args, self.targetctx) or self._whole(args))
+        return self.overloads[args].entry_point
+
+    def _whole(self, args: Any) -> Any:
+        collecting, context = gc.isenabled(), self.targetctx
+        gc.disable()  # a sixth of the time, and next to nothing to collect
+        try:
+            part = self._part(args)
+            library = _Whole(context.codegen(), part.library.name)
+            library.enable_object_caching()
+            context.create_cpython_wrapper(library, part.fndesc, part.environment, part.call_helper, release_gil=True)
+            for each in (part.library, *part.library._linking_libraries):
+                library.add_linking_library(each)
+            entry = context.get_executable(library, part.fndesc, part.environment)
+        finally:
+            gc.freeze()
+            gc.unfreeze()  # what was made is old, and not looked through at the next turn
+            if collecting:
+                gc.enable()
+        for name in (variable.name for variable in library._final_module.global_variables):
+            if name.startswith("_ZN08NumbaEnv") and lookup_environment(name) is not None:
+                library.codegen.set_env(name, lookup_environment(name))
+        whole = part._replace(library=library, entry_point=entry, target_context=context)
+        self._cache.save_overload(args, whole)
+        return whole
