@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 from steerclear.shield.bridge.blackbox import McapWriter, header_of_fleet, log_path
 from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.session import VehicleSession
 
-from .station import Station
 
-
-def open_box(station: Station, text: str, policy: str, checks: Sequence[CheckResult]) -> McapWriter:
+def open_box(station: VehicleSession, text: str, policy: str, checks: Sequence[CheckResult]) -> McapWriter:
     """Begin a log of what a station does.
 
     Args:

@@ -16,12 +16,12 @@ from steerclear.shield.bridge.preflight.missed import Missed
 from steerclear.shield.bridge.preflight.response import drill_checks
 from steerclear.shield.bridge.preflight.result import Check
 from steerclear.shield.bridge.roster import Roster
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.situation import SITUATION, check_situation
 from steerclear.shield.bridge.tick import TickSink
 
 from .grounds import grounds_of
 from .preflight_file import check_drill
-from .station import Station
 
 LOOK_S = 1.5
 """How long boats are looked at before their situation is judged, s."""
@@ -30,7 +30,7 @@ LOOK_S = 1.5
 class _Look:
     """What is known of all boats after watching them for a while, when first asked for."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: VehicleSession) -> None:
         self._station = station
 
     @cached_property
@@ -47,7 +47,7 @@ class _Look:
         return roster
 
 
-def checks_of(station: Station, minutes: float) -> list[Check]:
+def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
     """Checks that move no boat, in the order to run.
 
     Args:
@@ -64,12 +64,12 @@ def checks_of(station: Station, minutes: float) -> list[Check]:
     return [disk, *links, *situation]
 
 
-def drilled_check(station: Station, text: str, boat: str | None, accept: Sequence[str]) -> Check:
+def drilled_check(station: VehicleSession, text: str, boat: str | None, accept: Sequence[str]) -> Check:
     """The check that these boats were drilled lately, and did well but for what is accepted."""
     return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links), accept))
 
 
-def drive_drill(station: Station, operator: Operator, sinks: Sequence[TickSink] = ()) -> list[Check]:
+def drive_drill(station: VehicleSession, operator: Operator, sinks: Sequence[TickSink] = ()) -> list[Check]:
     """Drive one boat after the other a short way, all of them behind the shield; the checks of what was seen.
 
     Args:

@@ -12,12 +12,11 @@ from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import FeedReceiver
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.fleet_settings import LinkSettings
+from steerclear.shield.bridge.links import key_of, signing_of
 from steerclear.shield.bridge.loop import contact_of
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
 from steerclear.shield.exceptions import FleetFileError
-
-from .signing import key_of, signing_of
 
 CONNECT_S = 15.0
 

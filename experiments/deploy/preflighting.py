@@ -7,6 +7,7 @@ import contextlib
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import not_passed, run_checks
+from steerclear.shield.bridge.session import VehicleSession
 
 from .boxes import open_box
 from .checks import checks_of, drive_drill
@@ -14,7 +15,6 @@ from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, m
 from .preflight_file import DRILLED, keep
 from .quiet import ended_by_signals, undisturbed, warm_up
 from .rehearsal import refuse_early
-from .station import Station
 
 
 def preflight(
@@ -38,7 +38,7 @@ def preflight(
     warm_up(fleet)
     outcome = Outcome()
     clock = MonotonicClock(orders.speed)
-    station = Station(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
+    station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
     try:
         with station, ended_by_signals(operator):
             checks = checks_of(station, LONGEST_MINUTES)
@@ -53,7 +53,9 @@ def preflight(
     return outcome
 
 
-def _drill(station: Station, text: str, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome) -> None:
+def _drill(
+    station: VehicleSession, text: str, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome
+) -> None:
     with contextlib.ExitStack() as stack:
         box = stack.enter_context(contextlib.closing(open_box(station, text, "drill", outcome.checks)))
         station.prepare()

@@ -10,11 +10,11 @@ from typing import Self
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import FeedSender, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.links import key_of
 from steerclear.shield.exceptions import FleetFileError
 
 from .hearing import Hearing
 from .rules import Umpire, game_config, player_names
-from .signing import key_of
 
 logger = logging.getLogger(__name__)
 

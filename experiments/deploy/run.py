@@ -9,10 +9,12 @@ from steerclear.policies.registry import SB3_PREFIX
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.links import key_of
 from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.publishing import PositionPublisher
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.bridge.timing import Timing
 
@@ -24,8 +26,6 @@ from .policy_process import PolicyProcess
 from .preflight_file import DRILLED
 from .quiet import ended_by_signals, undisturbed, warm_up
 from .rehearsal import refuse_early
-from .signing import key_of
-from .station import Station
 from .tally import Tally
 
 
@@ -59,7 +59,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         publishers = _publishers(fleet, orders)
         for publisher in publishers:
             stack.callback(publisher.close)
-        station = Station(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
+        station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
         try:
             with station, ended_by_signals(operator):
                 checks = checks_of(station, orders.minutes or LONGEST_MINUTES)
@@ -77,7 +77,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
 
 
 def _run(
-    station: Station,
+    station: VehicleSession,
     policy: PolicyProcess,
     orders: Orders,
     kept: Sequence[TickSink],

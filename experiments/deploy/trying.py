@@ -10,6 +10,7 @@ from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.tick import Tick
 
 from .boxes import open_box
@@ -19,7 +20,6 @@ from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, m
 from .quiet import ended_by_signals, undisturbed, warm_up
 from .rehearsal import refuse_early
 from .sea_trial import SeaTrial, longest_s
-from .station import Station
 
 
 def sea_trial(
@@ -53,7 +53,7 @@ def sea_trial(
     warm_up(fleet)
     outcome, trial = Outcome(), None
     clock = MonotonicClock(orders.speed)
-    station = Station(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
+    station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
     try:
         with station, ended_by_signals(operator):
             checks = checks_of(station, LONGEST_MINUTES)
@@ -84,7 +84,7 @@ class _End:
         """Nothing is held."""
 
 
-def _run(station: Station, trial: SeaTrial, box: Any, surface: Surface, operator: Operator) -> str:
+def _run(station: VehicleSession, trial: SeaTrial, box: Any, surface: Surface, operator: Operator) -> str:
     fleet = station.fleet
     with contextlib.ExitStack() as stack:
         shown = surface.sinks(fleet, operator, station.clock)

@@ -12,12 +12,12 @@ import numpy as np
 from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.orders import _delay_s
-from steerclear.experiments.deploy.station import Station
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.platforms import layout as L
 
 OURS, THEIRS = ("blue_1", "blue_2", "blue_3"), ("red_1", "red_2", "red_3")
@@ -106,7 +106,7 @@ def sail(folder, told, true, minutes, seed, shielded):
         random_start=True,
         hulls=lambda name, platform: true if name in OURS else platform,
     )
-    station = Station(fleet, None, clock, tlog=False)
+    station = VehicleSession(fleet, None, clock, tlog=False)
 
     def move():
         clock.sleep_until(clock.now_s() + STEP_S)

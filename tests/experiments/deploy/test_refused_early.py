@@ -8,8 +8,8 @@ from steerclear.experiments.deploy.orders import Orders
 from steerclear.experiments.deploy.preflight_file import measured_delay_s, path_of
 from steerclear.experiments.deploy.preflighting import preflight
 from steerclear.experiments.deploy.run import deploy
-from steerclear.experiments.deploy.station import Station
 from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.exceptions import SteerclearError
 from test_deploy_run import free_ports
 from typer.testing import CliRunner
@@ -50,7 +50,7 @@ def no_packet(monkeypatch):
     def connect(self, timeout_s=0.0):
         raise RuntimeError("packets were sent")
 
-    monkeypatch.setattr(Station, "connect", connect)
+    monkeypatch.setattr(VehicleSession, "connect", connect)
 
 
 FENCE = "{xmin_m: -10, ymin_m: -10, xmax_m: 90, ymax_m: 50}"

@@ -9,13 +9,13 @@ from pymavlink import mavutil
 from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.experiments.deploy.replaying_report import compare, draw, replay_log
 from steerclear.experiments.deploy.run import warm_up
-from steerclear.experiments.deploy.station import Station
 from steerclear.shield import Commands
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.session import VehicleSession
 
 SECONDS = 5.0
 TEXT = """\
@@ -72,7 +72,7 @@ def deployed(tmp_path_factory):
     boats = [SimBoat(name, team=int(name[0] == "r"), address=address, start=start) for name, start in STARTS.items()]
     with (
         SimFleet(boats, y_axis_deg=20.0, autopilot=AutopilotSettings(boot_s=0.0)),
-        Station(fleet, None, clock) as station,
+        VehicleSession(fleet, None, clock) as station,
     ):
         station.connect()
         station.prepare()

@@ -15,13 +15,13 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
-from steerclear.experiments.deploy.station import Station
 from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.platforms import layout as L
 
 DOC = Path(__file__).parents[3] / "docs" / "boats.md"
@@ -74,7 +74,7 @@ class Lake:
         self.water = SimFleet(
             places, clock=self.clock, autopilot=settings, noise=1.0, seed=5, key=KEY if signed else None
         )
-        self.station = Station(load_fleet(folder / "FLEET.yaml"), None, self.clock)
+        self.station = VehicleSession(load_fleet(folder / "FLEET.yaml"), None, self.clock)
 
     def __enter__(self):
         done = threading.Event()

@@ -1,4 +1,4 @@
-"""`Station`: every socket and file of a runner, opened from a fleet file and given back together."""
+"""`VehicleSession`: every socket and file of a runner, opened from a fleet file and given back together."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import Self
 
-from steerclear.shield.bridge.blackbox import TlogWriter, log_path
-from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.contact import Contact, heard_from
-from steerclear.shield.bridge.feed import FeedReceiver
-from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.fleet_settings import BoatSettings
-from steerclear.shield.bridge.mavlink.endpoint import Endpoint
-from steerclear.shield.bridge.mavlink.link import MavlinkLink
-from steerclear.shield.bridge.parts import contact_of
-
-from .signing import signing_of
+from .blackbox import TlogWriter, log_path
+from .clock import Clock
+from .contact import Contact, heard_from
+from .feed import FeedReceiver
+from .fleet_file import FleetFile
+from .fleet_settings import BoatSettings
+from .links import LINK_MAKERS, BoatLink, LinkMaker, key_of
+from .parts import contact_of
 
 LOG = logging.getLogger(__name__)
 
@@ -28,7 +25,7 @@ PREPARE_S = 60.0
 """An autopilot arms up to 42 s after it was switched on."""
 
 
-class Station:
+class VehicleSession:
     """Links to the boats a process commands, links it only listens to, and the feed. A context manager.
 
     Nothing is sent to any boat before `connect`. Leaving it stops every boat it prepared, verifies that, and gives
@@ -40,6 +37,11 @@ class Station:
         clock: the loop's.
         tlog: whether raw packets are kept in the log folder.
         begun_unix_s: time, s since 1970, that this run's files are named after; None: now.
+
+    Attributes:
+        links: to the boats this process commands, by name.
+        ears: links that are only listened to, by name.
+        key: signing key, 32 bytes; None: nothing is signed.
 
     Raises:
         FleetFileError: there is nothing to command.
@@ -54,9 +56,8 @@ class Station:
         self.fleet, self.clock = fleet, clock
         self.begun_unix_s = time.time() if begun_unix_s is None else begun_unix_s
         commanded = fleet.commanded(boat)
-        signing = signing_of(fleet)
-        self._endpoints: dict[str, Endpoint] = {}
-        self._signing = signing
+        self.key = key_of(fleet)
+        self._makers: dict[str, LinkMaker] = {}
         self._tlog: TlogWriter | None = None
         self.feed: FeedReceiver | None = None
         self.left: tuple[str, ...] = ()
@@ -68,19 +69,12 @@ class Station:
             self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
             listen = fleet.feed_listen(boat)
             if fleet.feed is not None and listen is not None:
-                self.feed = FeedReceiver(
-                    listen, fleet.frame, clock, fleet.feed.allow, fleet.names, None if signing is None else signing.key
-                )
-            for endpoint in self._endpoints.values():
-                endpoint.open()
+                self.feed = FeedReceiver(listen, fleet.frame, clock, fleet.feed.allow, fleet.names, self.key)
+            for maker in self._makers.values():
+                maker.open()
         except BaseException:
             self.close()
             raise
-
-    @property
-    def key(self) -> bytes | None:
-        """The signing key, 32 bytes; None: nothing is signed."""
-        return None if self._signing is None else self._signing.key
 
     def connect(self, timeout_s: float = CONNECT_S) -> None:
         """Hear every boat and get its streams, all at once.
@@ -108,7 +102,7 @@ class Station:
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
-        links: dict[str, MavlinkLink] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
+        links: dict[str, BoatLink] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
         ears = getattr(self, "ears", {})
         if links and not self.left:
             with ThreadPoolExecutor(len(links)) as pool:
@@ -116,8 +110,8 @@ class Station:
             for link in ears.values():
                 link.release()
             self.left = tuple(texts)
-        for endpoint in self._endpoints.values():
-            endpoint.close()
+        for maker in self._makers.values():
+            maker.close()
         if self.feed is not None:
             self.feed.close()
         if self._tlog is not None:
@@ -139,27 +133,15 @@ class Station:
             if entry.link is not None and entry.name not in names and self.fleet.contact_of(entry) == "telemetry"
         ]
 
-    def _link(self, boat: BoatSettings) -> MavlinkLink:
-        settings = boat.link
-        if settings is None:
-            raise ValueError(f"boat {boat.name} has no link")
-        endpoint = self._endpoints.get(settings.address)
-        if endpoint is None:
+    def _link(self, boat: BoatSettings) -> BoatLink:
+        kind = "" if boat.link is None else boat.link.kind
+        if kind not in self._makers:
             on_bytes = None if self._tlog is None else self._tlog.on_bytes
-            endpoint = Endpoint(settings.address, self.clock, signing=self._signing, on_bytes=on_bytes)
-            self._endpoints[settings.address] = endpoint
-        return MavlinkLink(
-            boat.name,
-            endpoint,
-            settings.system_id,
-            self.fleet.frame,
-            self.clock,
-            rate_hz=settings.rate_hz,
-            route=settings.route,
-        )
+            self._makers[kind] = LINK_MAKERS[kind](self.fleet, self.clock, on_bytes)
+        return self._makers[kind].link(boat)
 
     @staticmethod
-    def _all(links: Mapping[str, MavlinkLink], work: Callable[[MavlinkLink], None]) -> None:
+    def _all(links: Mapping[str, BoatLink], work: Callable[[BoatLink], None]) -> None:
         """Do something slow with all links at the same time; the first that fails is told, after all are done."""
         if not links:
             return
@@ -172,7 +154,7 @@ class Station:
             raise errors[0]
 
 
-def _leave(link: MavlinkLink) -> str:
+def _leave(link: BoatLink) -> str:
     try:
         return link.close()
     except Exception as error:  # the other boats must still be stopped
