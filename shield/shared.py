@@ -59,7 +59,7 @@ def share(row: Row) -> Row:
 
 
 def type_of(row: Any) -> SharedType:
-    """numba's type of a shared tuple."""
+    """Numba's type of a shared tuple."""
     kind: SharedType = row._type
     return kind
 

@@ -27,7 +27,7 @@ Logs = Annotated[
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="Platform file to write (.yaml); a new one."), NEW]
 Name = Annotated[str | None, typer.Option(metavar="NAME", help="Of the boat.", show_default="the file's name")]
-Kind = Annotated[str, typer.Option(metavar="KIND", help="rate, usv, or auto: the one that foretells best.")]
+Kind = Annotated[str, typer.Option(metavar="KIND", help="rate, usv, or auto: the one that predicts best.")]
 Boat = Annotated[str | None, typer.Option(metavar="NAME", help="The boat, of a black-box log with several.")]
 SystemId = Annotated[int | None, typer.Option(metavar="N", help="The boat, of a .tlog with several.")]
 Plot = Annotated[
@@ -59,12 +59,15 @@ def fit(
     check_new(picture, "--plot")
     if kind != "auto" and kind not in MODELS:
         raise ConfigError(f"--kind is {kind!r}; give auto or one of {', '.join(MODELS)}")
-    runs = read_logs(logs, boat, system_id)
+    left_out: list[str] = []
+    runs = read_logs(logs, boat, system_id, left_out.append)
+    for words in left_out:
+        err().print(f"left out: {words}", style="yellow", markup=False, soft_wrap=True)
     kinds = tuple(MODELS) if kind == "auto" else (kind,)
     found = fit_runs(runs, kinds, lambda words: err().print(f"fitting {len(runs)} runs as {words} ...", style="dim"))
     chosen = best_of(found)
     described = platform_file(found[chosen], name or file.stem)
-    results = results_of(found, chosen, described)
+    results = results_of(found, chosen, described) | {"left_out": left_out}
     head = f"Fitted by steerclear fit to {len(runs)} runs of {', '.join(sorted({log.name for log in logs}))[:200]}."
     _write(file, to_text(described, head))
     make_folder_of(picture)

@@ -1,4 +1,4 @@
-"""From runs to a platform file: every kind of boat is tried, the one that foretells best is kept."""
+"""From runs to a platform file: every kind of boat is tried, the one that predicts best is kept."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import numpy as np
 from steerclear.shield.exceptions import PlatformError
 from steerclear.shield.platforms.files import PlatformFile
 
-from .errors import FitError
 from .judge import AHEAD_S, COVERED, Judged, judge
 from .models import MODELS, Seen
-from .runs import Run
+from .runs import FitError, Run
 
 DIGITS = 4
 CHOSEN_BY = 0.9
@@ -44,12 +43,12 @@ def platform_file(judged: Judged, name: str) -> PlatformFile:
     """The file of a fitted boat.
 
     Raises:
-        FitError: the log cannot be foretold, or what was fitted is no boat that can be steered.
+        FitError: the log cannot be predicted, or what was fitted is no boat that can be steered.
     """
     worst = judged.quantile_m(1, 0.5)
     if worst > WORST_M:
         raise FitError(
-            f"no model foretells these runs: {worst:.1f} m off 3 s ahead, half of the time; is it the log of one boat, "
+            f"no model predicts these runs: {worst:.1f} m off 3 s ahead, half of the time; is it the log of one boat, "
             "obeying these commands, in still water?"
         )
     model, vector = judged.fit.model, np.array([_rounded(value) for value in judged.fit.vector])

@@ -1,4 +1,4 @@
-"""How well a model foretells runs it was not fitted to, and the margin that covers what it misses."""
+"""How well a model predicts runs it was not fitted to, and the margin that covers what it misses."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from .runs import STEP_S, Run
 from .solve import Fit, fit_model
 
 FOLDS = 3
-"""Runs of each kind are dealt out to so many parts; each part is foretold by a fit to the others."""
+"""Runs of each kind are dealt out to so many parts; each part is predicted by a fit to the others."""
 AHEAD_S = (1.0, 3.0, 6.0)
 COVERED = 0.99
 EVERY = 3
-"""Steps between the moments from which a run is foretold."""
-FEWEST_RUNS = 3
-FEWEST_TURNING_DEG, FEWEST_SPEED_MPS = 20.0, 0.3
+"""Steps between the moments from which a run is predicted."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +28,9 @@ class Judged:
     Attributes:
         fit: to all runs.
         seen: what the boat did at its hardest.
-        errors_m: (windows, 3) distances at `AHEAD_S` between places foretold and seen, of all runs, NaN: past its end.
+        errors_m: (windows, 3) distances at `AHEAD_S` between places predicted and seen, of all runs, NaN: past its end.
         whose: (windows,) number of the run.
-        held_out: (windows,) whether the run was foretold by a fit that did not know it.
+        held_out: (windows,) whether the run was predicted by a fit that did not know it.
         runs: all of them.
     """
 
@@ -71,7 +69,7 @@ class Judged:
 
 
 def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
-    """Fit a model to all runs, and foretell each run by a fit to the others of its kind."""
+    """Fit a model to all runs, and predict each run by a fit to the others of its kind."""
     around = model.around(seen)
     fit = fit_model(around, runs, seen.top_mps, around.starts())
     part = _dealt(runs)

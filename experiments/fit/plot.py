@@ -1,4 +1,4 @@
-"""A picture of a fit: some runs as seen and as foretold, and the errors over the time ahead."""
+"""A picture of a fit: some runs as seen and as predicted, and the errors over the time ahead."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def draw(judged: Judged, name: str, path: Path) -> None:
         _draw_run(axis, judged, params, number)
     _draw_errors(axes.flat[4], judged)
     _draw_spread(axes.flat[5], judged)
-    figure.suptitle(f"{name}: {judged.fit.model.kind}, {len(judged.runs)} runs; dashed: foretold 6 s ahead, every 3 s")
+    figure.suptitle(f"{name}: {judged.fit.model.kind}, {len(judged.runs)} runs; dashed: predicted 6 s ahead, every 3 s")
     figure.savefig(path, dpi=110)
 
 
 def _telling(judged: Judged) -> list[int]:
-    """Runs to show: of each kind the one foretold worst, then others."""
+    """Runs to show: of each kind the one predicted worst, then others."""
     worst = {
         n: float(np.nanmax(judged.errors_m[judged.whose == n][:, 1], initial=0.0)) for n in range(len(judged.runs))
     }

@@ -1,4 +1,4 @@
-"""Foretelling runs: the model follows a run as the runner does, and from many moments is run on under the commands."""
+"""Predicting runs: the model follows a run as the runner does, and from many moments is run on under the commands."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def _relative(heading_deg: float, told_deg: float) -> float:
 
 
 @kernel
-def foretell(params: Array, thrust: Array, seen: Array, told: Array, every: int, ahead: int, out: Array) -> None:
-    """Fill ``out`` (windows, ahead, 4): x, y, unwrapped heading, speed foretold 1, 2, ... steps on.
+def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, ahead: int, out: Array) -> None:
+    """Fill ``out`` (windows, ahead, 4): x, y, unwrapped heading, speed predicted 1, 2, ... steps on.
 
     Before each step the model is put where the boat was seen, its controllers' memory kept; window w begins at step
     w * every of the run.
@@ -31,7 +31,7 @@ def foretell(params: Array, thrust: Array, seen: Array, told: Array, every: int,
         seen: (k, 5), see `Run`.
         told: (k, 2) speed and heading that work in each step.
         every: steps between windows.
-        ahead: steps foretold.
+        ahead: steps predicted.
         out: windows, overwritten.
     """
     row, window = np.zeros(L.N_STATE), np.zeros(L.N_STATE)
@@ -74,7 +74,7 @@ def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -
     if count == 0:
         return out
     thrust = np.full(1, thrust_at(params, max(0.0, float(run.seen[0, 3]))))
-    foretell(params, thrust, run.seen, delayed(run, delay_s), every, ahead, out)
+    predict(params, thrust, run.seen, delayed(run, delay_s), every, ahead, out)
     for w in range(count):
         begin = w * every + 1
         out[w] -= run.seen[begin : begin + ahead, :4]

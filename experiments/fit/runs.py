@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
-
-from .errors import FitError
 
 STEP_S = 0.1
 """Step of the grid and of the model, s."""
-LONGEST_GAP_S = 1.0
-"""Between two of a log's rows a run ends."""
 SHORTEST_S = 3.0
 """Shorter runs tell nothing."""
 RATE_OVER_S = 0.2
 """Turn rates are taken over this time, s."""
-FASTEST_MPS = 40.0
-SAME_S = 1e-4
-"""Times closer together are the same."""
+
+
+class FitError(ConfigError):
+    """A log cannot be read, contradicts itself, or says too little of the boat; one line that names the remedy."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +26,30 @@ class Run:
 
     Attributes:
         name: of the log it is from.
+        begin_s: time of its first step in the log, s.
         seen: (k, 5) x m, y m, heading deg (unwrapped, clockwise from the y axis), speed m/s, turn rate deg/s.
         told: (k, 2) speed m/s and heading deg (unwrapped) commanded at each step.
     """
 
     name: str
+    begin_s: float
     seen: Array = field(repr=False)
     told: Array = field(repr=False)
+
+    @classmethod
+    def of(cls, name: str, begin_s: float, seen: Array, told: Array) -> Run:
+        """Build a run of x, y, heading, speed (k, 4) and of speed and heading told (k, 2), on the grid."""
+        heading, wanted = np.unwrap(seen[:, 2], period=360.0), np.unwrap(told[:, 1], period=360.0)
+        wanted = wanted + 360.0 * np.round((heading[0] - wanted[0]) / 360.0)
+        back = max(1, round(RATE_OVER_S / STEP_S))
+        padded = np.concatenate([np.full(back, heading[0]), heading])
+        rates = (padded[back:] - padded[:-back]) / (back * STEP_S)
+        whole = np.column_stack([seen[:, 0], seen[:, 1], heading, seen[:, 3], rates])
+        return cls(name, begin_s, whole, np.column_stack([told[:, 0], wanted]))
+
+    def part(self, begin: int, end: int) -> Run:
+        """Take steps ``begin`` to ``end``, the last one left out."""
+        return Run(self.name, self.begin_s + begin * STEP_S, self.seen[begin:end], self.told[begin:end])
 
     @property
     def seconds(self) -> float:
@@ -52,58 +66,3 @@ class Run:
         if abs(gain) < 0.3:
             return "steady"
         return "faster" if gain > 0.0 else "slower"
-
-
-def runs_of(name: str, time_s: Array, seen: Array, told: Array) -> list[Run]:
-    """Runs of a log's rows: cut where commands or rows are missing, on equal steps.
-
-    Args:
-        name: of the log.
-        time_s: (m,) times, s.
-        seen: (m, 4) x m, y m, heading deg, speed m/s.
-        told: (m, 2) speed m/s, heading deg; NaN where nothing was commanded.
-
-    Raises:
-        FitError: values no boat can have.
-    """
-    order = np.argsort(time_s, kind="stable")
-    time_s, seen, told = time_s[order], seen[order], told[order]
-    fine = np.isfinite(time_s) & np.isfinite(seen).all(axis=1) & np.isfinite(told).all(axis=1)
-    _check_values(name, seen[fine])
-    pieces = np.flatnonzero(~fine[1:] | ~fine[:-1] | (np.diff(time_s) > LONGEST_GAP_S)) + 1
-    bounds = [0, *pieces.tolist(), len(time_s)]
-    runs = [_grid(name, time_s[a:b], seen[a:b], told[a:b]) for a, b in pairwise(bounds)]
-    return [run for run in runs if run is not None]
-
-
-def _check_values(name: str, seen: Array) -> None:
-    if len(seen) and float(np.abs(seen[:, 3]).max()) > FASTEST_MPS:
-        raise FitError(f"{name}: a speed of {np.abs(seen[:, 3]).max():.0f} m/s is no boat's; give speeds in m/s")
-
-
-def _grid(name: str, time_s: Array, seen: Array, told: Array) -> Run | None:
-    keep = np.concatenate([[True], np.diff(time_s) > 1e-6]) if len(time_s) else np.zeros(0, bool)
-    time_s, seen, told = time_s[keep], seen[keep], told[keep]
-    if len(time_s) < 4 or time_s[-1] - time_s[0] < SHORTEST_S:
-        return None
-    time_s = time_s - time_s[0]  # seconds since 1970 leave no room for fractions
-    grid = np.arange(time_s[0], time_s[-1], STEP_S)
-    columns = [
-        np.interp(grid, time_s, column) for column in (seen[:, 0], seen[:, 1], _unwrapped(seen[:, 2]), seen[:, 3])
-    ]
-    last = np.searchsorted(time_s, grid + SAME_S, side="right") - 1  # commands hold until the next one
-    heading = _unwrapped(told[:, 1])
-    heading = heading + 360.0 * np.round((columns[2][0] - heading[0]) / 360.0)
-    commands = np.column_stack([told[last, 0], heading[last]])
-    return Run(name, np.column_stack([*columns, turn_rates(columns[2])]), commands)
-
-
-def _unwrapped(angle_deg: Array) -> Array:
-    return np.unwrap(angle_deg, period=360.0)
-
-
-def turn_rates(heading_deg: Array) -> Array:
-    """Turn rates, deg/s, of unwrapped headings on the grid, over `RATE_OVER_S` back."""
-    back = max(1, round(RATE_OVER_S / STEP_S))
-    padded = np.concatenate([np.full(back, heading_deg[0]), heading_deg])
-    return np.asarray((padded[back:] - padded[:-back]) / (back * STEP_S))

@@ -1,4 +1,4 @@
-"""Least squares: the numbers of a model whose foretold runs lie nearest to those seen (scipy's trust region)."""
+"""Least squares: the numbers of a model whose predicted runs lie nearest to those seen (scipy's trust region)."""
 
 from __future__ import annotations
 

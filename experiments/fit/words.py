@@ -67,7 +67,7 @@ def promise(file: PlatformFile) -> list[str]:
         return ["Nothing was measured of it: fit it to a log, so that the shield knows delay and margin."]
     error = file.error_m(3.0)
     lines = [
-        f"Commands work after {measured.get('delay_s', 0.0):.2f} s; of places foretold 1, 3 and 6 s ahead 99 of 100 "
+        f"Commands work after {measured.get('delay_s', 0.0):.2f} s; of places predicted 1, 3 and 6 s ahead 99 of 100 "
         f"are within {', '.join(format(measured.get(f'error_{at}_s_m', float('nan')), '.2f') for at in (1, 3, 6))} m.",
         "deploy counts on that delay, rounded up to whole turns of its loop, and keeps the boat "
         f"{file.error_m(1.0):.2f} m farther from everybody for what its model misses; what it misses on the day widens "
