@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from steerclear.env.config import GameConfig
 from steerclear.env.record import Record
@@ -14,6 +14,7 @@ from steerclear.env.record_meta import DEFAULT_SEPARATION_M
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L

@@ -11,10 +11,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
 from steerclear.experiments.boats.demo import demo_text
 from steerclear.shield.bridge.blackbox import log_path
+from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
 
 FOLDER = Path("steerclear_demo")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Self
 
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.contact import Contact
@@ -16,6 +15,7 @@ from steerclear.shield.bridge.links import key_of, signing_of
 from steerclear.shield.bridge.loop import contact_of
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
 
 CONNECT_S = 15.0

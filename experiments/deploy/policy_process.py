@@ -13,7 +13,7 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from steerclear.policies.registry import looks_like_path
@@ -21,6 +21,7 @@ from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.wanted import Answer, Snapshot
 from steerclear.shield.commands import Commands
+from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array
 

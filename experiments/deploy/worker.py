@@ -23,7 +23,12 @@ from ..entries.limits import Limits
 from ..entries.system import end_group, end_marked, is_stopped
 from .frames import GONE, Broken, FrameReader, FrameWriter
 
-KEEPER = "steerclear.experiments.entries.keeper"
+KEEP = """import sys
+sys.path[:] = filter(None, sys.path)
+from steerclear.experiments.entries.keeper import main
+sys.exit(main(sys.argv[1:]))
+"""
+"""What the process runs: the keeper, without the working directory's own modules in its way."""
 PART = "steerclear.experiments.deploy.policy_child"
 DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True)
 """Limits of a policy that may play for days."""
@@ -72,7 +77,7 @@ class Worker:
             fds = (theirs_r, theirs_w, notes_w)
             what = (*map(str, fds), self._folder, json.dumps(asdict(limits)), part, *preload)
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", KEEPER, *what],
+                [sys.executable, "-c", KEEP, *what],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

@@ -1,6 +1,6 @@
 """Our own process between a runner and foreign code, which it forks, watches and ends with all it started.
 
-``python -m steerclear.experiments.entries.keeper READ_FD WRITE_FD NOTE_FD FOLDER LIMITS PART PRELOAD...``: module PART
+Its arguments (of `main`) are READ_FD WRITE_FD NOTE_FD FOLDER LIMITS PART PRELOAD...: module PART
 has ``serve(read_fd, write_fd, folder)``, whose return value is the exit status. When that is `AGAIN`, all that is left
 of it is ended and it begins anew, from a process that has everything imported; any other end is the keeper's, too. When
 the runner is gone, so is everything here. NOTE_FD is the keeper's alone: it says `READY` when it begins anew, and which
@@ -148,7 +148,3 @@ def main(arguments: list[str]) -> int:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     gc.freeze()
     return keeper.run()
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from steerclear.shield.compat import StrEnum
 
 Array = NDArray[np.float64]
 

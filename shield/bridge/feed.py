@@ -13,8 +13,8 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from types import TracebackType
-from typing import Self
 
+from ..compat import Self
 from ..exceptions import FeedError
 from .clock import Clock
 from .contact import TELEMETRY, Alarm, Contact

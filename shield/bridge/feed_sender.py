@@ -6,8 +6,8 @@ import logging
 import random
 from collections.abc import Iterable, Sequence
 from types import TracebackType
-from typing import Self
 
+from ..compat import Self
 from .feed_packets import Fix, GameState, Packet
 from .feed_seal import Seal
 from .feed_sockets import ip_version, numeric_host, sending_socket, socket_address

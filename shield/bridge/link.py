@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
+
+from ..compat import Self
 
 NEVER_S = math.inf
 """Age of what was never received."""

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Self
 
+from ..compat import Self
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
 from .contact import Contact, heard_from

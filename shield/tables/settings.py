@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
+from ..compat import StrEnum
 from ..exceptions import TableError
 from ..jit import Array
 from ..platforms.limits import limits_of

@@ -9,10 +9,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, Any
 
 from mcap.records import Channel, Footer, Message
 
+from ...compat import Self
 from ...exceptions import LogError
 from ..tick import Tick
 from .chain_check import ChainCheck

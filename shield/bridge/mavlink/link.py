@@ -6,8 +6,8 @@ import logging
 import math
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
 
+from ...compat import Self
 from ...exceptions import LinkError
 from ..clock import Clock
 from ..frame import FieldFrame
