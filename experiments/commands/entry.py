@@ -10,10 +10,10 @@ import typer
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..entries.checking import check_entry, headline
+from ..entries.check import always_late, check_entry, headline
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
-from ..entries.wrapping.wrap import wrap_entry
+from ..entries.wrap import wrap_entry
 from ..play.match import play_match
 from ..play.spec import ANSWER_S
 from ..report.replay_html import write_replay
@@ -38,7 +38,7 @@ Entry = Annotated[str, typer.Argument(metavar="ENTRY", help="Folder or zip with 
 Also = Annotated[str | None, typer.Option(metavar="A.zip,B.zip", help="Further opponents: entries or policies.")]
 Games = Annotated[int, typer.Option(metavar="N", help="Games against each opponent, without the shield and with it.")]
 Looks = Annotated[int, typer.Option(metavar="N", help="Pairs of games to keep as replays, 0 to 3.")]
-CheckTime = Annotated[float, typer.Option(metavar="S", help="Length of the game it is tried in, s.")]
+CheckTime = Annotated[float | None, typer.Option(metavar="S", help="Length of the game it is tried in, s. [whole]")]
 QUICK_GAMES, QUICK_TIME_S = 2, 200.0
 
 
@@ -57,13 +57,14 @@ def check_path(entry: str) -> None:
 def check(
     entry: Entry,
     preset: o.Preset = "mctf2026",
-    max_time: CheckTime = 60.0,
+    max_time: CheckTime = None,
     answer_time: o.AnswerTime = ANSWER_S,
     json_file: o.JsonFile = None,
 ) -> None:
     """Check an entry: whether it loads, what it imports, how long its actions take, a game against boats that hold.
 
-    Exit status: 0 it plays, 1 a boat had no usable action in some step, 2 it cannot be loaded or gave nothing usable.
+    Exit status: 0 it plays, 1 a boat had no usable action in some step or every decision came too late, 2 it cannot be
+    loaded or gave nothing usable.
     """
     check_path(entry)
     say_of_elsewhere([entry], GameConfig.preset(preset))
@@ -73,7 +74,7 @@ def check(
         console.print(line, markup=False, soft_wrap=True)
     if json_file is not None:
         write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
-    finish(not found["failures"])
+    finish(not found["failures"] and not always_late(found))
 
 
 def check_lines(found: dict[str, Any]) -> list[str]:
@@ -86,6 +87,7 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         f"time of a decision of the team: mean {time_text(found['mean_decision_ms'])}, longest "
         f"{time_text(found['max_decision_ms'])} in {found['decisions']} decisions ({found['calls']} actions); "
         f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
+        f"tried in {found['steps']} of the {found['game_steps']} decisions of a game",
         f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
         f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
     ]
@@ -184,8 +186,9 @@ def wrap(
     say_of_elsewhere([entry], GameConfig.preset(preset))
     made = wrap_entry(entry, out_file, preset, o.with_distance(asked, preset, {}))
     tried, settings = made.pop("tried"), made["shield"]
-    if tried["failures"]:
-        err().print(f"warning: {headline(tried)}; its shield tells them to stop", markup=False, soft_wrap=True)
+    if tried["failures"] or always_late(tried):
+        stops = "; its shield tells boats to stop that fail" if tried["failures"] else ""
+        err().print(f"warning: {headline(tried)}{stops}", markup=False, soft_wrap=True)
     say_of_distance(settings["separation_m"], GameConfig.preset(preset))
     console = out()
     words = f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; for preset {made['preset']}; {_kept(settings)}"

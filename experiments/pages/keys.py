@@ -210,6 +210,7 @@ ENTRY_CHECK = {
     "late_decisions": "those that took longer than the game gives",
     "held": "actions that could not be used: the boat stopped",
     "steps": "in which it was asked for actions",
+    "game_steps": "steps of a whole game",
     "failed_steps.*": "by boat: steps without a usable action",
     "failures[].kind": "what kind of failure",
     "failures[].count": "how often",

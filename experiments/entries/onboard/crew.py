@@ -65,8 +65,7 @@ class Crew:
         if agent_id not in self._facts.agent_ids:
             _say_once(f"unknown boat {agent_id!r}: it is told to stop")
             return np.array(STOP)
-        if (agent_id, "pos") not in state and isinstance(state.get(agent_id), Mapping):
-            state = state[agent_id]
+        state = unwrapped(agent_id, state)
         place = self._facts.agent_ids.index(agent_id)
         team = int(2 * place >= len(self._facts.agent_ids))
         return np.array(self._deck(team).command(ask, place, state))
@@ -131,7 +130,8 @@ class Deck:
             wanted[place] = self._asked(ask, place, sight)
         try:
             fleet = fleet_of(self._facts, sight, self._team, self._disabled_s)
-            sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
+            with np.errstate(all="ignore"):  # as compiled code, which divides by zero and goes on
+                sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
         except Exception as error:  # whatever it is, boats that nobody decides for must stop
             text = describe_error(error)
             self.failures = dict.fromkeys(self._places, (UNDECIDED, text))
@@ -200,8 +200,17 @@ class Deck:
         rows[:, L.Y] = 30.0
         nobody = np.zeros(len(rows), np.bool_)
         fleet = fleet_of(self._facts, Sight(rows, nobody, nobody, nobody, nobody), self._team, self._disabled_s)
-        self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
+        with np.errstate(all="ignore"):
+            self._shield.decide(fleet, Commands.game_deg(np.zeros((len(rows), 2))), self._around)
         self._shield.reset()
+
+
+def unwrapped(agent_id: Any, state: Mapping[Any, Any]) -> Mapping[Any, Any]:
+    """The global state itself, where a runner hands in an info, or infos by boat, that it is in."""
+    for key in (agent_id, "global_state", agent_id):
+        if (agent_id, "pos") not in state and isinstance(state.get(key), Mapping):
+            state = state[key]
+    return state
 
 
 def name_of(facts: Facts, place: int) -> str:

@@ -1,7 +1,8 @@
 """Run by a test in a process of its own: a shielded zip's shield or entry, where only numpy can be imported.
 
 ``alone.py FOLDER shield STATES OUT``: the shield decides about recorded states; ``alone.py FOLDER entry STATES OUT``:
-the entry is asked for its team's actions in them. OUT is an array of commands.
+the entry is asked for its team's actions in them. OUT is an array of commands. ``as solution`` and ``as packages``: the
+two entries in team_one and team_two are imported in that way, and each is asked for one action.
 """
 
 import importlib
@@ -24,10 +25,39 @@ def main(folder, what, states, out):
     import numpy as np
 
     recorded = dict(np.load(states))
+    if what.startswith("as "):
+        return np.save(out, np.array(both(folder, what)))
     package = next(path for path in Path(folder).glob("steerclear_*") if path.is_dir()).name
     answer = {"shield": shield_commands, "entry": entry_actions}[what](package, folder, recorded)
     assert not BLOCKED & {name.partition(".")[0] for name in sys.modules}
-    np.save(out, np.array(answer))
+    return np.save(out, np.array(answer))
+
+
+def both(folder, how):
+    """Both entries built before either is asked."""
+    entries = []
+    for name in ("team_one", "team_two"):
+        if how == "as packages":
+            entries.append(importlib.import_module(f"{name}.solution").solution())
+            continue
+        sys.path.insert(0, str(Path(folder, name)))
+        entries.append(importlib.import_module("solution").solution())
+        del sys.path[0], sys.modules["solution"]
+    import numpy as np
+
+    state = state_of(np.array([(30.0 + 20 * i, 40.0, 0.0, 0.0) for i in range(6)]))
+    return [entry.compute_action("agent_0", {}, {}, state) for entry in entries]
+
+
+def state_of(boats):
+    """A global state of boats (x, y, heading, speed)."""
+    state = {}
+    for i, boat in enumerate(boats):
+        name = f"agent_{i}"
+        state[name, "pos"], state[name, "heading"], state[name, "speed"] = boat[:2], boat[2], boat[3]
+        for flag in ("is_tagged", "oob", "is_disabled"):
+            state[name, flag] = False
+    return state
 
 
 def rows_of(state):
@@ -69,12 +99,7 @@ def entry_actions(package, folder, recorded):
 
     entry, actions = solution.solution(), []
     for row in recorded["state"]:
-        state = {}
-        for i, boat in enumerate(row):
-            name = f"agent_{i}"
-            state[name, "pos"], state[name, "heading"], state[name, "speed"] = boat[:2], boat[2], boat[3]
-            for flag in ("is_tagged", "oob", "is_disabled"):
-                state[name, flag] = False
+        state = state_of(row)
         seen = dict.fromkeys([f"agent_{i}" for i in range(3)], row)
         actions.append([entry.compute_action(f"agent_{i}", seen, seen, state) for i in range(3)])
     return actions

@@ -74,6 +74,29 @@ def test_one_boat_that_fails_is_said_first_and_named(write_entry):
     assert content["failed_steps"] == {"agent_1": 3}
 
 
+def test_an_entry_that_is_late_in_every_decision_is_said_and_no_success(write_entry):
+    entry = write_entry("time.sleep(0.5); return 4")
+    done = run("check", entry, "--max-time", "2")
+    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert "but all 2 decisions took longer than the game gives" in done.stdout.splitlines()[0]
+    wrapped = run("wrap", entry, "--out", "late.zip")
+    assert wrapped.exit_code == ExitCode.OK
+    assert "warning:" in wrapped.stderr
+    assert "decisions took longer than the game gives" in wrapped.stderr.replace("\n", " ")
+
+
+def test_a_check_plays_a_whole_game_unless_told_otherwise(write_entry, monkeypatch):
+    """What goes wrong late is found: here after a minute."""
+    entry = write_entry("self.n += 1\nif self.n > 3 * 70: raise ValueError('worn out')\nreturn 4", start="self.n = 0")
+    done = run("check", entry, "--json", "a.json")
+    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert "tried in 600 of the 600 decisions of a game" in done.stdout
+    assert "agent_0 failed in 530 of 600 steps" in done.stdout.splitlines()[0]
+    short = run("check", entry, "--max-time", "3")
+    assert short.exit_code == ExitCode.OK
+    assert "tried in 3 of the 600 decisions of a game" in short.stdout
+
+
 def test_times_are_told_in_digits_that_say_something():
     assert [time_text(ms) for ms in (0.0004, 0.0123, 0.1, 12.34)] == ["0.4 us", "12.3 us", "0.1 ms", "12.3 ms"]
 

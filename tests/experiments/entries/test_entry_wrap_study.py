@@ -10,8 +10,8 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.entries.wrapping.facts import facts_for
-from steerclear.experiments.entries.wrapping.wrap import shielded_files
+from steerclear.experiments.entries.facts import facts_for
+from steerclear.experiments.entries.wrap import shielded_files
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.platforms import layout as L
 
@@ -54,7 +54,7 @@ def noted_in(opponent, seed, settings):
 @pytest.mark.study
 def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
     facts = facts_for("mctf2026", {"separation_m": 4.0})
-    package, files = shielded_files(facts, "mctf2026")
+    package, files = shielded_files(facts, "mctf2026", {})
     for name, content in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(content)

@@ -12,7 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.wrappers.mctf import surroundings_of
 
-from ...play.kept_distance import check_shield
+from ..play.kept_distance import check_shield
 
 
 def facts_for(preset: str, shield: dict[str, Any]) -> dict[str, Any]:

@@ -5,23 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sys
 import textwrap
 import zipfile
-from pathlib import Path
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
-from ...runs.new_file import check_new, check_place, make_folder_of
-from ...runs.store import told_settings
-from ..checking import check_entry
-from ..team import EntryTeam
+from ..runs.new_file import check_new, check_place, make_folder_of
+from ..runs.store import told_settings
+from .check import check_entry
 from .facts import facts_for
 from .package import code, data, renamed
+from .team import EntryTeam
 
-TEMPLATE = Path(__file__).parent.parent.parent / "report" / "templates" / "shielded_solution.txt"
+TEMPLATE = Path(__file__).parent / "shielded_solution.txt"
 PREFIX = "steerclear_"
 """Of private packages' names; the rest tells one content from another, so that two zips can meet in one process."""
 MARK = "crew.py"
@@ -42,7 +44,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         shield: settings of the shield that are not the default.
 
     Returns:
-        What `keys.ENTRY_WRAP` describes, and as ``tried`` what `checking.check_entry` found of the entry.
+        What `keys.ENTRY_WRAP` describes, and as ``tried`` what `check.check_entry` found of the entry.
 
     Raises:
         PolicyError: there is no entry, it cannot be loaded, or it gave nothing usable: a shield would hide that.
@@ -54,9 +56,8 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
     try:
         check_bare(stage.folder, entry)
         tried = check_entry(entry, preset, TRIED_S, ANSWER_S)
-        package, added = shielded_files(facts, preset)
-        own = own_files(stage.folder, package)
-        write_zip(out, {**own, **added})
+        package, files = shielded_files(facts, preset, own_files(stage.folder))
+        write_zip(out, files)
     finally:
         stage.close()
     try:
@@ -97,27 +98,30 @@ def check_bare(folder: Path, entry: str) -> None:
         raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
 
 
-def shielded_files(facts: dict[str, Any], preset: str) -> tuple[str, dict[str, bytes]]:
-    """Name of the private package, and all files that a shielded zip has beside the entry's own.
+def shielded_files(facts: dict[str, Any], preset: str, own: Mapping[str, Path]) -> tuple[str, dict[str, bytes | Path]]:
+    """Name of the private package, which hangs on all that is in the zip, and the zip's files by name.
 
     Args:
         facts: of `facts_for`.
         preset: rules of the game that they are of.
+        own: the entry's files by name.
     """
     made = about(facts, preset)
     plain: dict[str, bytes] = {name: text.encode() for name, text in code().items()}
     plain |= data(facts["platforms"])
     plain["facts.json"] = json.dumps(facts).encode()
     digest = hashlib.sha256()
-    for name in sorted(plain):
-        digest.update(name.encode() + b"\0" + plain[name])
+    for name, content in sorted({**plain, **{f"../{name}": path.read_bytes() for name, path in own.items()}}.items()):
+        digest.update(f"{name} {len(content)}\0".encode() + content)
     package = PREFIX + digest.hexdigest()[:12]
-    files = {
+    files: dict[str, bytes | Path] = {
         f"{package}/{name}": renamed(content.decode(), package).encode() if name.endswith(".py") else content
         for name, content in plain.items()
     }
-    text = TEMPLATE.read_text().replace("ENTRY_FILE", f"{entry_name(package)}.py")
-    text = text.replace("ENTRY_NAME", entry_name(package)).replace("PACKAGE", package)
+    entry = f"unshielded_{package.removeprefix(PREFIX)}"
+    files |= {f"{entry}.py" if name == ENTRY_FILE else name: path for name, path in own.items()}
+    text = TEMPLATE.read_text(encoding="utf-8").replace("OWN_MODULES", repr(own_modules(own)))
+    text = text.replace("ENTRY_FILE", f"{entry}.py").replace("ENTRY_NAME", entry).replace("PACKAGE", package)
     text = text.replace("ABOUT", textwrap.fill(words_of(made), 100))
     return package, {**files, ENTRY_FILE: text.encode(), ABOUT_FILE: made.to_bytes()}
 
@@ -138,20 +142,21 @@ def words_of(made: MadeFor) -> str:
     )
 
 
-def entry_name(package: str) -> str:
-    """Module name of the entry itself in its shielded zip."""
-    return f"unshielded_{package.removeprefix(PREFIX)}"
-
-
-def own_files(folder: Path, package: str) -> dict[str, Path]:
-    """The entry's own files by their names in the zip; its ``solution.py`` under another one."""
+def own_files(folder: Path) -> dict[str, Path]:
+    """The entry's own files by their names in its folder."""
     files: dict[str, Path] = {}
     for place, folders, names in os.walk(folder, followlinks=True):
         folders[:] = sorted(one for one in folders if one not in ("__pycache__", WORKING_DIR))
         for name in sorted(names):
-            inside = (Path(place) / name).relative_to(folder).as_posix()
-            files[f"{entry_name(package)}.py" if inside == ENTRY_FILE else inside] = Path(place) / name
+            files[(Path(place) / name).relative_to(folder).as_posix()] = Path(place) / name
     return files
+
+
+def own_modules(own: Iterable[str]) -> list[str]:
+    """Names by which an entry may import what lies beside its ``solution.py``, Python's own left out."""
+    paths = [PurePosixPath(name) for name in own if name.endswith(".py") and name != ENTRY_FILE]
+    found = {path.parts[0].removesuffix(".py") for path in paths if len(path.parts) <= 2}
+    return sorted(found - set(sys.stdlib_module_names))
 
 
 def write_zip(out: Path, files: dict[str, Any]) -> None:

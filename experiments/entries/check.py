@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from steerclear.env.config import GameConfig
 from steerclear.policies.report import PolicyReport
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
@@ -21,19 +22,25 @@ OPPONENT = "hold"
 
 
 def headline(found: dict[str, Any]) -> str:
-    """Whether an entry plays, and which boats failed how often; what `check_entry` found in one sentence."""
-    failed = [f"{boat} failed in {count} of {found['steps']} steps" for boat, count in found["failed_steps"].items()]
-    but = f", but {', '.join(failed)}" if failed else ""
-    return f"{found['entry']} loads in {found['load_s']:.1f} s and plays{but}"
+    """Whether an entry plays, which boats failed how often and whether it is in time; in one sentence."""
+    but = [f"{boat} failed in {count} of {found['steps']} steps" for boat, count in found["failed_steps"].items()]
+    if always_late(found):
+        but.append(f"all {found['decisions']} decisions took longer than the game gives")
+    return f"{found['entry']} loads in {found['load_s']:.1f} s and plays{', but ' if but else ''}{', '.join(but)}"
 
 
-def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> dict[str, Any]:
+def always_late(found: dict[str, Any]) -> bool:
+    """Whether no decision that `check_entry` saw was made in time."""
+    return 0 < found["decisions"] == found["late_decisions"]
+
+
+def check_entry(path: str, preset: str, max_time_s: float | None, answer_s: float) -> dict[str, Any]:
     """Load an entry in a process of its own and let it play against boats that hold.
 
     Args:
         path: a folder or zip with solution.py.
         preset: rules of the game.
-        max_time_s: length of the game, s.
+        max_time_s: length of the game, s; None: a whole one.
         answer_s: time it has for the actions of a decision, s.
 
     Returns:
@@ -47,7 +54,8 @@ def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> d
     started = time.perf_counter()
     EntryTeam(path, answer_s).close()
     load_s = time.perf_counter() - started
-    rules = {"max_time_s": max_time_s}
+    whole = GameConfig.preset(preset)
+    rules = {"max_time_s": whole.max_time_s if max_time_s is None else max_time_s}
     match = Match(MatchSpec(preset, path, OPPONENT, rules=rules, judge="none", answer_s=answer_s))
     try:
         row = match.play().row
@@ -76,6 +84,7 @@ def check_entry(path: str, preset: str, max_time_s: float, answer_s: float) -> d
         ],
         "held": report.held,
         "steps": report.steps,
+        "game_steps": round(whole.max_time_s / whole.decision_s),
         "failed_steps": report.failed_by_boat(),
         "game": {
             name: row[name] for name in ("captures", "grabs", "tags", "collisions", "duration_s", "first_failure")
