@@ -10,6 +10,7 @@ from pathlib import Path
 from steerclear.shield.exceptions import PolicyError
 
 from .entrants.listing import entrants
+from .own import file_of, own_code
 from .registry import SB3_PREFIX, WEIGHTS_PREFIX, names
 
 RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"
@@ -22,7 +23,7 @@ def fingerprint(name_or_path: str | Path) -> str:
     Hidden files and folders, ``__pycache__``, folders of results and virtual environments do not count.
 
     Args:
-        name_or_path: as for `make`; of a ``solution.py`` all the folder it lies in counts.
+        name_or_path: as for `make`; of a ``solution.py`` all the folder it lies in counts, of your own file it alone.
 
     Returns:
         16 hexadecimal digits; empty for our named policies and where there is no file.
@@ -31,12 +32,17 @@ def fingerprint(name_or_path: str | Path) -> str:
         PolicyError: a file cannot be read.
     """
     text = str(name_or_path)
+    own = own_code(text)
     path = Path(text.removeprefix(SB3_PREFIX).removeprefix(WEIGHTS_PREFIX)).expanduser()
+    if own is not None:
+        path = file_of(own[0]) or path
     if text in entrants():
         return entrants()[text].files()
     if text in names() or not path.exists():
         return ""
-    alone = text.startswith((SB3_PREFIX, WEIGHTS_PREFIX)) or (path.is_file() and path.suffix != ".py")
+    alone = (
+        own is not None or text.startswith((SB3_PREFIX, WEIGHTS_PREFIX)) or (path.is_file() and path.suffix != ".py")
+    )
     folder = path if path.is_dir() else path.parent
     try:
         return _digest(folder, [path] if alone else sorted(_files(folder, set())))
@@ -63,7 +69,6 @@ def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
 def _digest(folder: Path, files: list[Path]) -> str:
     digest = hashlib.sha256()
     for path in files:
-        with path.open("rb") as file:
-            content = hashlib.file_digest(file, "sha256").hexdigest()
+        content = hashlib.sha256(path.read_bytes()).hexdigest()
         digest.update(f"{path.relative_to(folder).as_posix()} {content}\n".encode())
     return digest.hexdigest()[:16]

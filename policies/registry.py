@@ -13,6 +13,7 @@ from steerclear.shield.exceptions import PolicyError
 
 from .entrants.listing import entrants
 from .keyboard import KeyboardTeam, Keys
+from .own import check_own, load_own, own_code
 from .protocol import BatchPolicy, TeamPolicy
 from .scripted.batch import ScriptedBatch
 from .scripted.layout import Behaviour
@@ -133,8 +134,8 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
     """A team policy by name or from a file.
 
     Args:
-        name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; ``sb3:PATH.zip``; or
-            ``weights:PATH.npz``.
+        name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; ``sb3:PATH.zip``;
+            ``weights:PATH.npz``; or your own ``FILE.py``, ``FILE.py:NAME`` or ``MODULE:NAME``, see `own`.
         game: number of the game in its series: which of its teams the hidden opponent fields; without it the seed
             decides. No other policy looks at it.
         **options: the policy's own options, see `describe`.
@@ -159,6 +160,8 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
         from .sb3 import load_sb3
 
         return _call(load_sb3, text, options, text.removeprefix(SB3_PREFIX))
+    if (own := own_code(text)) is not None:
+        return _call(load_own, text, options, *own)
     if looks_like_path(text):
         from .submissions import load_submission
 
@@ -175,6 +178,8 @@ def check(name_or_path: str | Path) -> None:
     text = str(name_or_path)
     if text in names():
         return
+    if (own := own_code(text)) is not None:
+        return check_own(*own)
     path = Path(text.removeprefix(SB3_PREFIX).removeprefix(WEIGHTS_PREFIX)).expanduser()
     if not text or not (text.startswith((SB3_PREFIX, WEIGHTS_PREFIX)) or looks_like_path(text)):
         raise unknown_policy(text)
@@ -225,14 +230,16 @@ def _batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | No
 
 def looks_like_path(text: str) -> bool:
     """Whether a policy's name is meant as a path: it exists, has a separator, or ends like a submission's file."""
-    return bool(text) and ("/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists())
+    path = "/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists()
+    return bool(text) and own_code(text) is None and path
 
 
 def unknown_policy(name: str) -> PolicyError:
     """The error for a name nobody knows."""
     near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(near)}? " if near else ""
-    known = f"known: {', '.join(names())}; or give a submission's folder or zip, sb3:PATH.zip or weights:PATH.npz"
+    files = "a submission's folder or zip, sb3:PATH.zip, weights:PATH.npz, your own FILE.py or MODULE:NAME"
+    known = f"known: {', '.join(names())}; or give {files}"
     return PolicyError(f"unknown policy {name!r}; {hint}{known}")
 
 

@@ -1,0 +1,99 @@
+"""A policy of your own by the name of its file or module: ``mypol.py``, ``mypol.py:act``, ``mypol:act``.
+
+It is your own code, and runs in this process; what others hand in is a submission.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.words import describe_error
+
+from .adapters import from_agents, from_callable
+from .protocol import TeamPolicy
+from .submissions.stage import ENTRY_FILE
+
+DEFAULT = "act"
+"""What is taken of a file where nobody says."""
+FORMS = (
+    f"a function {DEFAULT}(observation) -> action, a class with reset and act, or one with compute_action(obs, info)"
+)
+
+
+def own_code(text: str) -> tuple[str, str] | None:
+    """File or module, and the name in it, that a policy's name stands for; None: it is no such name."""
+    where, colon, name = text.rpartition(":")
+    if colon and name.isidentifier() and (where.endswith(".py") or all(map(str.isidentifier, where.split(".")))):
+        return (where, name) if where not in ("sb3", "weights") else None
+    return (text, DEFAULT) if text.endswith(".py") and Path(text).name != ENTRY_FILE else None
+
+
+def file_of(where: str) -> Path | None:
+    """The file that holds it; None: an installed module."""
+    path = Path(where).expanduser() if where.endswith(".py") else Path(*where.split(".")).with_suffix(".py")
+    return path.absolute() if where.endswith(".py") or path.is_file() else None
+
+
+def check_own(where: str, name: str) -> None:
+    """Look whether there is such a file or module, without running it.
+
+    Raises:
+        PolicyError: there is none.
+    """
+    path = file_of(where)
+    try:
+        there = path.is_file() if path is not None else importlib.util.find_spec(where) is not None
+    except (ImportError, ValueError):
+        there = False
+    if not there:
+        raise PolicyError(f"there is no policy {where}:{name}: no file {path or where + '.py'}; give FILE.py:NAME")
+
+
+def load_own(where: str, name: str) -> TeamPolicy:
+    """The team policy of that name in a file or module.
+
+    Raises:
+        PolicyError: there is none, or it cannot be built.
+    """
+    try:
+        found = getattr(_module(where), name, None)
+        if found is None:
+            raise PolicyError(f"{where} has no {name!r}; define there {FORMS}, or give {where}:NAME")
+        if isinstance(found, type) and not hasattr(found, "compute_action"):
+            found = found()
+    except PolicyError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise PolicyError(f"policy {where}:{name} cannot be built: {describe_error(error)}") from error
+    if hasattr(found, "reset") and hasattr(found, "act"):
+        if not hasattr(found, "name"):
+            found.name = f"{Path(where).stem}:{name}"
+        return found  # type: ignore[no-any-return]  # told by what it has
+    if hasattr(found, "compute_action") and isinstance(found, type):
+        return from_agents(found, Path(where).stem)
+    if callable(found):
+        return from_callable(found, Path(where).stem)
+    raise PolicyError(f"{where}:{name} is a {type(found).__name__}; give {FORMS}")
+
+
+def _module(where: str) -> ModuleType:
+    """The module, run anew if it is a file, with what lies beside it importable."""
+    path = file_of(where)
+    if path is None:
+        return importlib.import_module(where)
+    if not path.is_file():
+        raise PolicyError(f"there is no policy at {path}; give a Python file with {FORMS}")
+    if str(path.parent) not in sys.path:
+        sys.path.insert(0, str(path.parent))
+    spec = importlib.util.spec_from_file_location(f"steerclear_own_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise PolicyError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
