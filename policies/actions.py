@@ -9,7 +9,7 @@ from steerclear.shield.actions import short
 from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError, PolicyError
 
-from .scripted.team import game_core
+from .games import SeenGame, seen_game
 
 HOLD = (0.0, 0.0)
 """Action of a boat that gave no usable answer: speed 0, heading as it is."""
@@ -20,19 +20,19 @@ MAX_HEADING_DEG = 360.0
 
 
 class ActionReader:
-    """Reads actions for the boats of one env.
+    """Reads actions for the boats of one game.
 
     Args:
-        env: the `MctfEnv` (or a wrapper round one).
+        env: an `MctfEnv`, a Pyquaticus env, a wrapper round one, or the `SeenGame` of one.
 
     Raises:
         PolicyError: ``env`` is no such env.
     """
 
     def __init__(self, env: Any) -> None:
-        self._core = game_core(env)
-        self._game = getattr(env, "unwrapped", env)
-        self._numbers = {agent_id: i for i, agent_id in enumerate(self._core.config.agent_ids)}
+        self._game = env if isinstance(env, SeenGame) else seen_game(env)
+        self._top_mps = self._game.top_speed_mps
+        self._numbers = {agent_id: i for i, agent_id in enumerate(self._game.agent_ids)}
 
     def command(self, agent_id: str, action: Any) -> tuple[float, float]:
         """Speed m/s and relative heading deg an action asks for, from where the boat is now.
@@ -64,10 +64,10 @@ class ActionReader:
         return self._too_large(agent_id, row)
 
     def _decode(self, agent_id: str, action: Any) -> np.ndarray:
-        return self._game.decode({agent_id: action})[self._numbers[agent_id]]
+        return self._game.commands({agent_id: action})[self._numbers[agent_id]]
 
     def _too_large(self, agent_id: str, row: np.ndarray) -> tuple[str, str] | None:
-        limit_mps = MAX_SPEED_FACTOR * float(self._core.max_speed_mps[self._numbers[agent_id]])
+        limit_mps = MAX_SPEED_FACTOR * self._top_mps[agent_id]
         if abs(row[0]) > limit_mps:
             return "too large", f"speed {row[0]:g} m/s is beyond {limit_mps:g} m/s"
         if abs(row[1]) > MAX_HEADING_DEG:
@@ -79,12 +79,12 @@ def to_command(env: Any, agent_id: str, action: Any) -> tuple[float, float]:
     """One action as (speed m/s, relative heading deg); see `ActionReader.command`, which is quicker for many.
 
     Raises:
-        PolicyError: ``env`` is no `MctfEnv`, the agent is unknown, or the action is unusable.
+        PolicyError: nobody reads ``env``, the agent is unknown, or the action is unusable.
     """
-    reader = ActionReader(env)
-    if agent_id not in game_core(env).config.agent_ids:
-        raise PolicyError(f"unknown agent {agent_id!r}; agents are {', '.join(game_core(env).config.agent_ids)}")
-    return reader.command(agent_id, action)
+    game = seen_game(env)
+    if agent_id not in game.agent_ids:
+        raise PolicyError(f"unknown agent {agent_id!r}; agents are {', '.join(game.agent_ids)}")
+    return ActionReader(game).command(agent_id, action)
 
 
 def _as_numbers(action: Any) -> np.ndarray | None:

@@ -14,9 +14,9 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.words import describe_error
 
 from .actions import HOLD, ActionReader
+from .games import seen_game
 from .protocol import Action
 from .report import PolicyReport, Reporter
-from .scripted.team import boat_numbers, game_core
 
 Answer = Callable[[str], Any]
 """``answer(agent_id) -> action``."""
@@ -38,15 +38,15 @@ class GameFacts:
 
 
 def game_facts(env: Any) -> GameFacts:
-    """The facts of an `MctfEnv`, or of a wrapper round one; facts are answered as they are.
+    """The facts of a game that somebody reads; facts are answered as they are.
 
     Raises:
-        PolicyError: it is neither.
+        PolicyError: nobody reads it.
     """
     if isinstance(env, GameFacts):
         return env
-    core = game_core(env)
-    return GameFacts(core.n_obs, dict(zip(core.config.agent_ids, core.max_speed_mps.tolist(), strict=True)))
+    game = seen_game(env)
+    return GameFacts(game.n_obs, game.top_speed_mps)
 
 
 class ForeignCode(ABC):
@@ -98,13 +98,13 @@ class GuardedTeam:
         """Begin a game.
 
         Raises:
-            PolicyError: not an `MctfEnv`, unusable agent ids, or the code cannot begin.
+            PolicyError: a game that nobody reads, unusable agent ids, or the code cannot begin.
         """
-        core = game_core(env)
-        boat_numbers(core, agent_ids)
+        game = seen_game(env)
+        game.check_team(agent_ids)
         self._ids = list(agent_ids)
-        self._reader = ActionReader(env)
-        self._reporter.begin(core.config.decision_s)
+        self._reader = ActionReader(game)
+        self._reporter.begin(game.decision_s)
         try:
             self.code.begin(env, self._ids, seed)
         except PolicyError:

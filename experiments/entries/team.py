@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from steerclear import policies
 from steerclear.policies.actions import HOLD, ActionReader
+from steerclear.policies.games import seen_game
 from steerclear.policies.guard import Fault, check_observed, game_facts
 from steerclear.policies.protocol import Action, TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
-from steerclear.policies.scripted.team import boat_numbers, game_core
 from steerclear.policies.submissions.made_for import check_game, made_for
 from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import PolicyError
@@ -63,17 +63,17 @@ class EntryTeam:
         """Begin a game.
 
         Raises:
-            PolicyError: not an `MctfEnv`, unusable agent ids, a game that the shield in it is not for, or the code
-                cannot begin.
+            PolicyError: a game that nobody reads, unusable agent ids, a game that the shield in it is not for, or the
+                code cannot begin.
         """
-        core = game_core(env)
+        game = seen_game(env)
         if self._made is not None:
-            check_game(self._made, core.config, self._path)
-        boat_numbers(core, agent_ids)
+            check_game(self._made, game, self._path)
+        game.check_team(agent_ids)
         self._ids = list(agent_ids)
-        self._reader = ActionReader(env)
+        self._reader = ActionReader(game)
         self._packer = Packer(not self._path.startswith(SB3_PREFIX))
-        self._reporter.begin(core.config.decision_s)
+        self._reporter.begin(game.decision_s)
         if not self._lost:
             self._first("begin", game_facts(env), self._ids, seed)
 

@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.words import describe_error, plain_text
 
+from ..games import SeenGame, seen_game
 from ..guard import Answer, ForeignCode, GameFacts, GuardedTeam
-from ..scripted.team import game_core
 from .history import CONFIG_FILE, History, ObservationSettings
 from .interface import METHOD_NAME, check_interface
 from .made_for import MadeFor, check_game, made_for, words_of_less
@@ -85,11 +84,11 @@ class SubmissionCode(ForeignCode):
             PolicyError: it cannot be built, or the shield in it is for another game.
         """
         if self._made is not None and not isinstance(env, GameFacts):  # a runner of this process checked it
-            self._check_game(self._made, game_core(env).config)
+            self._check_game(self._made, seen_game(env))
         self._instance = self._build(seed)
         self._history.clear()
 
-    def _check_game(self, made: MadeFor, game: GameConfig) -> None:
+    def _check_game(self, made: MadeFor, game: SeenGame) -> None:
         check_game(made, game, self.stage.source)
         words = words_of_less(made, game, self.stage.source)
         if words and words != self._told:

@@ -15,6 +15,8 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.words import plain_text
 
+from ..games import SeenGame
+
 ABOUT_FILE = "steerclear_entry.json"
 """Lies beside ``solution.py``."""
 MAX_BYTES = 1 << 20
@@ -82,7 +84,7 @@ def _content(source: Path) -> bytes:
     return b""
 
 
-def check_game(made: MadeFor, game: GameConfig, source: object) -> None:
+def check_game(made: MadeFor, game: GameConfig | SeenGame, source: object) -> None:
     """Refuse a game that the shield in an entry does not foresee: of another length of a decision, or other boats.
 
     Raises:
@@ -101,12 +103,12 @@ def check_game(made: MadeFor, game: GameConfig, source: object) -> None:
         )
 
 
-def platform_names(game: GameConfig) -> tuple[str, ...]:
+def platform_names(game: GameConfig | SeenGame) -> tuple[str, ...]:
     """Names of a game's boats, in order."""
     return tuple(get_platform(boat).name for boat in game.platforms)  # type: ignore[union-attr]  # a tuple once built
 
 
-def words_of_less(made: MadeFor, game: GameConfig, source: object) -> str:
+def words_of_less(made: MadeFor, game: GameConfig | SeenGame, source: object) -> str:
     """What to say of a shield in an entry that keeps less than the distance at which a game counts; else nothing."""
     counted_m = 2.0 * max(game.agent_radius_m)  # type: ignore[arg-type]  # a tuple once built
     if not made.shielded or made.separation_m >= counted_m - 1e-9:
