@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 import typer
+from rich.markup import escape
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import missing
 
@@ -33,7 +34,7 @@ def optional_command(app: typer.Typer, name: str) -> None:
 def _add_refusal(app: typer.Typer, name: str, lacking: ConfigError) -> None:
     anything = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
 
-    @app.command(name, context_settings=anything, help=f"Not installed: {lacking}")
+    @app.command(name, context_settings=anything, help=escape(f"Not installed: {lacking}"))
     @command
     def refuse(context: typer.Context) -> None:
         raise lacking

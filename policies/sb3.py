@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.extras import install_command
 
 from .guard import Answer, ForeignCode, GuardedTeam, game_facts
 from .submissions.stage import ENTRY_FILE, check_members
@@ -76,7 +77,7 @@ class Sb3Code(ForeignCode):
         try:
             library = importlib.import_module("stable_baselines3")
         except ImportError as error:
-            raise PolicyError("sb3 models need the extra: pip install 'steerclear[train]'") from error
+            raise PolicyError(f"sb3 models need the extra: {install_command('train')}") from error
         say_it_runs_code(self._path)
         try:
             self._model = getattr(library, name).load(self._path, device="cpu")

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
 from .exceptions import ConfigError
 
 EXTRA_OF = {
@@ -29,4 +36,25 @@ def missing(error: ModuleNotFoundError, what: str) -> ConfigError | None:
     module = (error.name or "").partition(".")[0]
     if module not in EXTRA_OF:
         return None
-    return ConfigError(f"{what} needs {module}; install the extra: pip install 'steerclear[{EXTRA_OF[module]}]'")
+    return ConfigError(f"{what} needs {module}; install the extra: {install_command(EXTRA_OF[module])}")
+
+
+def install_command(extra: str) -> str:
+    """The command that installs an extra: from the clone that this was installed from, or by name from an index."""
+    origin = _origin()
+    url = str(origin.get("url", ""))
+    if "vcs_info" in origin:
+        return f"pip install 'steerclear[{extra}] @ {origin['vcs_info'].get('vcs', 'git')}+{url}'"
+    folder = Path(url2pathname(urlsplit(url).path)) if url.startswith("file:") else None
+    if folder is None or not (folder / "pyproject.toml").is_file():
+        return f"pip install 'steerclear[{extra}]'"
+    editable = "-e " if (origin.get("dir_info") or {}).get("editable") else ""
+    return f"pip install {editable}'{folder}[{extra}]'"
+
+
+def _origin() -> dict[str, Any]:
+    """Where pip notes that it installed this from (PEP 610); empty: from an index, or nobody knows."""
+    try:
+        return dict(json.loads(distribution("steerclear").read_text("direct_url.json") or "{}"))
+    except (PackageNotFoundError, ValueError, TypeError):
+        return {}

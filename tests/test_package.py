@@ -1,9 +1,9 @@
 """The distribution: version, typed packages, a light base with extras, and what a source archive holds."""
 
+import json
 import re
 import subprocess
 import sys
-import tomllib
 from collections import Counter
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +13,9 @@ import pytest
 import steerclear
 from packaging.specifiers import SpecifierSet
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.extras import EXTRA_OF, missing
+from steerclear.shield.extras import EXTRA_OF, install_command, missing
+
+tomllib = pytest.importorskip("tomllib", reason="Python 3.11 and newer read TOML")
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -70,7 +72,35 @@ def test_the_extra_named_brings_the_module(module):
     assert DISTRIBUTIONS.get(module, module) in brought
     told = missing(ModuleNotFoundError(name=f"{module}.sub"), "this")
     assert isinstance(told, ConfigError)
-    assert f"pip install 'steerclear[{EXTRA_OF[module]}]'" in str(told)
+    assert install_command(EXTRA_OF[module]) in str(told)
+
+
+@pytest.mark.parametrize(
+    ("told", "command"),
+    [
+        ({"url": ROOT.as_uri(), "dir_info": {}}, f"pip install '{ROOT}[boats]'"),
+        ({"url": ROOT.as_uri(), "dir_info": {"editable": True}}, f"pip install -e '{ROOT}[boats]'"),
+        ({"url": "file:///gone", "dir_info": {}}, "pip install 'steerclear[boats]'"),
+        (
+            {"url": "https://host/s.git", "vcs_info": {"vcs": "git"}},
+            "pip install 'steerclear[boats] @ git+https://host/s.git'",
+        ),
+        (None, "pip install 'steerclear[boats]'"),
+    ],
+)
+def test_an_extra_is_installed_from_where_the_package_came_from(told, command, monkeypatch):
+    class Installed:
+        def read_text(self, name):
+            return None if told is None else json.dumps(told)
+
+    monkeypatch.setattr("steerclear.shield.extras.distribution", lambda name: Installed())
+    assert install_command("boats") == command
+
+
+def test_help_without_extras_names_them_in_brackets():
+    done = bare("--help")
+    assert done.returncode == 0, done.stderr
+    assert "[boats]" in done.stdout
 
 
 def test_other_modules_are_of_no_extra():
@@ -84,7 +114,7 @@ def test_other_modules_are_of_no_extra():
 def test_without_its_extra_a_command_is_one_line_that_names_it(arguments, extra):
     done = bare(*arguments)
     assert done.returncode == 2, done.stderr
-    assert f"pip install 'steerclear[{extra}]'" in done.stderr
+    assert install_command(extra) in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 
 

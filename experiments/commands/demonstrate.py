@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, Demonstrator
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import install_command
 
 from ..play.match import Match
 from ..play.spec import MatchSpec
@@ -105,4 +106,4 @@ def _check(opponent: str, file: Path) -> None:
         raise ConfigError(f"--opponent is {opponent!r}; demonstrations are against {' or '.join(OPPONENTS)}")
     check_ending(file, "--out", (".parquet",))
     if find_spec("pyarrow") is None:
-        raise ConfigError('Parquet files need pyarrow; pip install "steerclear[parquet]"')
+        raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}")

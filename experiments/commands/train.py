@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import install_command
 
 from ..runs.folder_lock import lock_folder
 from ..training.config_file import read_config
@@ -23,7 +24,7 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last chec
 CONFIG = "config.yaml"
 WRITTEN = ("curve.json", "best.npz", "final.npz", "model.zip")
 """What a training writes into its folder beside checkpoints and its config."""
-EXTRA = 'training needs torch and stable-baselines3; pip install "steerclear[train]"'
+EXTRA = f"training needs torch and stable-baselines3; {install_command('train')}"
 
 
 @command

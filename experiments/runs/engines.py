@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import Any, TypeVar
 
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import install_command
 
 from .pool import DIED, Outcome, attempt, check_jobs
 from .provenance import code_digest
@@ -84,7 +85,7 @@ def engine_of(name: str, address: str | None, jobs: int | None) -> Workers:
 
 def _ray() -> Any:
     if find_spec("ray") is None:
-        raise ConfigError('Ray is not installed; pip install "steerclear[cluster]", or leave out --engine ray')
+        raise ConfigError(f"Ray is not installed; {install_command('cluster')}, or leave out --engine ray")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # else it warns about a default to come
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     import ray  # the extra [cluster]

@@ -15,6 +15,7 @@ from steerclear.policies import make
 from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, write_chooser
 from steerclear.policies.entrants.learned.teacher import Teacher
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import install_command
 
 from .checks import check_options
 from .curve import write_curve
@@ -107,7 +108,7 @@ def _read(path: Path) -> list[dict[str, Any]]:
     try:
         import pyarrow.parquet as parquet
     except ModuleNotFoundError as error:
-        raise ConfigError('Parquet files need pyarrow; pip install "steerclear[parquet]"') from error
+        raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}") from error
     try:
         return parquet.read_table(path).to_pylist()
     except (OSError, ValueError) as error:

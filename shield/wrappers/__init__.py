@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..extras import install_command
 from .games_shield import games_shield
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
@@ -35,5 +36,5 @@ def __getattr__(name: str) -> Any:
     try:
         from .vector_sb3 import MctfVecEnv
     except ModuleNotFoundError as error:
-        raise ImportError(f"MctfVecEnv needs {error.name}; install the extra: pip install '.[train]'") from error
+        raise ImportError(f"MctfVecEnv needs {error.name}; install the extra: {install_command('train')}") from error
     return MctfVecEnv

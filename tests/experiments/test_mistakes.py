@@ -10,6 +10,7 @@ from steerclear.experiments import cli
 from steerclear.experiments.commands import train
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.policies.entrants import learned
+from steerclear.shield.extras import install_command
 from typer.testing import CliRunner
 
 MISTAKES = [
@@ -291,7 +292,7 @@ def test_who_learns_without_the_extra_is_told_which_it_is(line, workplace, monke
     monkeypatch.setattr(train, "find_spec", lambda name: None)
     done = CliRunner().invoke(cli.app, shlex.split(line))
     assert done.exit_code == ExitCode.BAD_INPUT, done.output
-    assert 'pip install "steerclear[train]"' in done.stderr
+    assert install_command("train") in done.stderr
     assert not Path("t").exists()
 
 

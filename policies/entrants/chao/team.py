@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.extras import install_command
 
 from ..catalogue import entrant
 from ..plane import STOP_MPS, Order, dock, heading_to
@@ -46,7 +47,7 @@ class Chao(EntrantTeam):
         if planner not in PLANNERS:
             raise PolicyError(f"planner is {planner!r}; choose from {', '.join(PLANNERS)}")
         if planner == "pddl" and not available():
-            raise PolicyError('the PDDL+ planner is not installed; pip install "steerclear[plan]", or planner="astar"')
+            raise PolicyError(f'the PDDL+ planner is not installed; {install_command("plan")}, or planner="astar"')
         if contact_m is not None and not 0.0 <= contact_m < math.inf:
             raise PolicyError(f"contact_m is {contact_m!r}; give a distance in m, 0 or more")
         self.planner = ("pddl" if available() else "astar") if planner == "auto" else planner

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.extras import install_command
 
 from ...sb3 import UNREADABLE, algorithm_of, saved_settings
 from .network import Features, Network
@@ -100,7 +101,7 @@ def _tensors(file: Path) -> dict[str, Any]:
     try:
         import torch
     except ImportError as error:
-        raise PolicyError("sb3 models need the extra: pip install 'steerclear[train]'") from error
+        raise PolicyError(f"sb3 models need the extra: {install_command('train')}") from error
     import pickle
 
     with zipfile.ZipFile(file) as archive:
