@@ -1,5 +1,6 @@
 """The distribution: version, typed packages, a light base with extras, and what a source archive holds."""
 
+import ast
 import json
 import re
 import subprocess
@@ -122,6 +123,42 @@ def test_the_base_runs_commands_that_need_no_extra():
     done = bare("platform", "show")
     assert done.returncode == 0, done.stderr
     assert "heron" in done.stdout
+
+
+LATER = {
+    "typing": {"Self", "assert_never", "assert_type", "LiteralString", "Never", "NotRequired", "Required", "Unpack"},
+    "enum": {"StrEnum", "verify"},
+    "datetime": {"UTC"},
+    "contextlib": {"chdir"},
+    "math": {"cbrt", "exp2", "sumprod"},
+    "hashlib": {"file_digest"},
+    "asyncio": {"timeout", "TaskGroup", "Runner"},
+    "itertools": {"batched"},
+    "tomllib": {"loads", "load"},
+}
+"""Names that Python 3.10 lacks; `steerclear.shield.compat` has those that are used."""
+
+
+def later_names(source):
+    """What a source takes of `LATER`, by import or as an attribute of a module."""
+    tree, found = ast.parse(source), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{one.name}" for one in node.names if one.name in LATER.get(node.module, ())}
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            found |= {f"{node.value.id}.{node.attr}"} if node.attr in LATER.get(node.value.id, ()) else set()
+    return found
+
+
+def test_nothing_is_of_a_python_later_than_the_oldest_asked_for():
+    assert PROJECT["project"]["requires-python"] == ">=3.10"
+    assert later_names("from typing import Self\nimport hashlib\nhashlib.file_digest(f, 'x')") == {
+        "typing.Self", "hashlib.file_digest",
+    }  # fmt: skip
+    for folder in ("shield", "env", "policies", "experiments"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if path.name != "compat.py":
+                assert later_names(path.read_text(encoding="utf-8")) == set(), path
 
 
 def test_numba_is_one_that_was_tested():
