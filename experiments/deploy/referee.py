@@ -1,3 +1,112 @@
 """`Referee`: watches boats, keeps the game by the env's rules, and tells everybody how it stands."""
 
 from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from types import TracebackType
+
+from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.feed import FeedSender, GameState
+from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.links import key_of
+from steerclear.shield.compat import Self
+from steerclear.shield.exceptions import FleetFileError
+
+from .hearing import Hearing
+from .rules import Umpire, game_config, player_names
+
+logger = logging.getLogger(__name__)
+
+RATE_HZ = 10.0
+LINGER_S = 3.0
+"""How long the end of a game is told, s."""
+
+Told = Callable[[GameState, Sequence[str]], None]
+"""Called each time with the state of the game and what happened, a line each."""
+
+
+class Referee:
+    """Hears positions, applies the rules, publishes the state of the game. A context manager.
+
+    Args:
+        fleet: the file.
+        clock: of all times.
+        listen: HOST:PORT to hear positions at; None: the file's feed.referee.
+        publish: HOST:PORT of further listeners, besides the file's runners.
+        links: whether boats that have a link are heard there too.
+
+    Raises:
+        FleetFileError: the file has no game, or does not say where to hear positions or whom to tell.
+        BridgeError: an address cannot be heard at, or a boat does not answer.
+        ConfigError: an address is none, or the signing key cannot be read or others can read it.
+    """
+
+    def __init__(
+        self,
+        fleet: FleetFile,
+        clock: Clock,
+        listen: str | None = None,
+        publish: Sequence[str] = (),
+        links: bool = False,
+    ) -> None:
+        self.umpire = Umpire(game_config(fleet), player_names(fleet), fleet.limits.contact.lost_after_s)
+        to = tuple(dict.fromkeys((*fleet.feed_listeners(), *publish)))
+        if not to:
+            raise FleetFileError('nobody is told how the game stands; add feed.listen: "HOST:PORT", or give --publish')
+        self.clock = clock
+        self.hearing = Hearing(fleet, clock, listen, links)
+        try:
+            self._sender = FeedSender("referee", to, key_of(fleet))
+        except BaseException:
+            self.hearing.close()
+            raise
+
+    def turn(self) -> GameState:
+        """Look once and tell everybody."""
+        state = self.umpire.watch(self.hearing.contacts(), self.clock.now_s())
+        self._sender.send_game(state)
+        return state
+
+    def run(
+        self, told: Told, stopped: Callable[[], bool], rate_hz: float = RATE_HZ, limit_s: float | None = None
+    ) -> str:
+        """Keep the game until it is over, stopped, or the time is up.
+
+        Args:
+            told: called after each look.
+            stopped: asked before each look.
+            rate_hz: looks a second.
+            limit_s: longest time from now, s; None: no limit.
+
+        Returns:
+            Why it ended: "over", "stopped" or "time".
+        """
+        begun_s = due_s = self.clock.now_s()
+        over_s: float | None = None
+        while not stopped():
+            state = self.turn()
+            told(state, self.umpire.events)
+            now_s = self.clock.now_s()
+            if state.over:
+                over_s = now_s if over_s is None else over_s
+                if now_s - over_s >= LINGER_S:
+                    return "over"
+            elif limit_s is not None and now_s - begun_s >= limit_s:
+                return "time"
+            due_s = max(due_s + 1.0 / rate_hz, now_s)  # what was missed is not made up for
+            self.clock.sleep_until(due_s)
+        return "stopped"
+
+    def close(self) -> None:
+        """Give the sockets back; may be called again."""
+        self.hearing.close()
+        self._sender.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
