@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import steerclear.shield
+from steerclear.experiments.entries.package import LEFT_OUT, ONBOARD, STAND_INS
 
 ROOT = Path(steerclear.shield.__file__).parent.parent
 FOLDERS = ("shield", "env", "policies", "experiments")
@@ -70,3 +71,31 @@ def test_the_shield_imports_nothing_of_the_rest(name):
 @pytest.mark.parametrize("name", [name for name in FILES if name.startswith("steerclear.env")])
 def test_the_game_imports_nothing_of_policies_and_experiments(name):
     assert not [other for other in GRAPH[name] if other.startswith(("steerclear.policies", "steerclear.experiments"))]
+
+
+def imported_names(module):
+    """What the other modules that a zip packs import of a module of the shield."""
+    found = set()
+    for name, path in FILES.items():
+        if not name.startswith("steerclear.shield.") or name.split(".")[2] in LEFT_OUT:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                base = name.split(".")
+                base = base[: len(base) - node.level + (path.name == "__init__.py")]
+                if ".".join([*base, *([node.module] if node.module else [])]) == module:
+                    found |= {alias.name for alias in node.names}
+    return found
+
+
+@pytest.mark.parametrize(("place", "stand_in"), STAND_INS.items())
+def test_a_stand_in_has_what_others_import_of_what_it_stands_for(place, stand_in):
+    """In shielded zips, see `steerclear.experiments.entries.package`."""
+    assert (ROOT / "shield" / place).is_file()
+    tree = ast.parse((ONBOARD / "stand_ins" / stand_in).read_text(encoding="utf-8"))
+    known = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    for node in [*tree.body, *(inner for one in tree.body if isinstance(one, ast.With) for inner in one.body)]:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        known |= {one.id for one in targets if isinstance(one, ast.Name)}
+    module = "steerclear.shield." + place.removesuffix(".py").replace("/", ".")
+    assert imported_names(module) <= known
