@@ -221,10 +221,34 @@ class Decisions(Sequence[Decision]):
             return ()
         return tuple(self.fleet.names[j] for j in np.flatnonzero(self.no_table[i]))
 
+    def __str__(self) -> str:
+        """One line a boat: what was wanted, what is sent, and why."""
+        heads = ("boat", "wanted deg", "m/s", "sent deg", "m/s", "reason", "binding", "margin m")
+        rows = [heads, *(_cells(one) for one in self)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        left = (0, 5, 6)  # words; numbers stand to the right
+        lines = [
+            "  ".join(f"{cell:{'<' if k in left else '>'}{widths[k]}}" for k, cell in enumerate(row)) for row in rows
+        ]
+        return "\n".join(line.rstrip() for line in lines)
+
     @property
     def count_intervened(self) -> int:
         """Number of boats whose command was changed."""
         return int(np.count_nonzero(self.intervened))
+
+
+def _cells(one: Decision) -> tuple[str, ...]:
+    """A decision as cells of a table."""
+    wanted, sent = (
+        (f"{math.degrees(heading) % 360.0:.1f}", f"{speed:.2f}")
+        for heading, speed in (
+            (one.wanted_heading_rad, one.wanted_speed_mps),
+            (one.sent_heading_rad, one.sent_speed_mps),
+        )
+    )
+    margin = "-" if math.isinf(one.certificate_m) else f"{one.certificate_m:.2f}"
+    return (one.boat, *wanted, *sent, one.reason.name, ", ".join(one.binding) or "-", margin)
 
 
 def _place(index: Any) -> int:

@@ -94,9 +94,14 @@ class Fleet:
             value = getattr(self, name)
             if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
                 raise FleetError(f"{name} holds masked values; fill them in, or leave those boats out")
-            if isinstance(value, np.ndarray):
+            if isinstance(value, (list, tuple)):
+                brought = _FROM_LISTS.get(name, brought)
+            if isinstance(value, (np.ndarray, list, tuple)):
                 with suppress(NoNumbersError):
                     object.__setattr__(self, name, brought(value))
+        for name in ("platforms", "names"):
+            if isinstance(getattr(self, name), (list, np.ndarray)):
+                object.__setattr__(self, name, tuple(getattr(self, name)))
 
     @classmethod
     def of(
@@ -308,6 +313,7 @@ _FORMS: dict[str, Callable[[Any], Any]] = {
     "adversary_s": numbers,
     "visiting": _laid_out,
 }
+_FROM_LISTS: dict[str, Callable[[Any], Any]] = {"state": numbers, "controlled": truths, "visiting": truths}
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...], bools: bool = False) -> Array:

@@ -246,6 +246,8 @@ def wrap_policy(policy: Any, shield: Shield, read: Callable[[Any], Fleet] | None
             "a plain function needs read=, which turns what it sees into a Fleet; or build a team "
             "policy with steerclear.policies.from_callable"
         )
+    if isinstance(policy, str):
+        raise ConfigError(f"cannot wrap the name {policy!r}; give the policy: wrap(policies.make({policy!r}))")
     raise ConfigError(
         f"cannot wrap {type(policy).__name__}; build a team policy with steerclear.policies.make(name, path or "
         "'sb3:model.zip'), from_agents or from_callable first"

@@ -43,8 +43,9 @@ def reader_of(env: Any) -> GameReader:
         if fits(base):
             return build(base)
     raise ConfigError(
-        f"cannot read a game from {type(base).__name__}; give an MctfEnv, a Pyquaticus env, or use Shield.decide "
-        "with a Fleet of your own"
+        f"cannot read a game from {type(base).__name__}; give an MctfEnv or a Pyquaticus env, or register a GameReader "
+        "for yours (steerclear.shield.wrappers.game_reader), or wrap a function: Shield(...).wrap(f, read=...), where "
+        "read turns what f sees into a Fleet"
     )
 
 

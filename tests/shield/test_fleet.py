@@ -108,10 +108,10 @@ def test_an_unknown_platform_is_told_the_known_ones(names):
         ({"state": np.full((2, L.N_STATE), np.nan)}, "position of boat 'boat_0'"),
         ({"controlled": np.ones(1, bool)}, "controlled has 1 entries"),
         ({"controlled": np.ones(2)}, "controlled is of float64"),
-        ({"controlled": [True, False]}, "controlled is of list; give an array of True or False"),
-        ({"team": [0, 1]}, "team is of list; give an array, or build the fleet by Fleet.of"),
-        ({"age_s": [0.0, 0.0]}, "age_s is of list; give an array"),
-        ({"position_error_m": [0.0, 0.0]}, "position_error_m is of list; give an array"),
+        ({"controlled": [True, None]}, "controlled is of list; give an array of True or False"),
+        ({"team": [0, 0.5]}, "team is of list; give an array, or build the fleet by Fleet.of"),
+        ({"age_s": [0.0, "new"]}, "age_s is of list; give an array"),
+        ({"position_error_m": [0.0, True]}, "position_error_m is of list; give an array"),
         ({"team": np.zeros(3, np.int64)}, "team has 3 entries"),
         ({"names": ("a",)}, "names has 1 entries"),
         ({"platforms": ("heron",)}, "platforms has 1 entries"),
@@ -162,6 +162,43 @@ def test_teams_and_who_is_controlled_may_be_told_by_true_and_false():
 def test_one_command_per_boat_is_wanted(n):
     with pytest.raises(FleetError, match=r"commands of shape .* for 2 boats; give one row per boat"):
         Shield().decide(fleet(), relative(*[(2.0, 0.0)] * n))
+
+
+def test_rows_may_be_given_as_lists():
+    """They decide as arrays do; what is no rows is refused in words."""
+    made = fleet()
+    names = ("state", "team", "controlled")
+    lists = {name: getattr(made, name).tolist() for name in names} | {"names": list(made.names)}
+    given_lists = Fleet(**lists, platforms=list(made.platforms))
+    given_lists.check()
+    for name in names:
+        np.testing.assert_array_equal(getattr(given_lists, name), getattr(made, name))
+    decided, again = (Shield().decide(one, AHEAD) for one in (made, given_lists))
+    assert decided.sent.values.tobytes() == again.sent.values.tobytes()
+    for name, wrong in (("state", [[0.0, "east"]]), ("team", [0, "red"]), ("controlled", ["yes", "no"])):
+        with pytest.raises(FleetError, match=name):
+            Shield().decide(Fleet(**{**lists, name: wrong}, platforms=made.platforms), AHEAD)
+
+
+def test_decisions_print_as_a_table():
+    lines = str(Shield().decide(fleet(), AHEAD)).splitlines()
+    assert lines[0].split() == [
+        "boat",
+        "wanted",
+        "deg",
+        "m/s",
+        "sent",
+        "deg",
+        "m/s",
+        "reason",
+        "binding",
+        "margin",
+        "m",
+    ]
+    assert lines[1].startswith("boat_0 ")
+    assert "NOT_COVERED" in lines[2]
+    assert {len(line) <= 120 for line in lines} == {True}
+    assert len(lines) == 3
 
 
 def test_an_empty_fleet_gets_an_empty_answer():

@@ -219,15 +219,53 @@ def test_a_disk_that_falls_behind_is_told(tmp_path, ticks, caplog):
     writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
     assert writer.behind_s == 0.0
     found[0].free.clear()
-    writer.take(ticks[0])
-    until(lambda: writer.behind_s > 1.1)
+    taken = 0
+    while writer.behind_s <= 1.1:
+        writer.take(numbered(ticks, taken))
+        taken += 1
+        time.sleep(0.05)
     found[0].free.set()
     until(lambda: writer.behind_s == 0.0)
     writer.close()
     told = [record.getMessage() for record in caplog.records]
     assert len(told) == 1
     assert "s behind: the disk is slow" in told[0]
-    assert kept(tmp_path / "run.mcap") == ([0], True)
+    assert kept(tmp_path / "run.mcap") == (list(range(taken)), True)
+
+
+SUSPENDED = """
+import logging, sys, threading, time
+from pathlib import Path
+from steerclear.shield.bridge.blackbox.spool import Spool
+logging.basicConfig()
+
+class Slow:
+    def keep(self, item): pass
+    def flush(self): time.sleep(0.2)  # so that the process is suspended while something is on its way
+    def finish(self): pass
+    abandon = finish
+
+spool = Spool("run", Slow(), flush_s=0.02, give_up_s=1.5)
+print("begun", flush=True)
+for number in range(60):
+    spool.put(number)
+    time.sleep(0.05)
+spool.close()
+print(spool.fault or "well", flush=True)
+"""
+
+
+def test_a_suspended_runner_is_not_told_as_a_slow_disk():
+    process = subprocess.Popen(
+        [sys.executable, "-c", SUSPENDED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(2.5)
+    process.send_signal(signal.SIGCONT)
+    out, told = process.communicate(timeout=60)
+    assert (out, told) == ("well\n", "")
 
 
 def test_closing_does_not_wait_for_ever(tmp_path, ticks):
