@@ -102,7 +102,7 @@ def test_misuse_is_refused():
         team.reset(env, [], 0)
     with pytest.raises(ConfigError, match="a plain function needs read="):
         Shield().wrap(lambda seen: None)
-    with pytest.raises(ConfigError, match="cannot wrap str"):
+    with pytest.raises(ConfigError, match="cannot wrap the name 'medium'; give the policy: wrap"):
         Shield().wrap("medium")
     with pytest.raises(ConfigError, match="read is 5; give a function"):
         Shield().wrap(lambda seen: None, read=5)
