@@ -6,6 +6,7 @@ import ipaddress
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from ..config import ShieldConfig
@@ -77,6 +78,7 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
         same = given == value or (isinstance(given, float) and isinstance(value, float) and math.isclose(given, value))
         if not same:
             raise FleetFileError(f"shield.{key} is {given!r} and {source} says {value!r}; leave shield.{key} out")
+    _hard_line(fleet, settings)
     oldest = max(fleet.limits.contact.lost_after_s, fleet.limits.navigation.lost_after_s)
     settings.setdefault("max_track_age_s", oldest + dt_s)
     if settings.get("adversary_s") is None:  # a real hull is at stake, and nobody knows who is out there
@@ -94,6 +96,18 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
             "(limits.*.lost_after_s); leave shield.max_track_age_s out"
         )
     return config
+
+
+def _hard_line(fleet: FleetSettings, settings: dict[str, Any]) -> None:
+    """The hard line as the geofence has it, where the shield's own settings do not say otherwise."""
+    for key, name in (("beyond_m", "beyond_m"), ("beyond_then", "then")):
+        said = getattr(fleet.geofence, name)
+        if name in fleet.geofence.model_fields_set and settings.get(key, said) != said:
+            raise FleetFileError(
+                f"shield.{key} is {settings[key]!r} and geofence.{name} {said!r}; leave shield.{key} out"
+            )
+        if key in {field.name for field in fields(ShieldConfig)}:
+            settings.setdefault(key, said)
 
 
 def address_of(text: str, key: str) -> tuple[str, int]:

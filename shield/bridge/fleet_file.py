@@ -23,6 +23,7 @@ from .fleet_messages import explain
 from .fleet_settings import BoatSettings, FleetSettings
 from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
+from .obstacles import check_obstacles, corners_m, read_obstacles
 
 VERSION = 1
 """Of the format."""
@@ -61,8 +62,14 @@ class FleetFile(FleetSettings):
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """The geofence, as the shield keeps it."""
-        return Surroundings(field=self.geofence.box)
+        """The operating area and the obstacles, as the shield is given them."""
+        lines = (corners_m(obstacle, self.frame) for obstacle in self.obstacles)
+        circles = (obstacle.circle_m for obstacle in self.obstacles)
+        return Surroundings(
+            field=self.geofence.box,
+            polygons=tuple(line for line in lines if line),
+            circles=tuple(circle for circle in circles if circle is not None),
+        )
 
     @property
     def dt_s(self) -> float:
@@ -199,6 +206,9 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
     if folder is not None:
         fleet = _rooted(fleet, folder)
     try:
+        if fleet.obstacles:
+            fleet = fleet.model_copy(update={"obstacles": read_obstacles(fleet, folder or Path())})
+            check_obstacles(fleet, fleet.frame)
         check_fleet(fleet)
     except FleetFileError as error:
         raise FleetFileError(f"{where}: {error}") from None

@@ -17,6 +17,7 @@ Name = Annotated[
 ]
 Seconds = Annotated[float, Field(gt=0.0, le=3600.0, description="give seconds > 0")]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, description="give metres in the field's frame")]
+Degrees = Annotated[float, Field(ge=-180.0, le=180.0, description="give degrees")]
 Length = Annotated[float, Field(gt=0.0, le=1e5, description="give metres > 0")]
 
 
@@ -44,12 +45,21 @@ class FieldSettings(Section):
 
 
 class Geofence(Section):
-    """The water no boat of ours may leave, m in the field's frame."""
+    """The operating area of our boats, m in the field's frame, and the hard line around it.
+
+    Boats are kept inside the area and leave it only to keep clear of others. ``beyond_m``: how far outside it the hard
+    line lies. ``then``: what becomes of a boat beyond that line: "stop" (stopped by its link and handed over to its
+    pilot) or "flee" (it goes on to keep clear of others).
+    """
 
     xmin_m: Metres
     ymin_m: Metres
     xmax_m: Metres
     ymax_m: Metres
+    beyond_m: Annotated[float, Field(ge=0.0, le=1000.0, description="give metres outside the geofence, 0 to 1000")] = (
+        10.0
+    )
+    then: Literal["stop", "flee"] = Field("stop", description="stop or flee: what a boat beyond the hard line does")
 
     @property
     def box(self) -> tuple[float, float, float, float]:
@@ -59,6 +69,24 @@ class Geofence(Section):
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a point is inside; NaN is not."""
         return self.xmin_m <= x_m <= self.xmax_m and self.ymin_m <= y_m <= self.ymax_m
+
+
+class Obstacle(Section):
+    """Shore, pier, shallow or keep-out area that no command may lead a boat across; one of its four forms.
+
+    ``polygon_m``: corners [x, y] in the field's frame. ``polygon_deg``: corners [latitude, longitude]. ``circle_m``:
+    [x, y, radius]. ``geojson``: path of a GeoJSON file, whose polygons and lines are all taken.
+    """
+
+    name: Name | None = None
+    polygon_m: tuple[tuple[Metres, Metres], ...] | None = Field(
+        None, min_length=3, description="give corners [x, y] in m, at least three"
+    )
+    polygon_deg: tuple[tuple[Degrees, Degrees], ...] | None = Field(
+        None, min_length=3, description="give corners [latitude, longitude] in deg, at least three"
+    )
+    circle_m: tuple[Metres, Metres, Length] | None = Field(None, description="give [x, y, radius] in m")
+    geojson: Path | None = Field(None, description="give the path of a GeoJSON file")
 
 
 class LinkSettings(Section):
@@ -209,7 +237,8 @@ class FleetSettings(Section):
     version: Annotated[int, Field(ge=1, le=1, description="give the version of the format: 1")]
     rate_hz: Annotated[float, Field(ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")] = 10.0
     field: FieldSettings = Field(description="give origin and size_m of the field")
-    geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the water no boat may leave")
+    geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the operating area")
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=64, description="give a list of shores and keep-out areas")
     team: Literal["blue", "red"] = Field(description="the side our boats play: blue or red")
     coordination: Literal["team", "per_boat"] = Field(
         "team", description="team (one process for all boats) or per_boat (a process per boat)"

@@ -30,7 +30,13 @@ class Water:
 
     def __init__(self, file: FleetFile, grounds: Surroundings = OPEN_WATER) -> None:
         self._game_max_age_s = file.limits.game.max_age_s
-        home = replace(grounds, field=file.geofence.box)
+        fixed = file.surroundings
+        home = replace(
+            grounds,
+            field=fixed.field,
+            polygons=(*fixed.polygons, *grounds.polygons),
+            circles=(*fixed.circles, *grounds.circles),
+        )
         self._open = replace(home, stops=())
         self._home = home if grounds.stops else self._open
 
