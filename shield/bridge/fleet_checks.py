@@ -13,9 +13,10 @@ from ..config import ShieldConfig
 from ..exceptions import ConfigError, FleetFileError
 from ..platforms import Gains, Platform, get_platform
 from ..surroundings import Surroundings
-from .fleet_settings import FleetSettings
+from .fleet_settings import BoatSettings, FleetSettings
 
 LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
+MOOS = "moos://"
 
 _HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
 _ADDRESS = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
@@ -186,11 +187,19 @@ def _check_links(fleet: FleetSettings) -> None:
     for boat in fleet.boats:
         if boat.link is None:
             continue
+        if boat.link.kind == "moos":
+            address_of(boat.link.address.removeprefix(MOOS), f"boat {boat.name!r}: link address {MOOS}...")
+            other = seen.setdefault((boat.link.address, 0), boat.name)
+            if other != boat.name:
+                raise FleetFileError(
+                    f"boats {other!r} and {boat.name!r} have one MOOSDB, {boat.link.address}; each boat has its own"
+                )
+            continue
         kind = boat.link.address.split(":")[0]
         if kind not in LINK_KINDS or ":" not in boat.link.address:
             raise FleetFileError(
                 f"boat {boat.name!r}: link address {boat.link.address!r}; give one of "
-                f"{', '.join(f'{k}:...' for k in LINK_KINDS)}, such as udpin:127.0.0.1:14550"
+                f"{', '.join(f'{k}:...' for k in LINK_KINDS)}, such as udpin:127.0.0.1:14550, or {MOOS}HOST:PORT"
             )
         rest = boat.link.address.partition(":")[2]
         if kind != "serial":
@@ -208,12 +217,25 @@ def _check_links(fleet: FleetSettings) -> None:
             )
 
 
+def contact_kind(fleet: FleetSettings, boat: BoatSettings) -> str:
+    """How a process that does not command this boat knows it: "feed", "telemetry" or "moos"."""
+    if boat.contact is not None:
+        return boat.contact
+    if boat.link is None and any(other.link is not None and other.link.kind == "moos" for other in fleet.boats):
+        return "moos"
+    return "feed" if fleet.feed is not None else "telemetry"
+
+
 def _check_contacts(fleet: FleetSettings) -> None:
     for boat in fleet.boats:
-        kind = boat.contact or ("feed" if fleet.feed is not None else "telemetry")
+        kind = contact_kind(fleet, boat)
         commanded = boat.link is not None and boat.commanded
         if kind == "feed" and fleet.feed is None:
             raise FleetFileError(f"boat {boat.name!r} is known from the feed, and the file has none; add feed: listen")
+        if kind == "moos" and not any(other.link is not None and other.link.kind == "moos" for other in fleet.boats):
+            raise FleetFileError(
+                f"boat {boat.name!r} is known from NODE_REPORTs, and no boat of ours has a moos:// link"
+            )
         if kind == "telemetry" and boat.link is None:
             raise FleetFileError(
                 f"nobody says where boat {boat.name!r} is; give it a link, or contact: feed and a feed section"

@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ..exceptions import FleetFileError
 from ..platforms import Platform
 from ..platforms.files import is_path, load_platform
 from ..surroundings import Surroundings
-from .fleet_checks import check_fleet, platform_of, shield_config
+from .fleet_checks import check_fleet, contact_kind, platform_of, shield_config
 from .fleet_messages import explain
 from .fleet_settings import BoatSettings, FleetSettings
 from .fleet_yaml import MOST_BYTES, read_settings
@@ -156,8 +156,8 @@ class FleetFile(FleetSettings):
         return boat.link is not None and boat.commanded and self.team_of[boat.name] == self.team_number
 
     def contact_of(self, boat: BoatSettings) -> str:
-        """How a process that does not command this boat knows it: "feed" or "telemetry"."""
-        return boat.contact or ("feed" if self.feed is not None else "telemetry")
+        """How a process that does not command this boat knows it: "feed", "telemetry" or "moos"."""
+        return contact_kind(self, boat)
 
     def feed_listen(self, boat: str | None = None) -> str | None:
         """HOST:PORT at which a runner hears the feed: the team's, or the one of a boat's own process."""
@@ -257,10 +257,14 @@ def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:
     update: dict[str, Any] = {"log_dir": folder / fleet.log_dir}
     if fleet.signing is not None:
         update["signing"] = fleet.signing.model_copy(update={"key_file": folder / fleet.signing.key_file})
-    boats = tuple(_with_root(boat, folder) if boat.platform not in fleet.platforms else boat for boat in fleet.boats)
+    boats = tuple(_with_root(boat, folder, fleet.platforms) for boat in fleet.boats)
     return fleet.model_copy(update={**update, "boats": boats})
 
 
-def _with_root(boat: BoatSettings, folder: Path) -> BoatSettings:
-    """The boat with the path of its platform's file rooted."""
-    return boat.model_copy(update={"platform": str(folder / boat.platform)}) if is_path(boat.platform) else boat
+def _with_root(boat: BoatSettings, folder: Path, described: Collection[str]) -> BoatSettings:
+    """The boat with the paths of its platform's file and of its mission rooted."""
+    update: dict[str, Any] = {"platform": str(folder / boat.platform)} if is_path(boat.platform) and boat.platform not in described else {}
+    mission = getattr(boat.link, "mission", None)
+    if boat.link is not None and mission is not None:
+        update["link"] = boat.link.model_copy(update={"mission": folder / mission})
+    return boat.model_copy(update=update) if update else boat

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 Response = Literal["hold_course", "slow", "hold_station", "stop"]
 FenceResponse = Literal["return", "hold_course", "slow", "hold_station", "stop"]
@@ -103,14 +104,34 @@ class LinkSettings(Section):
     route: Annotated[str, Field(min_length=1, description='give "auto" or the name of a route')] = "auto"
 
 
+class MoosLinkSettings(LinkSettings):
+    """How a boat that runs MOOS-IvP is reached; ``link: moos://HOST:PORT`` alone takes the defaults.
+
+    ``gate``: where the shield sits: "helm" between helm and PID, "pid" between PID and actuators. ``prefix``: what the
+    helm puts before its DESIRED_*. ``corner_m``: the field's corner on the mission's local grid, x east, y north.
+    ``mission``: the boat's .moos file, which checks before a start read.
+    """
+
+    kind: Literal["moos"] = Field(description="the kind of link: moos")  # type: ignore[assignment]
+    address: Annotated[str, Field(pattern=r"^moos://", max_length=200, description='give "moos://HOST:PORT"')]
+    system_id: Annotated[int, Field(ge=1, le=1, description="leave system_id out: MOOS has none")] = 1
+    gate: Literal["helm", "pid"] = Field("helm", description="give helm or pid")
+    prefix: Annotated[str, Field(pattern=r"^[A-Z0-9_]{1,16}$", description="give the helm_prefix, such as RAW_")] = (
+        "RAW_"
+    )
+    corner_m: tuple[Metres, Metres] = Field((0.0, 0.0), description="give [x, y] of the field's corner in m")
+    mission: Path | None = Field(None, description="give the path of the boat's .moos file")
+
+
 class BoatSettings(Section):
     """One boat.
 
     ``agent``: its place in the game, agent_0 ...; none for a boat outside the game, such as a safety boat. ``team``:
     side of a boat outside the game, else nobody's. ``contact``: how this boat is known to a process that does not
-    command it: "feed" (UDP positions) or "telemetry" (its own link);
-    None: "feed" when the file has a feed, else "telemetry". ``commanded``: false for a boat with a link that somebody
-    else steers. ``feed_listen``: HOST:PORT at which this boat's own process hears the feed (coordination per_boat).
+    command it: "feed" (UDP positions), "telemetry" (its own link) or "moos" (NODE_REPORTs in our boats' MOOSDBs);
+    None: "moos" for a boat without a link where ours have MOOS, else "feed" when the file has a feed, else "telemetry".
+    ``commanded``: false for a boat with a link that somebody else steers. ``feed_listen``: HOST:PORT at which this
+    boat's own process hears the feed (coordination per_boat).
     """
 
     name: Name
@@ -118,9 +139,19 @@ class BoatSettings(Section):
     team: Literal["blue", "red"] | None = Field(None, description="give blue or red")
     platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron, or its file")]
     link: LinkSettings | None = None
-    contact: Literal["feed", "telemetry"] | None = Field(None, description="give feed or telemetry")
+    contact: Literal["feed", "telemetry", "moos"] | None = Field(None, description="give feed, telemetry or moos")
     commanded: bool = True
     feed_listen: str | None = Field(None, description='give "HOST:PORT"')
+
+    @field_validator("link", mode="before")
+    @classmethod
+    def _moos_link(cls, value: Any) -> Any:
+        """A link to a MOOSDB, which may be its address alone."""
+        if isinstance(value, str) and value.startswith("moos:"):
+            value = {"kind": "moos", "address": value}
+        if isinstance(value, dict) and value.get("kind") == "moos":
+            return MoosLinkSettings.model_validate_json(json.dumps(value))
+        return value
 
 
 class Signing(Section):

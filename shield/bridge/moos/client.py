@@ -133,6 +133,11 @@ class MoosClient:
         fault = "" if self.connected else self._fault
         return Health(self.connected, fault, self._community, age_s, self._trip_s, self._sessions, self._damaged)
 
+    @property
+    def ahead_s(self) -> float:
+        """MOOS time less the loop's clock, s; NaN while it is not known."""
+        return self._ahead_s
+
     def moos_s(self, now_s: float) -> float:
         """MOOS time of the MOOSDB at a time of the loop's clock, s; NaN while it is not known."""
         return now_s + self._ahead_s

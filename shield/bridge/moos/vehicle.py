@@ -1,0 +1,323 @@
+"""`MoosLink`: one boat that runs MOOS-IvP, by the contract of `bridge.link`."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from ...exceptions import LinkError, LinkRefused
+from ..clock import Clock
+from ..frame import TWO_PI, FieldFrame
+from ..link import NEVER_S, BoatReading, Sent, never
+from . import drivers, nav
+from .client import Health, MoosClient
+from .contacts import MoosContacts
+from .drivers import Drivers
+from .helm_gate import Gate, Nominal
+from .nav import Navigation
+from .wire import Message, WireError
+
+LOG = logging.getLogger(__name__)
+
+REPORT = "NODE_REPORT"
+ALIVE_S = 1.5
+"""A MOOSDB whose last echo is no older answers, real s."""
+REST_MPS, REST_S = 0.3, 3.0
+"""A boat this slow lies still; how long `close` waits for it, real s."""
+POLL_S = 0.05
+MOST_TEXTS = 32
+SAY_AGAIN_S, ALIKE = 10.0, 40
+"""A text is repeated after this long, s of the loop's clock; texts that begin alike are one."""
+
+
+def client_name(boat: str) -> str:
+    """Name of our client in a boat's community."""
+    return f"steerclear_{boat}"
+
+
+class MoosLink:
+    """One boat behind its MOOSDB. `connect`, `prepare`, then `read` and `send` at the loop's rate, then `close`.
+
+    Args:
+        boat: its name.
+        host, port: of its MOOSDB.
+        gate: where the shield sits in the community.
+        frame: of the field.
+        clock: the loop's; as many times faster than real time as the community's MOOSTimeWarp says.
+        contacts: takes the NODE_REPORTs that reach this boat; None: they are left.
+        corner_m: the field's corner on the boat's local grid, m.
+        prefix: what the helm puts before its own DESIRED_*, for words.
+    """
+
+    def __init__(
+        self,
+        boat: str,
+        host: str,
+        port: int,
+        gate: Gate,
+        frame: FieldFrame,
+        clock: Clock,
+        contacts: MoosContacts | None = None,
+        *,
+        corner_m: tuple[float, float] = (0.0, 0.0),
+        prefix: str = "RAW_",
+    ) -> None:
+        self.boat, self.gate = boat, gate
+        self._frame, self._clock, self._contacts = frame, clock, contacts
+        self._lock = threading.Lock()
+        self._navigation = Navigation(frame, corner_m)
+        self._drivers = Drivers(client_name(boat), gate.outputs, prefix)
+        self._faults: Counter[str] = Counter()
+        self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
+        self._told_fault = ""
+        self._said_s: dict[str, float] = {}
+        self._last_rad = math.nan
+        self._prepared = self._closed = False
+        self.writers: dict[str, set[str]] = {}
+        """Who was heard writing each variable, for the checks."""
+        names = (*nav.VARIABLES, *nav.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
+        self.client = MoosClient(
+            client_name(boat), host, port, clock, dict.fromkeys(names, 0.0), self._hear, self._forget
+        )
+
+    def connect(self, timeout_s: float) -> None:
+        """Find the MOOSDB, register, and hear where the boat is.
+
+        Raises:
+            LinkError: no MOOSDB there, one of another warp, or nobody posts NAV_* in it.
+        """
+        self.client.start()
+        end_s = time.monotonic() + timeout_s
+        while not math.isfinite(self.read().age_s):
+            if time.monotonic() > end_s:
+                raise LinkError(f"boat {self.boat}: {self._missing(timeout_s)}")
+            time.sleep(POLL_S)
+
+    def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
+        """See that commands would be obeyed; a boat driven by hand stays so until MOOS_MANUAL_OVERRIDE is false.
+
+        A mission starts with the override on: then the boat is left alone, and obeys from the moment it is set off.
+
+        Raises:
+            LinkRefused: asked for again while the boat is driven by hand: only who set the override may end it.
+            LinkError: its MOOSDB does not answer.
+        """
+        with self._lock:
+            why, first = self._drivers.why_not(), not self._prepared
+        if not self.client.connected:
+            raise LinkError(f"boat {self.boat}: {self.client.health().fault}")
+        if why and not first:
+            raise LinkRefused(f"boat {self.boat}: {why}")
+        self._prepared = True
+
+    def read(self) -> BoatReading:
+        """The latest of everything; never waits."""
+        health = self.client.health()
+        with self._lock:
+            now_s = self._clock.now_s()
+            if health.echo_age_s < ALIVE_S:
+                self._say(self._drivers.dropped(now_s), now_s)
+            seen = self._navigation
+            why_not = health.fault or self._drivers.why_not()
+            moving = abs(seen.speed_mps) >= 0.1
+            heading_rad = seen.heading_rad
+            texts, self._texts = tuple(self._texts), deque(maxlen=MOST_TEXTS)
+            faults = self._take_faults()
+            return BoatReading(
+                boat=self.boat,
+                read_s=now_s,
+                position_m=seen.position_m,
+                position_age_s=_age(now_s, seen.position_s),
+                heading_rad=heading_rad,
+                heading_age_s=_age(now_s, seen.heading_s),
+                speed_mps=seen.speed_mps,
+                course_rad=(heading_rad + (math.pi if seen.speed_mps < 0.0 else 0.0)) % TWO_PI if moving else math.nan,
+                velocity_age_s=_age(now_s, seen.speed_s),
+                turn_rate_rads=seen.turn_rate_rads,
+                turn_rate_age_s=_age(now_s, seen.heading_s) if math.isfinite(seen.turn_rate_rads) else NEVER_S,
+                mode=self._drivers.state or ("override" if self._drivers.overridden else "no helm"),
+                ready=not why_not,
+                why_not=why_not,
+                heartbeat_age_s=max(0.0, health.echo_age_s) * self.client.warp if health.connected else NEVER_S,
+                texts=texts,
+                faults=faults,
+            )
+
+    def nominal(self) -> Nominal:
+        """What somebody else in the community wants of the boat, through the gate; a stop when nobody does.
+
+        An all-stop of the helm is a stop at once.
+        """
+        reading = self.read_quietly()
+        with self._lock:
+            nominal = self.gate.nominal(reading)
+            allstop = self._drivers.allstop
+            if allstop.lower() not in ("", "clear") and not nominal.fault:
+                nominal = Nominal(0.0, nominal.heading_rad, f"the helm stopped all: {allstop}")
+            if nominal.fault != self._told_fault:
+                words = f"{nominal.fault}; told to stop" if nominal.fault else "nominal commands come again"
+                self._texts.append(f"{self.boat}: {words}")
+                self._told_fault = nominal.fault
+            return nominal
+
+    def read_quietly(self) -> BoatReading:
+        """As `read`, without taking texts and faults away from the loop."""
+        with self._lock:
+            seen, now_s = self._navigation, self._clock.now_s()
+            return BoatReading(self.boat, now_s, heading_rad=seen.heading_rad, speed_mps=seen.speed_mps)
+
+    def send(self, heading_rad: float, speed_mps: float) -> Sent:
+        """Post a command as it is; never waits.
+
+        Raises:
+            LinkError: heading or speed is not finite; nothing is posted.
+        """
+        if not (math.isfinite(heading_rad) and math.isfinite(speed_mps)):
+            raise LinkError(
+                f"boat {self.boat} was to be sent heading {heading_rad} rad and speed {speed_mps} m/s; "
+                "give finite numbers"
+            )
+        now_s = self._clock.now_s()
+        reading = self.read_quietly()
+        with self._lock:
+            values = self.gate.encode(heading_rad, speed_mps, reading)
+        delivered = self.client.post(values)
+        with self._lock:
+            self._last_rad = heading_rad
+            if delivered:
+                self._drivers.posted(now_s)
+                self._navigation.told(speed_mps, now_s)
+        return Sent(self.boat, now_s, heading_rad, speed_mps, " and ".join(self.gate.outputs), delivered)
+
+    def stop(self) -> Sent:
+        """Speed 0 on the present heading, or the last one sent; never waits, never raises."""
+        with self._lock:
+            heading = self._navigation.heading_rad
+        if not math.isfinite(heading):
+            heading = self._last_rad if math.isfinite(self._last_rad) else 0.0
+        try:
+            return self.send(heading, 0.0)
+        except WireError as error:  # a platform whose numbers leave the finite: the PID stops for want of commands
+            return Sent(self.boat, self._clock.now_s(), heading, 0.0, f"none: {error}", False)
+
+    def close(self) -> str:
+        """Stop the boat, wait until it lies still, end the connection; may be called again.
+
+        Returns:
+            What the boat was left doing, in words.
+        """
+        if self._closed:
+            return f"{self.boat}: its connection is closed"
+        self._closed = True
+        try:
+            return f"{self.boat}: {self._leave()}"
+        finally:
+            self.client.close()
+
+    def release(self) -> None:
+        """End the connection without a word to the boat: for one that was only listened to."""
+        self._closed = True
+        self.client.close()
+
+    def health(self) -> Health:
+        """What the connection knows of itself."""
+        return self.client.health()
+
+    def place_deg(self) -> tuple[float, float] | None:
+        """Latitude and longitude that the boat tells beside its local grid, deg; None: none."""
+        with self._lock:
+            return self._navigation.place_deg()
+
+    def other_commander(self) -> tuple[str, float]:
+        """Who else was last seen commanding the boat, and when, s; -inf: nobody."""
+        with self._lock:
+            return self._drivers.other, self._drivers.other_s
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        LOG.info("%s", self.close())
+
+    def _leave(self) -> str:
+        if not self._prepared:
+            return "not prepared; nothing was sent"
+        end_s = time.monotonic() + REST_S
+        while True:
+            reading = self.read()
+            if "override" in reading.why_not.lower():
+                return f"left as it is: {reading.why_not}"
+            if not self.stop().delivered:
+                return f"cannot be told to stop ({reading.why_not}); its PID stops it 2 s after our last command"
+            if abs(reading.speed_mps) < REST_MPS and reading.velocity_age_s < 1.0:
+                return "stopped; its PID gets no more commands and holds thrust at 0"
+            if time.monotonic() > end_s:
+                return f"told to stop, makes {reading.speed_mps:.1f} m/s yet; its PID drops thrust by itself"
+            time.sleep(POLL_S)
+
+    def _hear(self, message: Message, received_s: float) -> None:
+        """Take mail in; in the client's thread."""
+        key, true_s = message.key, self.client.clock_s(message.time_s)
+        with self._lock:
+            sources = self.writers.setdefault(key, set())
+            if len(sources) < MOST_TEXTS:
+                sources.add(message.source)
+            text = ""
+            if not math.isfinite(true_s) and key in (*nav.VARIABLES, *nav.PLACE, REPORT):
+                return  # MOOS time is not known yet
+            if key in nav.VARIABLES or key in nav.PLACE:
+                text = self._navigation.hear(message, true_s, received_s)
+            elif key == REPORT and self._contacts is not None:
+                text = self._contacts.hear(message.text, self.boat, -self.client.ahead_s, received_s)
+                self._faults["bad_report"] += bool(text)
+            elif key in self.gate.inputs:
+                self.gate.hear(message, received_s)
+            else:
+                text = self._drivers.hear(message, received_s, received_s - true_s)
+            self._say(text, received_s)
+
+    def _say(self, text: str, now_s: float) -> None:
+        """Keep a text for the operator, unless one like it was said lately."""
+        if text and now_s - self._said_s.get(text[:ALIKE], -math.inf) >= SAY_AGAIN_S:
+            if len(self._said_s) > MOST_TEXTS:
+                self._said_s.clear()
+            self._said_s[text[:ALIKE]] = now_s
+            self._texts.append(f"{self.boat}: {text}")
+
+    def _forget(self) -> None:
+        """The connection ended: all that is known is old, and no nominal command is in force."""
+        with self._lock:
+            self._navigation.forget()
+            self._drivers.forget()
+            self.gate.forget()
+
+    def _take_faults(self) -> dict[str, int]:
+        counters = (self._faults, self._navigation.faults, self._drivers.faults)
+        found = {kind: count for counter in counters for kind, count in counter.items() if count}
+        for counter in counters:
+            counter.clear()
+        return found
+
+    def _missing(self, timeout_s: float) -> str:
+        health = self.client.health()
+        if not health.connected:
+            return health.fault
+        with self._lock:
+            seen = self._navigation
+            parts = (("NAV_X and NAV_Y of one moment", seen.position_s), ("NAV_HEADING", seen.heading_s))
+            missing = [name for name, time_s in (*parts, ("NAV_SPEED", seen.speed_s)) if not math.isfinite(time_s)]
+            said = "; ".join(self._texts)
+        what = f"nobody posts {', '.join(missing)} in MOOSDB {self.client.address} ({health.community})"
+        return f"{what} within {timeout_s:g} s; start its simulator or sensors" + (f"; {said}" if said else "")
+
+
+def _age(now_s: float, true_s: float) -> float:
+    return max(0.0, now_s - true_s)
