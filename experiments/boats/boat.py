@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from steerclear.shield.bridge.fleet_checks import MOOS
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.platforms import get_platform
 
@@ -14,6 +15,7 @@ from .faults import Faults
 from .helmsman import Helmsman
 from .hull import Hull
 from .modes import Mode
+from .moos import Community
 from .orders import Order
 from .radio import Radio
 from .sensing import Sensors
@@ -30,6 +32,7 @@ class Setting:
         radio: what the radio does.
         noise: of the sensors: 0 none, 1 as measured.
         key: signing key; None: unsigned.
+        warp: times faster than real time.
     """
 
     frame: FieldFrame
@@ -37,6 +40,7 @@ class Setting:
     radio: RadioSettings
     noise: float = 0.0
     key: bytes | None = None
+    warp: float = 1.0
 
 
 class Boat:
@@ -55,6 +59,7 @@ class Boat:
         order: what its hull was told last.
         seen: what its sensors say, from its last step.
         write: takes the packets that reach the commander.
+        community: what it has aboard instead of its autopilot where it runs MOOS; None: it does not.
     """
 
     def __init__(
@@ -78,7 +83,10 @@ class Boat:
         settings = _with_top_speed(setting.autopilot, platform.max_speed_mps)
         self.autopilot = Autopilot(system_id, settings, setting.frame, seen, self._transmit, setting.key)
         self.faults = Faults(self.autopilot, self.down, self.up, setting.frame, seeds[3])
-        self.order: Order = self.autopilot.vehicle.order()
+        self.community: Community | None = None
+        if spec.address is not None and spec.address.startswith(MOOS):
+            self.community = Community(spec.name, spec.address, setting.frame, setting.warp)
+        self.order: Order = self._ordered()
         self.seen = seen
 
     @property
@@ -89,6 +97,8 @@ class Boat:
     @property
     def is_commanded(self) -> bool:
         """Whether it obeys a commander at this moment."""
+        if self.community is not None:
+            return self.community.is_commanded
         vehicle = self.autopilot.vehicle
         return vehicle.armed and vehicle.target is not None
 
@@ -99,13 +109,16 @@ class Boat:
 
     def step(self, time_s: float, order: Order | None = None) -> None:
         """Move by one step, to ``time_s``, as its autopilot orders or as given."""
-        self.order = self.autopilot.vehicle.order() if order is None else order
+        self.order = self._ordered() if order is None else order
         self.helmsman.step(self.faults.misled(self.order))
         self.seen = self._sensors.sense(self.hull, time_s)
 
     def tick(self, now_s: float) -> None:
         """Let the autopilot look at its clocks and send, and the radio deliver."""
         self.faults.tick(now_s)
+        if self.community is not None:
+            self.community.publish(self.faults.sensed(self.seen, now_s))
+            return
         for packet in self.up.take(now_s):
             self.autopilot.receive(packet, now_s)
         if self.autopilot.reboot_wanted:
@@ -131,6 +144,10 @@ class Boat:
         """The autopilot boots anew; the boat runs on without motors."""
         self.hull.forget()
         self.autopilot.boot(now_s)
+
+    def _ordered(self) -> Order:
+        """What it is told by who steers it aboard."""
+        return self.autopilot.vehicle.order() if self.community is None else self.community.order()
 
     def _transmit(self, packet: bytes) -> None:
         self.down.put(packet, self.autopilot.now_s)

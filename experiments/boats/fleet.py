@@ -97,7 +97,9 @@ class SimFleet:
         self._hub: PositionHub | None = None
         self._ports = Ports(allow_remote)
         self._pace = Pace(MonotonicClock(speed) if clock is None else clock, TICK_S, self._tick, self._receive)
-        setting = Setting(self.frame, autopilot or AutopilotSettings(), radio or RadioSettings(), noise, check_key(key))
+        warp = float(getattr(self._pace.clock, "speed", 1.0))
+        parts = (autopilot or AutopilotSettings(), radio or RadioSettings())
+        setting = Setting(self.frame, *parts, noise, check_key(key), warp)
         config = game_of(boats, preset, rules or {})
         try:
             self.boats = build_boats(boats, config, setting, self._ports, seed, random_start)
@@ -294,3 +296,7 @@ class SimFleet:
                 self._world.step(self.time_s)
             for boat in self.boats.values():
                 boat.tick(self.time_s)
+                if boat.community is not None:
+                    boat.community.report(
+                        [(name, other.spec.team, other.seen) for name, other in self.boats.items()], self.time_s
+                    )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import socket
 
 from steerclear.shield.bridge.feed_sockets import socket_address
+from steerclear.shield.bridge.fleet_checks import MOOS
 from steerclear.shield.exceptions import ConfigError
 
 from .boat import Boat
 from .frames import target_of
+from .moos import Community
 from .wires import ANY, LOOPBACK, Wire, is_loopback, open_wire
 
 _FREE_PORT = "udpout:127.0.0.1:0"
@@ -39,11 +41,13 @@ class Ports:
         self._allow_remote = allow_remote
         self._shared: dict[str, Wire] = {}
         self._aboard: dict[Wire, list[Boat]] = {}
+        self._communities: dict[str, Community] = {}
 
     @property
     def addresses(self) -> dict[str, str]:
         """Address to open for each boat with a link."""
-        return {boat.spec.name: wire.address for wire, aboard in self._aboard.items() for boat in aboard}
+        wired = {boat.spec.name: wire.address for wire, aboard in self._aboard.items() for boat in aboard}
+        return wired | {name: f"{MOOS}127.0.0.1:{aboard.db.port}" for name, aboard in self._communities.items()}
 
     def plug_in(self, boat: Boat) -> None:
         """Open a boat's link, if it has one.
@@ -53,6 +57,9 @@ class Ports:
         """
         address = boat.spec.address
         if address is None:
+            return
+        if boat.community is not None:
+            self._communities[boat.spec.name] = boat.community
             return
         if not 1 <= boat.system_id <= 255:
             raise ConfigError(f"boat {boat.spec.name!r} has system id {boat.system_id}; give one of 1..255")
@@ -80,6 +87,8 @@ class Ports:
         """Give the sockets back."""
         for wire in self._aboard:
             wire.close()
+        for community in self._communities.values():
+            community.close()
 
     def _wire(self, address: str) -> Wire:
         if address in self._shared:

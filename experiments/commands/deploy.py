@@ -15,11 +15,12 @@ from steerclear import policies
 from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.exceptions import ConfigError
 
-from ..boats.demo import demo_fleet
+from ..boats.demo import demo_fleet, demo_text
 from ..deploy.dashboard import Dashboard
 from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
@@ -45,6 +46,8 @@ DemoOption = Annotated[
 Opponents = Annotated[str, typer.Option(metavar="NAME", help="With --demo: policy of the other team.")]
 Plain = Annotated[bool, typer.Option("--plain", help="Lines instead of the dashboard; no keys but Ctrl-C.")]
 
+LinkOption = Annotated[str, typer.Option(metavar="KIND", help="With --demo: what our boats run, mavlink or moos.")]
+
 DEMO_WAIT_S = 300.0
 """Simulated boats may have to be compiled first."""
 
@@ -58,6 +61,7 @@ def deploy(
     accept: d.Accept = None,
     demo: DemoOption = False,
     opponents: Opponents = "medium",
+    link: LinkOption = "mavlink",
     speed: d.Speed = 1.0,
     wait: d.Wait = 15.0,
     seed: o.DrawSeed = 0,
@@ -72,11 +76,16 @@ def deploy(
     """
     if demo:
         policies.check(opponents)
-    policies.check(policy)
-    say_what_runs((policy,), trust)
-    orders = _orders(fleet, policy, boat, minutes, accept or [], demo, (speed, wait, seed, not no_tlog, trust))
+        demo_text(link)
+    if policy != MOOS_POLICY:
+        policies.check(policy)
+        say_what_runs((policy,), trust)
+    demo_link = link if demo else ""
+    orders = _orders(fleet, policy, boat, minutes, accept or [], demo_link, (speed, wait, seed, not no_tlog, trust))
     file = load_fleet(orders.fleet_file)
-    if file.agent_ids:
+    if demo:
+        orders = replace(orders, accept=(*orders.accept, *_not_simulated(file)))
+    if file.agent_ids and policy != MOOS_POLICY:
         say_of_elsewhere((policy,), game_config(file))
     dashboard = d.on_terminal() and not plain
     operator, console, started = Operator(), out(), time.perf_counter()
@@ -111,7 +120,7 @@ def _orders(
     boat: str | None,
     minutes: float | None,
     accept: Sequence[str],
-    demo: bool,
+    demo: str,
     more: tuple[float, float, int, bool, bool],
 ) -> Orders:
     speed, wait_s, seed, tlog, trust = more
@@ -121,13 +130,13 @@ def _orders(
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
     check_seed(seed)
     if boat is not None and fleet is None:
-        demo_fleet().commanded(boat)  # before its boats are simulated
+        demo_fleet(demo).commanded(boat)  # before its boats are simulated
     orders = Orders(
         fleet_file=fleet or Path(),
         policy=policy,
         boat=boat,
         minutes=minutes,
-        accept=(*accept, *(("drill",) if demo else ())),
+        accept=tuple(accept),
         seed=seed,
         tlog=tlog,
         speed=speed,
@@ -136,7 +145,14 @@ def _orders(
         untold_delay_s=0.0 if demo else None,  # simulated boats on this machine obey at once
         begun_unix_s=time.time(),
     )
-    return orders if fleet is not None else replace(orders, fleet_file=demo_file())  # a folder, once all else is sound
+    # a folder, once all else is sound
+    return orders if fleet is not None else replace(orders, fleet_file=demo_file(link=demo))
+
+
+def _not_simulated(file: FleetFile) -> tuple[str, ...]:
+    """Checks that simulated boats need not pass: nobody drilled them, and those that run MOOS have no mission file."""
+    moos = any(boat.link is not None and boat.link.kind == "moos" for boat in file.ours)
+    return ("drill", "mission") if moos else ("drill",)
 
 
 def _table(figures: dict[str, float]) -> Table:

@@ -8,6 +8,9 @@ from functools import cached_property
 
 from steerclear.shield.bridge.blackbox import check_disk
 from steerclear.shield.bridge.loop import Loop
+from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.moos.checks import moos_checks
+from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.preflight.drill import Drill
@@ -56,7 +59,9 @@ def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
     """
     fleet, look = station.fleet, _Look(station)
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
-    links = link_checks(station.links, fleet.platform_of, station.clock)
+    mavlink = {name: link for name, link in station.links.items() if isinstance(link, MavlinkLink)}
+    moos = {name: link for name, link in station.links.items() if isinstance(link, MoosLink)}
+    links = [*link_checks(mavlink, fleet.platform_of, station.clock), *moos_checks(moos, fleet)]
     grounds = grounds_of(fleet)
     situation = [
         Check(name, lambda name=name: check_situation(name, fleet, look.roster, grounds)) for name in SITUATION
@@ -84,7 +89,7 @@ def drive_drill(station: VehicleSession, operator: Operator, sinks: Sequence[Tic
         links=station.links,
         policy=drill,
         ears=station.ears,
-        contacts=() if station.feed is None else (station.feed,),
+        contacts=station.sources(),
         grounds=grounds_of(fleet),
         sinks=(drill, missed, *sinks),
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from steerclear.experiments.boats.demo import demo_text
+from steerclear.experiments.boats.demo import MOOS_PORTS, demo_text
 from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
@@ -27,18 +27,20 @@ PORTS = (14550, 14700, 14701)
 END_S = 10.0
 
 
-def demo_file(folder: Path = FOLDER) -> Path:
+def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
     """The fleet file that comes with the package, on free ports, in a new folder where it can be looked at.
 
     Args:
         folder: in which the new one is made, named after the time, UTC.
+        link: what our boats run, mavlink or moos.
 
     Raises:
         BridgeError: it cannot be written.
     """
     try:
-        text = demo_text()
-        for port, free in zip(PORTS, free_ports(len(PORTS)), strict=True):
+        text = demo_text(link)
+        ports = PORTS if link == "mavlink" else (*PORTS, *MOOS_PORTS)
+        for port, free in zip(ports, free_ports(len(ports)), strict=True):
             text = text.replace(f"127.0.0.1:{port}", f"127.0.0.1:{free}")
         path = _new_folder(folder) / "FLEET.yaml"
         path.write_text(text, encoding="utf-8")
@@ -48,16 +50,20 @@ def demo_file(folder: Path = FOLDER) -> Path:
 
 
 def free_ports(count: int) -> list[int]:
-    """UDP ports of this machine that nobody has now, all different.
+    """Ports of this machine that nobody has now, neither by UDP nor by TCP, all different.
 
     Raises:
         OSError: there is none.
     """
     with contextlib.ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)]
-        for entry in sockets:
-            entry.bind(("127.0.0.1", 0))
-        return [int(entry.getsockname()[1]) for entry in sockets]
+        found: list[int] = []
+        while len(found) < count:
+            port = int(stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1])
+            with contextlib.suppress(OSError):
+                entry = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                entry.bind(("127.0.0.1", port))
+                found.append(port)
+        return found
 
 
 def _new_folder(folder: Path) -> Path:

@@ -6,11 +6,13 @@ import contextlib
 from collections.abc import Sequence
 
 from steerclear.policies.registry import SB3_PREFIX
-from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.links import key_of
 from steerclear.shield.bridge.loop import Loop
+from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
+from steerclear.shield.bridge.moos.links import MoosNominal
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.publishing import PositionPublisher
@@ -51,8 +53,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
     clock, outcome = MonotonicClock(orders.speed), Outcome()
     boats = tuple(entry.name for entry in fleet.commanded(orders.boat))
     with contextlib.ExitStack() as stack:
-        options = {"allow_code": True} if orders.trust and orders.policy.startswith(SB3_PREFIX) else {}
-        policy = PolicyProcess(fleet, orders.policy, clock=clock, boats=boats, options=options, seed=orders.seed)
+        policy = _policy(fleet, orders, clock, boats)
         stack.callback(policy.close)
         warm_up(fleet)
         policy.start()
@@ -60,6 +61,8 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         for publisher in publishers:
             stack.callback(publisher.close)
         station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
+        if isinstance(policy, MoosNominal):
+            policy.use(station.links)
         try:
             with station, ended_by_signals(operator):
                 checks = checks_of(station, orders.minutes or LONGEST_MINUTES)
@@ -78,7 +81,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
 
 def _run(
     station: VehicleSession,
-    policy: PolicyProcess,
+    policy: PolicyProcess | MoosNominal,
     orders: Orders,
     kept: Sequence[TickSink],
     surface: Surface,
@@ -95,7 +98,7 @@ def _run(
             links=station.links,
             policy=policy,
             ears=station.ears,
-            contacts=() if station.feed is None else (station.feed,),
+            contacts=station.sources(),
             game=station.feed,
             grounds=grounds_of(fleet),
             sinks=tuple(sinks),
@@ -107,6 +110,14 @@ def _run(
         outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
         outcome.figures |= {f"margin_{name}_m": margin for name, margin in loop.foresight.margin_m.items()}
         outcome.figures |= {f"delay_{name}_s": delay for name, delay in loop.delays.measured_s().items()}
+
+
+def _policy(fleet: FleetFile, orders: Orders, clock: Clock, boats: tuple[str, ...]) -> PolicyProcess | MoosNominal:
+    """Where nominal commands come from: a process of ours, or the boats' own communities."""
+    if orders.policy == MOOS_POLICY:
+        return MoosNominal(fleet, boats)
+    options = {"allow_code": True} if orders.trust and orders.policy.startswith(SB3_PREFIX) else {}
+    return PolicyProcess(fleet, orders.policy, clock=clock, boats=boats, options=options, seed=orders.seed)
 
 
 def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:

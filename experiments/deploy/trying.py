@@ -94,7 +94,7 @@ def _run(station: VehicleSession, trial: SeaTrial, box: Any, surface: Surface, o
             links=station.links,
             policy=trial,
             ears=station.ears,
-            contacts=() if station.feed is None else (station.feed,),
+            contacts=station.sources(),
             grounds=grounds_of(fleet),
             sinks=(box, trial, _End(trial, operator), *shown),
         )

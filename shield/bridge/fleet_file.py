@@ -175,7 +175,9 @@ class FleetFile(FleetSettings):
     def position_listeners(self) -> tuple[str, ...]:
         """Every HOST:PORT positions go to: the runners' and the referee's."""
         referee = () if self.feed is None or self.feed.referee is None else (self.feed.referee,)
-        return (*self.feed_listeners(), *referee)
+        others = [boat for boat in self.boats if boat.link is None]
+        by_moos = bool(others) and all(self.contact_of(boat) == "moos" for boat in others)
+        return (*(() if by_moos else self.feed_listeners()), *referee)
 
 
 def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None) -> FleetFile:
@@ -263,7 +265,8 @@ def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:
 
 def _with_root(boat: BoatSettings, folder: Path, described: Collection[str]) -> BoatSettings:
     """The boat with the paths of its platform's file and of its mission rooted."""
-    update: dict[str, Any] = {"platform": str(folder / boat.platform)} if is_path(boat.platform) and boat.platform not in described else {}
+    by_file = is_path(boat.platform) and boat.platform not in described
+    update: dict[str, Any] = {"platform": str(folder / boat.platform)} if by_file else {}
     mission = getattr(boat.link, "mission", None)
     if boat.link is not None and mission is not None:
         update["link"] = boat.link.model_copy(update={"mission": folder / mission})

@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from .fleet_messages import explain
 
 Response = Literal["hold_course", "slow", "hold_station", "stop"]
 FenceResponse = Literal["return", "hold_course", "slow", "hold_station", "stop"]
@@ -150,7 +152,10 @@ class BoatSettings(Section):
         if isinstance(value, str) and value.startswith("moos:"):
             value = {"kind": "moos", "address": value}
         if isinstance(value, dict) and value.get("kind") == "moos":
-            return MoosLinkSettings.model_validate_json(json.dumps(value))
+            try:
+                return MoosLinkSettings.model_validate_json(json.dumps(value))
+            except ValidationError as error:  # its own keys and remedies, not those of the other kind
+                raise ValueError(explain(error, MoosLinkSettings)) from None
         return value
 
 

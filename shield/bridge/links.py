@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from .clock import Clock
+from .contact import ContactSource
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
 from .link import Link
 from .mavlink.endpoint import Endpoint, OnBytes
 from .mavlink.link import MavlinkLink
 from .mavlink.signing import Signing, read_key
-from .preflight.watch import Watched
+from .moos.links import MoosLinks
 
 
-class BoatLink(Watched, Link, Protocol):
-    """A link that preflight can look at and that can also be given back unused, as one that was only listened to is."""
+class BoatLink(Link, Protocol):
+    """A link that can also be given back unused, as one that was only listened to is."""
 
     def release(self) -> None:
         """Give the link back without a word to the boat."""
@@ -37,6 +38,9 @@ class LinkMaker(Protocol):
 
     def close(self) -> None:
         """Give it back; may be called again."""
+
+    def sources(self) -> Sequence[ContactSource]:
+        """Who tells of other boats by the same way."""
 
 
 class MavlinkLinks:
@@ -68,6 +72,10 @@ class MavlinkLinks:
         frame, rate_hz, route = self._fleet.frame, settings.rate_hz, settings.route
         return MavlinkLink(boat.name, endpoint, settings.system_id, frame, self._clock, rate_hz=rate_hz, route=route)
 
+    def sources(self) -> Sequence[ContactSource]:
+        """See `LinkMaker`: nobody, other boats have links of their own."""
+        return ()
+
     def open(self) -> None:
         """See `LinkMaker`."""
         for endpoint in self._endpoints.values():
@@ -79,7 +87,10 @@ class MavlinkLinks:
             endpoint.close()
 
 
-LINK_MAKERS: Mapping[str, Callable[[FleetFile, Clock, OnBytes | None], LinkMaker]] = {"mavlink": MavlinkLinks}
+LINK_MAKERS: Mapping[str, Callable[[FleetFile, Clock, OnBytes | None], LinkMaker]] = {
+    "mavlink": MavlinkLinks,
+    "moos": MoosLinks,
+}
 
 
 def signing_of(fleet: FleetFile) -> Signing | None:

@@ -11,7 +11,7 @@ from types import TracebackType
 from ..compat import Self
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
-from .contact import Contact, heard_from
+from .contact import Contact, ContactSource, heard_from
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
@@ -93,11 +93,16 @@ class VehicleSession:
         """
         self._all(self.links, lambda link: link.prepare(timeout_s))
 
+    def sources(self) -> tuple[ContactSource, ...]:
+        """Who tells of other boats: the feed, and what comes by the way of the links."""
+        by_links = [source for maker in self._makers.values() for source in maker.sources()]
+        return (*by_links, *(() if self.feed is None else (self.feed,)))
+
     def contacts(self) -> tuple[Contact, ...]:
-        """Boats heard of by the feed and by links that are only listened to."""
+        """Boats heard of by these sources and by links that are only listened to."""
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.ears.values()]
-        heard = () if self.feed is None else heard_from(self.feed)
+        heard = [contact for source in self.sources() for contact in heard_from(source)]
         return (*heard, *(contact for contact in told if contact is not None))
 
     def close(self) -> None:
