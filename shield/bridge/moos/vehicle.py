@@ -9,8 +9,8 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
 
+from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
