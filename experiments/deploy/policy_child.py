@@ -1,4 +1,4 @@
-"""The policy's own process, forked by `entries.keeper`, which ends it when the runner is gone.
+"""The policy's own process, forked by `entries.sandbox`, which ends it when the runner is gone.
 
 Reads pickled `Orders`, then snapshots; answers JSON.
 """
@@ -20,7 +20,7 @@ FAILED = 3
 """Exit status when the policy could not be loaded; the answer before it says why."""
 
 GRACE_S = 5.0
-"""Time the keeper has to end this process once the runner is gone, s."""
+"""Time the supervisor has to end this process once the runner is gone, s."""
 
 
 class Slot:
@@ -45,7 +45,7 @@ class Slot:
             with contextlib.suppress(OSError):
                 message = read_message(self._descriptor)
             if message is None:
-                time.sleep(GRACE_S)  # the runner is gone, and the keeper ends all this, whatever the policy is at
+                time.sleep(GRACE_S)  # the runner is gone, and the supervisor ends all this, whatever the policy is at
                 os._exit(0)
             with self._ready:
                 self._message = message

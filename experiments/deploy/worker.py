@@ -18,17 +18,15 @@ from dataclasses import asdict
 
 from steerclear.shield.words import plain_text
 
-from ..entries.keeper import OVER, READY
-from ..entries.limits import Limits
-from ..entries.system import end_group, end_marked, is_stopped
+from ..entries.sandbox import OVER, READY, Limits, end_group, end_marked, is_stopped
 from .frames import GONE, Broken, FrameReader, FrameWriter
 
-KEEP = """import sys
+SUPERVISE = """import sys
 sys.path[:] = filter(None, sys.path)
-from steerclear.experiments.entries.keeper import main
+from steerclear.experiments.entries.sandbox import main
 sys.exit(main(sys.argv[1:]))
 """
-"""What the process runs: the keeper, without the working directory's own modules in its way."""
+"""What the process runs: the supervisor, without the working directory's own modules in its way."""
 PART = "steerclear.experiments.deploy.policy_child"
 DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True)
 """Limits of a policy that may play for days."""
@@ -44,7 +42,7 @@ SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Worker:
     """A started process, in a session of its own: keys for the runner do not reach it.
 
-    What runs in it is forked, watched and limited by `entries.keeper`, and ends with all it started. Its temporary
+    What runs in it is forked, watched and limited by `entries.sandbox`, and ends with all it started. Its temporary
     files, such as an unpacked submission, have a folder of their own that goes with it. What the policy prints is read
     a little at each turn, so that one that floods only slows itself.
 
@@ -77,7 +75,7 @@ class Worker:
             fds = (theirs_r, theirs_w, notes_w)
             what = (*map(str, fds), self._folder, json.dumps(asdict(limits)), part, *preload)
             self._process = subprocess.Popen(
-                [sys.executable, "-c", KEEP, *what],
+                [sys.executable, "-c", SUPERVISE, *what],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -179,7 +177,7 @@ class Worker:
     def end(self) -> None:
         """End the process and all it started; give everything back. May be called again.
 
-        The closed pipes tell the keeper to end what it keeps; one that does not is ended after a while.
+        The closed pipes tell the supervisor to end what it watches; one that does not is ended after a while.
         """
         if self._ended:
             return

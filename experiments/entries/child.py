@@ -20,8 +20,7 @@ from steerclear.shield.exceptions import SteerclearError
 from steerclear.shield.words import describe_error
 
 from .answers import to_plain
-from .keeper import AGAIN
-from .packing import Unpacker
+from .sandbox import AGAIN
 
 
 def serve(read_fd: int, write_fd: int, folder: str) -> int:
@@ -45,7 +44,6 @@ class Player:
     def __init__(self) -> None:
         self._team: GuardedTeam | None = None
         self._ids: Sequence[str] = ()
-        self._unpacker = Unpacker()
 
     def obey(self, order: str, arguments: Sequence[Any]) -> dict[str, Any]:
         """Do what an order says; whatever the entry raises is in the answer."""
@@ -61,13 +59,13 @@ class Player:
         return {"name": self._team.name}
 
     def _begin(self, facts: GameFacts, agent_ids: Sequence[str], seed: int) -> dict[str, Any]:
-        self._ids, self._unpacker = agent_ids, Unpacker()
+        self._ids = agent_ids
         self._code().begin(facts, agent_ids, seed)
         return {}
 
-    def _step(self, packed: Any) -> dict[str, Any]:
+    def _step(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
         code = self._code()
-        answer = code.prepare(*self._unpacker.unpack(packed))
+        answer = code.prepare(observations, infos)
         with code.around():
             return {"answers": {agent_id: _ask(code, answer, agent_id) for agent_id in self._ids}}
 

@@ -1,6 +1,6 @@
 """`EntryProcess`: the runner's side of an entry's process. Each call waits for the answer, for a limited time.
 
-Processes are used again for the next game: what ran there is gone by then, and the keeper forks anew.
+Processes are used again for the next game: what ran there is gone by then, and the supervisor forks anew.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ import contextlib
 import importlib.util
 import json
 import pickle
-import re
 import time
-import zipfile
 from collections.abc import Mapping
-from pathlib import Path
+from functools import lru_cache
 from typing import Any
 
 from steerclear.policies.registry import SB3_PREFIX
+from steerclear.shield.exceptions import PolicyError
 
 from ..deploy.frames import Broken
 from ..deploy.worker import Worker
-from .limits import Limits
+from .imports import imports_of
+from .sandbox import Limits
 
 PART = "steerclear.experiments.entries.child"
 LOAD_S = 120.0
@@ -32,7 +32,6 @@ MOST_IDLE = 2
 """Processes kept for later games."""
 HEAVY = ("torch", "stable_baselines3")
 """Modules that take long to import: done once for all games of an entry that imports them."""
-MOST_SOURCES, SOURCE_BYTES = 50, 1 << 16
 _IDLE: list[Worker] = []
 
 
@@ -103,33 +102,17 @@ class EntryProcess:
                 raise Broken(f"it did not answer within {timeout_s:g} s; its process was ended")
 
 
+@lru_cache(maxsize=64)
 def heavy_modules(policy: str) -> tuple[str, ...]:
     """Those of `HEAVY` that an entry imports by name, and that are installed."""
     if policy.startswith(SB3_PREFIX):
         wanted = set(HEAVY)
     else:
-        text = _sources(Path(policy).expanduser())
-        wanted = {name for name in HEAVY if re.search(rf"^\s*(?:import|from)\s+{name}\b", text, re.MULTILINE)}
+        try:
+            wanted = set(imports_of(policy).needed)
+        except PolicyError:
+            wanted = set()  # whoever loads it will say so
     return tuple(name for name in HEAVY if name in wanted and importlib.util.find_spec(name) is not None)
-
-
-def _sources(path: Path) -> str:
-    """The beginning of its Python files, for a look at what they import."""
-    texts: list[bytes] = []
-    try:
-        if path.suffix == ".zip" and path.is_file():
-            with zipfile.ZipFile(path) as archive:
-                for name in [name for name in archive.namelist() if name.endswith(".py")][:MOST_SOURCES]:
-                    with archive.open(name) as member:
-                        texts.append(member.read(SOURCE_BYTES))
-        else:
-            for place in sorted((path if path.is_dir() else path.parent).glob("*.py"))[:MOST_SOURCES]:
-                if place.is_file():
-                    with place.open("rb") as file:
-                        texts.append(file.read(SOURCE_BYTES))
-    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError):
-        return ""  # whoever loads it will say so
-    return "\n".join(text.decode(errors="replace") for text in texts)
 
 
 def _worker(limits: Limits, preload: tuple[str, ...]) -> Worker:

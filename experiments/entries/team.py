@@ -23,9 +23,8 @@ from steerclear.shield.words import plain_text
 
 from ..play.spec import ANSWER_S
 from .answers import from_plain
-from .limits import Limits, unlimited
-from .packing import Packer
 from .process import EntryProcess, Lost
+from .sandbox import Limits, unlimited
 
 MOST_NS = 10**15
 LIMITS = Limits()
@@ -72,7 +71,6 @@ class EntryTeam:
         game.check_team(agent_ids)
         self._ids = list(agent_ids)
         self._reader = ActionReader(game)
-        self._packer = Packer(not self._path.startswith(SB3_PREFIX))
         self._reporter.begin(game.decision_s)
         if not self._lost:
             self._first("begin", game_facts(env), self._ids, seed)
@@ -87,8 +85,8 @@ class EntryTeam:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
         check_observed(observations, self._ids)
         self.held = {}
-        packed = self._packer.pack(observations, infos)
-        answers = {} if self._lost else self._ask(packed)
+        seen = self._seen(observations, infos)
+        answers = {} if self._lost else self._ask(*seen)
         actions = {agent_id: self._checked(agent_id, answers.get(agent_id)) for agent_id in self._ids}
         self._reporter.next_step()
         return actions
@@ -116,9 +114,25 @@ class EntryTeam:
             raise PolicyError(plain_text(content["failed"], 600))
         return content
 
-    def _ask(self, packed: Any) -> Mapping[str, Any]:
+    def _seen(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What the entry is shown, as plain dicts: pickled by us, read by its process, never the other way round.
+
+        Raises:
+            PolicyError: infos lack what it is entitled to.
+        """
+        rows = {agent_id: np.asarray(row) for agent_id, row in observations.items()}
+        if self._path.startswith(SB3_PREFIX):
+            return rows, {}
         try:
-            content = self._process.ask("step", packed, timeout_s=self._answer_s)
+            state = dict(next(iter(infos.values()))["global_state"])
+            raw = {agent_id: dict(infos[agent_id]["unnorm_obs"]) for agent_id in rows}
+        except (KeyError, StopIteration, TypeError) as error:
+            raise PolicyError(f"infos lack {error} for a submission; pass those of MctfEnv.reset or step") from error
+        return rows, {agent_id: {"unnorm_obs": one, "global_state": state} for agent_id, one in raw.items()}
+
+    def _ask(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> Mapping[str, Any]:
+        try:
+            content = self._process.ask("step", observations, infos, timeout_s=self._answer_s)
         except Lost as lost:
             self._lost = str(lost)
             return {}

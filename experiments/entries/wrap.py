@@ -19,8 +19,7 @@ from steerclear.shield.exceptions import ConfigError
 from ..runs.new_file import check_new, check_place, make_folder_of
 from ..runs.store import told_settings
 from .check import check_entry
-from .facts import facts_for
-from .package import code, data, renamed
+from .package import code, data, facts_for, renamed
 from .team import EntryTeam
 
 TEMPLATE = Path(__file__).parent / "shielded_solution.txt"
@@ -102,7 +101,7 @@ def shielded_files(facts: dict[str, Any], preset: str, own: Mapping[str, Path]) 
     """Name of the private package, which hangs on all that is in the zip, and the zip's files by name.
 
     Args:
-        facts: of `facts_for`.
+        facts: of `package.facts_for`.
         preset: rules of the game that they are of.
         own: the entry's files by name.
     """

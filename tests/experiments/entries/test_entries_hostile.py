@@ -6,7 +6,7 @@ import time
 import pytest
 from steerclear import policies
 from steerclear.experiments.entries import process
-from steerclear.experiments.entries.limits import Limits
+from steerclear.experiments.entries.sandbox import Limits
 from steerclear.experiments.entries.team import EntryTeam
 from steerclear.shield.exceptions import PolicyError
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steerclear import policies
-from steerclear.experiments.entries import limits
+from steerclear.experiments.entries import sandbox
 from steerclear.experiments.entries import team as entry_team
 from steerclear.experiments.entries.answers import Unreadable, from_plain, to_plain
-from steerclear.experiments.entries.packing import Packer, Unpacker
 from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
 from steerclear.experiments.play import match
 from steerclear.experiments.play.match import play_match
@@ -85,19 +84,13 @@ def test_whatever_an_entry_says_is_read_without_an_error(content):
         assert found == content
 
 
-def test_steps_are_packed_small_and_unpacked_the_same(game):
-    _, observations, infos = game
-    packer, unpacker = Packer(), Unpacker()
-    for _ in range(2):
-        seen, told = unpacker.unpack(packer.pack(observations, infos))
-        assert list(seen) == list(observations)
-        for agent_id, row in observations.items():
-            np.testing.assert_array_equal(seen[agent_id], row)
-            assert told[agent_id]["unnorm_obs"] == infos[agent_id]["unnorm_obs"]
-            assert list(told[agent_id]["global_state"]) == list(infos[agent_id]["global_state"])
-    assert packer.pack(observations, infos)[2] is None, "keys travel once"
+def test_infos_that_lack_what_an_entry_is_entitled_to_are_told(team_of, game):
+    env, observations, infos = game
+    team = team_of("return 4")
+    team.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
     with pytest.raises(PolicyError, match="infos lack"):
-        packer.pack(observations, {})
+        team.act(observations, {})
+    assert team.act(observations, infos)["agent_0"] == 4
 
 
 def test_only_foreign_code_is_put_apart(write_entry):
@@ -133,7 +126,7 @@ def test_a_model_plays_in_its_own_process_as_in_ours(game, tmp_path):
 
 
 def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_entry, monkeypatch, caplog):
-    monkeypatch.delattr(limits.os, "fork")
+    monkeypatch.delattr(sandbox.os, "fork")
     entry_team._say_once.cache_clear()
     for _ in range(2):
         team = make_team(write_entry("return 4"))
@@ -141,6 +134,6 @@ def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_ent
         team.close()
     assert caplog.text.count("entries cannot be run in a process of their own on this system") == 1
     monkeypatch.undo()
-    assert limits.unlimited() == "" or sys.platform != "linux"
-    monkeypatch.setattr(limits.sys, "platform", "darwin")
-    assert "memory and number of processes of entries are not limited" in limits.unlimited()
+    assert sandbox.unlimited() == "" or sys.platform != "linux"
+    monkeypatch.setattr(sandbox.sys, "platform", "darwin")
+    assert "memory and number of processes of entries are not limited" in sandbox.unlimited()

@@ -20,10 +20,9 @@ from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.entries.facts import facts_for
 from steerclear.experiments.entries.onboard.crew import Crew, _tuples
 from steerclear.experiments.entries.onboard.state import Facts
-from steerclear.experiments.entries.package import code
+from steerclear.experiments.entries.package import code, facts_for
 from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings

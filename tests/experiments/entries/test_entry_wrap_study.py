@@ -1,6 +1,7 @@
 """Ten thousand decisions of real games: the plain shield sends what the compiled one does, and how long it takes."""
 
 import importlib
+import os
 import sys
 import time
 from dataclasses import replace
@@ -10,12 +11,13 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.entries.facts import facts_for
+from steerclear.experiments.entries.package import facts_for
 from steerclear.experiments.entries.wrap import shielded_files
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.platforms import layout as L
 
-GAMES = [("easy", seed) for seed in range(9)] + [("medium", seed) for seed in range(9)]
+SEEDS = int(os.environ.get("STEERCLEAR_STUDY_GAMES", "9"))
+GAMES = [(opponent, seed) for opponent in ("easy", "medium") for seed in range(SEEDS)]
 UNTOLD = [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]
 
 
@@ -69,13 +71,14 @@ def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
             seen = plain["fleet"].Fleet(**{**vars(fleet), "platforms": names})
             edge = plain["surroundings"].Surroundings(around.field)
             begun = time.process_time()
-            found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).sent.values
+            with np.errstate(all="ignore"):
+                found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).sent.values
             spent.append(time.process_time() - begun)
             worst, changed = max(worst, np.abs(found - sent).max()), changed + bool((sent != wanted).any())
     with capsys.disabled():
-        times = np.percentile(spent, [50, 95, 99]) * 1e3
+        times = np.percentile(spent, [50, 95, 99, 100]) * 1e3
         sys.stderr.write(
-            f"\n{len(spent)} decisions, {changed} changed, worst {worst:g}; ms p50 p95 p99: {times.round(1)}\n"
+            f"\n{len(spent)} decisions, {changed} changed, worst {worst:g}; ms p50 p95 p99 max: {times.round(1)}\n"
         )
-    assert len(spent) >= 10_000
-    assert worst <= 1e-6
+    assert len(spent) >= 600 * len(GAMES)
+    assert worst == 0.0, "the same statements give the same bits"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed, sail, sail_games
 from steerclear.experiments.conformance import NotConforming, check_barrier
-from steerclear.experiments.entries.facts import facts_for
+from steerclear.experiments.entries.package import facts_for
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, hints
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
