@@ -33,7 +33,7 @@ STAND_INS = {
     "platforms/registry.py": "registry.py",
 }
 """Modules of the shield that need a compiler or other packages, and what takes their places."""
-CREW = ("crew.py", "state.py")
+ONBOARD_TOP = ("team_shield.py", "state.py")
 """Modules of `onboard` that lie at the private package's top."""
 
 
@@ -41,7 +41,7 @@ CREW = ("crew.py", "state.py")
 def code() -> dict[str, str]:
     """Sources by path inside the package, with ``steerclear`` for its name."""
     files = {"__init__.py": '"""The safety shield of steerclear, as plain Python. BSD-3-Clause."""\n'}
-    files |= {name: (ONBOARD / name).read_text(encoding="utf-8") for name in CREW}
+    files |= {name: (ONBOARD / name).read_text(encoding="utf-8") for name in ONBOARD_TOP}
     files["shield/__init__.py"] = ""
     for path in sorted(SHIELD.rglob("*.py")):
         inside = path.relative_to(SHIELD)
@@ -79,8 +79,8 @@ def data(platforms: Iterable[str | Platform]) -> dict[str, bytes]:
     return files
 
 
-def facts_for(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
-    """The entries of `onboard.state.Facts`, fit for JSON.
+def game_spec(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
+    """The entries of `onboard.state.GameSpec`, fit for JSON.
 
     Args:
         preset: rules of the game.

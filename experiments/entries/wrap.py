@@ -19,13 +19,14 @@ from steerclear.shield.exceptions import ConfigError
 from ..runs.new_file import check_new, check_place, make_folder_of
 from ..runs.store import told_settings
 from .check import check_entry
-from .package import code, data, facts_for, renamed
+from .package import code, data, game_spec, renamed
 from .team import EntryTeam
 
 TEMPLATE = Path(__file__).parent / "shielded_solution.txt"
 PREFIX = "steerclear_"
 """Of private packages' names; the rest tells one content from another, so that two zips can meet in one process."""
-MARK = "crew.py"
+MARKS = ("team_shield.py", "crew.py")
+"""What tells a shielded zip: a module of its package, the second until 0.8."""
 ANSWER_S = 30.0
 """Time an entry has to be built when it is tried, s."""
 TRIED_S = 10.0
@@ -50,12 +51,12 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         ConfigError: the output exists or is no zip, the entry is shielded already, or a setting is unusable.
     """
     check_out(out)
-    facts = facts_for(preset, shield)
+    spec = game_spec(preset, shield)
     stage = Stage(entry)
     try:
         check_bare(stage.folder, entry)
         tried = check_entry(entry, preset, TRIED_S, ANSWER_S)
-        package, files = shielded_files(facts, preset, own_files(stage.folder))
+        package, files = shielded_files(spec, preset, own_files(stage.folder))
         write_zip(out, files)
     finally:
         stage.close()
@@ -71,7 +72,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         "bytes": out.stat().st_size,
         "package": package,
         "preset": preset,
-        "shield": facts["shield"],
+        "shield": spec["shield"],
     }
 
 
@@ -93,22 +94,22 @@ def check_bare(folder: Path, entry: str) -> None:
     Raises:
         ConfigError: it has.
     """
-    if any(folder.glob(f"{PREFIX}*/{MARK}")):
+    if any(path for mark in MARKS for path in folder.glob(f"{PREFIX}*/{mark}")):
         raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
 
 
-def shielded_files(facts: dict[str, Any], preset: str, own: Mapping[str, Path]) -> tuple[str, dict[str, bytes | Path]]:
+def shielded_files(spec: dict[str, Any], preset: str, own: Mapping[str, Path]) -> tuple[str, dict[str, bytes | Path]]:
     """Name of the private package, which hangs on all that is in the zip, and the zip's files by name.
 
     Args:
-        facts: of `package.facts_for`.
+        spec: of `package.game_spec`.
         preset: rules of the game that they are of.
         own: the entry's files by name.
     """
-    made = about(facts, preset)
+    made = about(spec, preset)
     plain: dict[str, bytes] = {name: text.encode() for name, text in code().items()}
-    plain |= data(facts["platforms"])
-    plain["facts.json"] = json.dumps(facts).encode()
+    plain |= data(spec["platforms"])
+    plain["facts.json"] = json.dumps(spec).encode()
     digest = hashlib.sha256()
     for name, content in sorted({**plain, **{f"../{name}": path.read_bytes() for name, path in own.items()}}.items()):
         digest.update(f"{name} {len(content)}\0".encode() + content)
@@ -125,12 +126,10 @@ def shielded_files(facts: dict[str, Any], preset: str, own: Mapping[str, Path]) 
     return package, {**files, ENTRY_FILE: text.encode(), ABOUT_FILE: made.to_bytes()}
 
 
-def about(facts: dict[str, Any], preset: str) -> MadeFor:
+def about(spec: dict[str, Any], preset: str) -> MadeFor:
     """What a shielded zip says of itself."""
-    shield = facts["shield"]
-    return MadeFor(
-        preset, facts["decision_s"], tuple(facts["platforms"]), shield["separation_m"], told_settings(shield)
-    )
+    shield = spec["shield"]
+    return MadeFor(preset, spec["decision_s"], tuple(spec["platforms"]), shield["separation_m"], told_settings(shield))
 
 
 def words_of(made: MadeFor) -> str:

@@ -16,7 +16,7 @@ NORMALISED_M = 1.5
 """Where no boat is farther than this from (0, 0), m, the state is normalised, and tells no metres."""
 
 
-class Facts(NamedTuple):
+class GameSpec(NamedTuple):
     """What a zip knows of its game; lengths in m, times in s, speeds in m/s.
 
     Attributes:
@@ -50,7 +50,7 @@ class Facts(NamedTuple):
     shield: Mapping[str, Any]
 
 
-class Sight(NamedTuple):
+class Observation(NamedTuple):
     """All boats now: (n, N_STATE) rows, and (n,) what the game does with them and who is on the other side."""
 
     rows: Any
@@ -60,16 +60,16 @@ class Sight(NamedTuple):
     visiting: Any
 
 
-def see(facts: Facts, state: Mapping[Any, Any]) -> Sight:
+def see(spec: GameSpec, state: Mapping[Any, Any]) -> Observation:
     """Read the global state.
 
     Raises:
         KeyError, ValueError, TypeError: it lacks a boat, or tells no metres.
     """
-    rows = np.zeros((len(facts.agent_ids), L.N_STATE))
+    rows = np.zeros((len(spec.agent_ids), L.N_STATE))
     rows[:, [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]] = math.nan
-    flags = np.zeros((4, len(facts.agent_ids)), np.bool_)
-    for i, name in enumerate(facts.agent_ids):
+    flags = np.zeros((4, len(spec.agent_ids)), np.bool_)
+    for i, name in enumerate(spec.agent_ids):
         x, y = state[name, "pos"]
         rows[i, [L.X, L.Y]] = float(x), float(y)
         rows[i, L.HEADING], rows[i, L.SPEED] = float(state[name, "heading"]), float(state[name, "speed"])
@@ -77,46 +77,48 @@ def see(facts: Facts, state: Mapping[Any, Any]) -> Sight:
         flags[3, i] = not state.get((name, "on_side"), True)
     if not np.isfinite(rows[:, : L.SPEED + 1]).all() or (np.abs(rows[:, [L.X, L.Y]]) <= NORMALISED_M).all():
         raise ValueError("the global state is normalised or not finite; the shield needs it in metres")
-    return Sight(rows, *flags)
+    return Observation(rows, *flags)
 
 
-def fleet_of(facts: Facts, sight: Sight, team: int, disabled_for_s: Any) -> Fleet:
+def fleet_of(spec: GameSpec, observed: Observation, team: int, disabled_for_s: Any) -> Fleet:
     """The fleet to decide for: the team's boats but those that the game drives."""
-    half = len(facts.agent_ids) // 2
+    half = len(spec.agent_ids) // 2
     teams = np.array([0] * half + [1] * half)
-    driven = sight.tagged | sight.oob | sight.disabled
+    driven = observed.tagged | observed.oob | observed.disabled
     rows = None
     if driven.any():
-        rows = np.array([_drive(facts, sight, i, int(teams[i]), disabled_for_s[i]) for i in range(2 * half)])
+        rows = np.array([_drive(spec, observed, i, int(teams[i]), disabled_for_s[i]) for i in range(2 * half)])
     ours = (teams == team) & ~driven
-    return Fleet(sight.rows, teams, facts.platforms, ours, facts.agent_ids, driven=rows, visiting=sight.visiting)
+    return Fleet(observed.rows, teams, spec.platforms, ours, spec.agent_ids, driven=rows, visiting=observed.visiting)
 
 
-def _drive(facts: Facts, sight: Sight, i: int, team: int, disabled_for_s: float) -> tuple[float, float, float, float]:
+def _drive(
+    spec: GameSpec, observed: Observation, i: int, team: int, disabled_for_s: float
+) -> tuple[float, float, float, float]:
     """What drives a boat, as in `Fleet.driven`."""
-    if sight.disabled[i]:
+    if observed.disabled[i]:
         return 0.0, math.nan, math.nan, disabled_for_s
-    if sight.tagged[i]:
-        return _home(facts, sight, i, team)
-    return _in(facts, sight, i) if sight.oob[i] else UNKNOWN
+    if observed.tagged[i]:
+        return _home(spec, observed, i, team)
+    return _in(spec, observed, i) if observed.oob[i] else UNKNOWN
 
 
-def _home(facts: Facts, sight: Sight, i: int, team: int) -> tuple[float, float, float, float]:
-    position, speed = sight.rows[i, [L.X, L.Y]], float(sight.rows[i, L.SPEED])
-    share = min(facts.tag_share, facts.oob_share) if sight.oob[i] else facts.tag_share
-    commanded = share * _top_mps(facts, i)
-    mark = nearest(position, np.array(facts.marks[team], dtype=np.float64))
-    until_s = time_until(position, np.array(facts.ends[team]), facts.untag_m, max(commanded, speed))
+def _home(spec: GameSpec, observed: Observation, i: int, team: int) -> tuple[float, float, float, float]:
+    position, speed = observed.rows[i, [L.X, L.Y]], float(observed.rows[i, L.SPEED])
+    share = min(spec.tag_share, spec.oob_share) if observed.oob[i] else spec.tag_share
+    commanded = share * _top_mps(spec, i)
+    mark = nearest(position, np.array(spec.marks[team], dtype=np.float64))
+    until_s = time_until(position, np.array(spec.ends[team]), spec.untag_m, max(commanded, speed))
     return commanded, float(mark[0]), float(mark[1]), float(until_s)
 
 
-def _in(facts: Facts, sight: Sight, i: int) -> tuple[float, float, float, float]:
-    speed, commanded = float(sight.rows[i, L.SPEED]), facts.oob_share * _top_mps(facts, i)
-    place, beyond_m = inwards(sight.rows[i, [L.X, L.Y]], np.array(facts.size))
+def _in(spec: GameSpec, observed: Observation, i: int) -> tuple[float, float, float, float]:
+    speed, commanded = float(observed.rows[i, L.SPEED]), spec.oob_share * _top_mps(spec, i)
+    place, beyond_m = inwards(observed.rows[i, [L.X, L.Y]], np.array(spec.size))
     return commanded, float(place[0]), float(place[1]), float(beyond_m) / max(commanded, speed, LEAST_MPS)
 
 
-def _top_mps(facts: Facts, i: int) -> float:
+def _top_mps(spec: GameSpec, i: int) -> float:
     from steerclear.shield.platforms import get_platform
 
-    return float(get_platform(facts.platforms[i]).max_speed_mps)
+    return float(get_platform(spec.platforms[i]).max_speed_mps)

@@ -11,7 +11,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.entries.package import facts_for
+from steerclear.experiments.entries.package import game_spec
 from steerclear.experiments.entries.wrap import shielded_files
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.platforms import layout as L
@@ -55,7 +55,7 @@ def noted_in(opponent, seed, settings):
 
 @pytest.mark.study
 def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
-    facts = facts_for("mctf2026", {"separation_m": 4.0})
+    facts = game_spec("mctf2026", {"separation_m": 4.0})
     package, files = shielded_files(facts, "mctf2026", {})
     for name, content in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from steerclear import policies
-from steerclear.experiments.entries.package import facts_for
+from steerclear.experiments.entries.package import game_spec
 from steerclear.experiments.play.match import Match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield import Shield, ShieldConfig
@@ -23,7 +23,7 @@ def played(opponent, seed, when):
     shield = {"separation_m": RADIUS_M} if when == "each move" else None
     match = Match(MatchSpec("mctf2026", "medium", opponent, seed=seed, shield=shield, judge="none"))
     if when == "once":
-        settings = ShieldConfig.of(**facts_for("mctf2026", {"separation_m": RADIUS_M})["shield"])
+        settings = ShieldConfig.of(**game_spec("mctf2026", {"separation_m": RADIUS_M})["shield"])
         match.seat(0, Shield(settings).wrap(policies.make("medium")))
     try:
         return match.play()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed, sail, sail_games
 from steerclear.experiments.conformance import NotConforming, check_barrier
-from steerclear.experiments.entries.package import facts_for
+from steerclear.experiments.entries.package import game_spec
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, hints
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
@@ -254,8 +254,8 @@ def test_names_are_checked_when_a_shield_is_built():
 def test_a_zip_refuses_them_by_name():
     register_barrier(Barrier("ferry", ferrys, values=FERRY))
     with pytest.raises(ConfigError, match="cannot carry registered barriers \\(ferry\\)"):
-        facts_for("mctf2026", {"barriers": ("ferry",)})
-    assert json.dumps(facts_for("mctf2026", {})["shield"]["barriers"]) == "[]"
+        game_spec("mctf2026", {"barriers": ("ferry",)})
+    assert json.dumps(game_spec("mctf2026", {})["shield"]["barriers"]) == "[]"
 
 
 def test_a_good_barrier_conforms_and_others_are_told_why():
