@@ -20,6 +20,7 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.extras import install_command
 
 from .guard import Answer, ForeignCode, GuardedTeam, game_facts
+from .protocol import TeamPolicy
 from .submissions.stage import ENTRY_FILE, check_members
 
 ALGORITHMS = ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG")
@@ -205,14 +206,31 @@ def _is_unit_box(space: Any) -> bool:
     return low is not None and high is not None and bool(np.all(low == -1.0) and np.all(high == 1.0))
 
 
+def trained_here(path: str | Path) -> bool:
+    """Whether a model is one of ``steerclear train``, by the card in its zip: its numbers play, its pickles never run.
+
+    A file that cannot be read is none.
+    """
+    from .entrants.learned.sb3_file import read_card
+
+    try:
+        return bool(read_card(Path(path).expanduser()).get("trained_with"))
+    except PolicyError:
+        return False
+
+
 def load_sb3(
     path: str | Path,
     algorithm: str | None = None,
     name: str | None = None,
     allow_code: bool | None = None,
     max_bytes: int = MAX_BYTES,
-) -> GuardedTeam:
-    """A saved Stable-Baselines3 model as a team policy. Loading runs code of whoever made it; that is logged before.
+) -> TeamPolicy:
+    """A saved Stable-Baselines3 model as a team policy.
+
+    One of ``steerclear train`` plays what was trained: its tensors are read as `load_weights` reads exported ones, with
+    its interval and its networks by place, and no code of it runs. Any other is asked anew in every step of the game,
+    and loading it runs code of whoever made it; that is logged before.
 
     Args:
         path: the zip ``model.save`` wrote.
@@ -225,4 +243,9 @@ def load_sb3(
     Raises:
         PolicyError: the extra ``[train]`` is missing, the file is no such model, too large, or refused.
     """
+    if algorithm is None and trained_here(path):
+        from .entrants.learned.play import LearnedTeam
+        from .entrants.learned.sb3_file import read_sb3
+
+        return LearnedTeam(read_sb3(path), name or Path(path).stem)
     return GuardedTeam(name or Path(path).stem, Sb3Code(path, algorithm, allow_code, max_bytes))

@@ -16,6 +16,7 @@ from steerclear.policies.guard import Fault, check_observed, game_facts
 from steerclear.policies.protocol import Action, TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.report import PolicyReport, Reporter
+from steerclear.policies.sb3 import trained_here
 from steerclear.policies.submissions.made_for import check_game, made_for
 from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import PolicyError
@@ -191,8 +192,13 @@ def _check_exists(path: str) -> None:
 
 
 def is_entry(name: str) -> bool:
-    """Whether a policy's name is that of foreign code: a path, or ``sb3:`` and one. Exported weights are numbers."""
+    """Whether a policy's name is that of foreign code: a path, or ``sb3:`` and one.
+
+    Exported weights are numbers, and so is what is read of models of ``steerclear train``.
+    """
     if name.startswith(WEIGHTS_PREFIX):
+        return False
+    if name.startswith(SB3_PREFIX) and trained_here(name.removeprefix(SB3_PREFIX)):
         return False
     return name not in policies.names() and (name.startswith(SB3_PREFIX) or looks_like_path(name))
 

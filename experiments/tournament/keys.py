@@ -25,6 +25,7 @@ _SIDE = {
 TOURNAMENT_GAME = {
     "phase": "qualifying or final",
     "state": "which teams were shielded: off, all, or names",
+    "examined": "side of the team whose qualifying game it is; empty in the final",
     "blue": "team on the left",
     "red": "team on the right",
     "repetition": "number; the same in all pairs, on both sides and in all states starts from the same seed",

@@ -35,6 +35,7 @@ def _header(job: GameJob, result: MatchResult) -> dict[str, Any]:
     return {
         "phase": job.phase,
         "state": job.state,
+        "examined": job.examined,
         "blue": label(spec.own),
         "red": label(spec.opponent),
         "repetition": spec.game,

@@ -106,7 +106,7 @@ def silent_teams(rows: Sequence[Row]) -> list[str]:
 
 
 def _qualifying(rows: Sequence[Row], settings: TournamentSettings) -> list[dict[str, Any]]:
-    """Mean primary score per game of each team in each state, best first."""
+    """Mean primary score per game of each team in each state, best first; each is scored by its own games alone."""
     table = []
     for state in settings.states:
         for team in (label(name) for name in settings.teams):
@@ -114,7 +114,7 @@ def _qualifying(rows: Sequence[Row], settings: TournamentSettings) -> list[dict[
                 (row, side)
                 for row in rows
                 for side in SIDES
-                if row["phase"] == QUALIFYING and row["state"] == state and row[side] == team
+                if row["phase"] == QUALIFYING and row["state"] == state and row["examined"] == side and row[side] == team
             ]
             if seats:
                 scores = [_primary(row, side, settings.penalty) for row, side in seats]

@@ -13,7 +13,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..measure.score import DEFAULT_PENALTY
 from ..measure.tally import RADII_M
-from ..play.spec import ANSWER_S, MatchSpec, near
+from ..play.spec import ANSWER_S, SIDES, MatchSpec, near
 from ..runs.store import key_of
 from .paper import SCRIPTED
 
@@ -32,17 +32,19 @@ class GameJob:
         state: which teams are shielded, as given on the command line.
         spec: the game.
         separation_m: radius at which hits are counted.
+        examined: side of the team whose qualifying game this is; empty in the final.
     """
 
     phase: str
     state: str
     spec: MatchSpec
     separation_m: float = RADII_M[0]
+    examined: str = ""
 
     @property
     def key(self) -> str:
         """Name under which the result is kept; which state asked for the game does not matter."""
-        return key_of({"phase": self.phase, "state": self.state, "game": self.spec.key})
+        return key_of({"phase": self.phase, "state": self.state, "examined": self.examined, "game": self.spec.key})
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ class TournamentSettings:
     def qualifying_games(self) -> list[GameJob]:
         """Every team against the organisers' opponents, on both sides."""
         return [
-            self._job(QUALIFYING, state, *(pair if side == 0 else pair[::-1]), self._round(number), number)
+            self._job(QUALIFYING, state, *(pair if side == 0 else pair[::-1]), self._round(number), number, SIDES[side])
             for team in self.teams
             for number, examiner in enumerate(EXAMINERS)
             for pair in [(team, examiner)]
@@ -131,7 +133,7 @@ class TournamentSettings:
         """Number by which the hidden team chooses its composition."""
         return max(number - EXAMINERS.index("hidden"), 0)
 
-    def _job(self, phase: str, state: str, blue: str, red: str, game: int, turn: int) -> GameJob:
+    def _job(self, phase: str, state: str, blue: str, red: str, game: int, turn: int, examined: str = "") -> GameJob:
         shielded = shielded_in(state, [label(team) for team in self.teams])
         covers = [dict(self.shield) if label(team) in shielded else None for team in (blue, red)]
         spec = MatchSpec(
@@ -151,7 +153,7 @@ class TournamentSettings:
             trust=self.trust,
             answer_s=self.answer_s,
         )
-        return GameJob(phase, state, spec, self.separation_m)
+        return GameJob(phase, state, spec, self.separation_m, examined)
 
 
 def label(team: str) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.bridge.fleet_yaml import read_settings
+from steerclear.shield.exceptions import ConfigError, FleetFileError
 
 from .settings import TrainingSettings, settings_of
 
@@ -26,9 +26,10 @@ def _content(path: Path) -> Any:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise ConfigError(f"{path} is larger than {MOST_BYTES} bytes; give a config file (docs/train.md)")
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return read_settings(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"cannot read {path} ({error.strerror}); give a config file (docs/train.md)") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        why = " ".join(str(error).split())[:200]
-        raise ConfigError(f"{path} is no YAML ({why}); give a config file (docs/train.md)") from error
+    except FleetFileError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    except ValueError as error:
+        raise ConfigError(f"{path} is no text in UTF-8 ({error}); give a config file (docs/train.md)") from error

@@ -131,8 +131,8 @@ class BoatPolicy(ActorCriticPolicy):
 
 
 def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
-    """The actor of a policy in numpy."""
-    tensors = {name: value.detach().cpu().numpy() for name, value in policy.state_dict().items()}
+    """The actor of a policy in numpy, as it is now: no memory is shared with what learns on."""
+    tensors = {name: value.detach().cpu().numpy().copy() for name, value in policy.state_dict().items()}
     return network_of_tensors(tensors, activation, None, card)
 
 

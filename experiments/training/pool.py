@@ -37,7 +37,7 @@ def opponent_of(name: str, every: int = 1) -> Any:
 
 
 class Pool:
-    """A `BatchPolicy` made of several.
+    """A `BatchPolicy` made of several. A game keeps its opponent to its end, also a snapshot that is no longer drawn.
 
     Args:
         stage: whose opponents they are, and how long they wait between tags; "self" among them stands for the snapshots
@@ -61,21 +61,21 @@ class Pool:
         self._core: Any = None
 
     def add_snapshot(self, network: Network, number: int) -> None:
-        """Add the learner as it is; the oldest snapshot goes where there are too many."""
+        """Add the learner as it is; the oldest snapshot is drawn no more where there are too many."""
         name = f"{SELF}_{number}"
-        ours = [one for one in self.members if one.startswith(f"{SELF}_")]
+        ours = [one for one in self.scores if one.startswith(f"{SELF}_")]
         if len(ours) >= self.league.keep:
-            self._drop(ours[0])
+            del self.scores[ours[0]]
+            self._forget_unused()
         self.members[name] = LearnedBatch(network, name, sample=network.kind == "discrete")
         self.scores[name] = deque(maxlen=LAST)
         if self._core is not None:
             self.members[name].reset(self._core, self._team, self._seed)
 
-    def _drop(self, name: str) -> None:
-        del self.members[name], self.scores[name]
-        if self._core is not None:
-            for game in np.flatnonzero(self.playing == name):
-                self.playing[game] = self._draw()
+    def _forget_unused(self) -> None:
+        """Let go of snapshots that are not drawn any more and that no game plays against."""
+        still = set(self.scores) | (set() if self._core is None else set(self.playing))
+        self.members = {name: member for name, member in self.members.items() if name in still}
 
     def reset(self, core: Any, team: int, seed: int) -> None:
         """Begin all games."""
@@ -97,6 +97,7 @@ class Pool:
             member.restart(chosen, seed)
         for game in np.flatnonzero(chosen):
             self.playing[game] = self._draw()
+        self._forget_unused()
         self.waits_s[chosen] = self._waits(int(np.sum(chosen)))
 
     def act(self, core: Any, team: int) -> Array:

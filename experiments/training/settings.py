@@ -102,8 +102,8 @@ class Ppo:
 
     def __post_init__(self) -> None:
         count("critic_first", self.critic_first, 0, 10**6)
-        for name, most in (("steps", 100_000), ("batch", 10**7), ("epochs", 1000)):
-            count(name, getattr(self, name), 1, most)
+        for name, least, most in (("steps", 1, 100_000), ("batch", 2, 10**7), ("epochs", 1, 1000)):
+            count(name, getattr(self, name), least, most)
         for name in ("learning_rate", "clip", "max_grad_norm"):
             number(name, getattr(self, name), 1e-9, 1e3)
         for name in ("discount", "gae_lambda"):
@@ -246,6 +246,12 @@ class TrainingSettings:
         count("entrants_every", self.entrants_every, 1, 1000)
         count("threads", self.threads, 1, 1024)
         count("checkpoint_every", self.checkpoint_every, 1, 10**6)
+        learners = self.games * self.game().team_size
+        if self.algorithm in ("ppo", "qmix+ppo") and self.ppo.steps * learners < 2:
+            raise ConfigError(
+                f"ppo.steps is {self.ppo.steps} and games {self.games}, so that a rollout holds one decision; "
+                "PPO needs 2, give more of either"
+            )
         if not self.stages:
             raise ConfigError("stages is empty; give one stage at least, such as [{opponents: [medium]}]")
         for name, weight in self.rewards.items():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
-from .pool import Pool
+from .pool import LAST, Pool
 
 _PLAIN = (bool, int, float, str)
 
@@ -54,6 +55,7 @@ def pool_facts(pool: Pool) -> dict[str, Any]:
     """What a pool remembers beside arrays."""
     return {
         "members": list(pool.members),
+        "seed": pool._seed,
         "playing": [str(name) for name in pool.playing],
         "waits_s": pool.waits_s.tolist(),
         "scores": {name: list(scores) for name, scores in pool.scores.items()},
@@ -63,11 +65,10 @@ def pool_facts(pool: Pool) -> dict[str, Any]:
 
 def put_pool(pool: Pool, facts: dict[str, Any]) -> None:
     """Put what `pool_facts` told into a pool with the same members."""
+    pool._seed = facts["seed"]
     pool.playing[:] = facts["playing"]
     pool.waits_s[:] = facts["waits_s"]
-    for name, scores in facts["scores"].items():
-        pool.scores[name].clear()
-        pool.scores[name].extend(scores)
+    pool.scores = {name: deque(scores, maxlen=LAST) for name, scores in facts["scores"].items()}
     pool._rng.bit_generator.state = facts["rng"]
 
 

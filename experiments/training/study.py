@@ -16,6 +16,7 @@ from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
 from ..runs.failed_jobs import end_failed
+from ..runs.folder_lock import lock_folder
 from ..runs.json_file import read_json
 from ..runs.pool import run_all
 from ..runs.provenance import machine, versions
@@ -147,8 +148,10 @@ def _rows_of(training: Training) -> dict[Cell, list[dict[str, Any]]]:
 
 def _cell_rows(base: TrainingSettings, cell: Cell, folder: Path, games: int) -> list[dict[str, Any]]:
     settings, place = settings_of_cell(base, cell), folder / cell.training
-    if not (place / "final.npz").exists():
-        training_of(settings, place, resume=True).run()
+    place.mkdir(parents=True, exist_ok=True)
+    lock = lock_folder(place)  # a worker of a study that was killed may still be at it
+    training_of(settings, place, resume=True).run()  # of one that is finished nothing is left to do
+    del lock
     network = read_weights(place / "final.npz")
     curve = read_json(place / CURVE, "the curve of a training", "delete its folder to train it again")
     learning = learning_of(curve["rows"])

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from steerclear.env.whole_file import whole_file
+from steerclear.policies.entrants.learned import LearnedBatch
 from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
@@ -80,8 +82,9 @@ class Training:
         write_weights(self.learner.network(), self.folder / FINAL)
         if not (self.folder / BEST).exists():
             write_weights(self.learner.network(), self.folder / BEST)
-        self.learner.model.save(self.folder / MODEL)
-        add_card(self.folder / MODEL, {**card_of(self.settings), TAKES_OVER: self.learner.first is not None})
+        with whole_file(self.folder / MODEL, ConfigError) as part:  # never without its card
+            self.learner.model.save(part)
+            add_card(part, {**card_of(self.settings), TAKES_OVER: self.learner.first is not None})
 
     def _iterate(self) -> None:
         began = time.perf_counter()
@@ -246,8 +249,8 @@ class Training:
         pool.members = {name: one for name, one in pool.members.items() if name in facts["pool"]["members"]}
         for name in facts["pool"]["members"]:
             if name not in pool.members:
-                number = int(name.removeprefix(f"{SELF}_"))
-                pool.add_snapshot(read_weights(self.folder / SNAPSHOTS / f"{name}.npz"), number)
+                network = read_weights(self.folder / SNAPSHOTS / f"{name}.npz")
+                pool.members[name] = LearnedBatch(network, name, sample=network.kind == "discrete")
         self.batch.reset(facts["seed"])
         put_pool(pool, facts["pool"])
         self.learner.put(arrays)

@@ -15,7 +15,7 @@ from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
 from steerclear.experiments.tournament.pages import subtitle, write_html, write_markdown
 from steerclear.experiments.tournament.play import play_game
 from steerclear.experiments.tournament.replays import chosen_games
-from steerclear.experiments.tournament.results import results_of, silent_teams
+from steerclear.experiments.tournament.results import _qualifying, results_of, silent_teams
 from steerclear.experiments.tournament.settings import GameJob, TournamentSettings, label
 from steerclear.shield.exceptions import ConfigError
 
@@ -169,10 +169,32 @@ def test_the_best_of_the_qualifying_go_on(tmp_path, monkeypatch):
     assert {row["blue"] for row in run.rows() if row["phase"] == "final"} == {"ohto", "hold"}
 
 
+def test_a_team_that_examines_others_too_is_scored_by_its_own_games_alone(tmp_path, monkeypatch):
+    """`medium` wins all ten of its own, and loses the games in which it examines others."""
+
+    def played_game(job: GameJob):
+        names = {"blue": label(job.spec.own), "red": label(job.spec.opponent)}
+        row = {"phase": job.phase, "state": job.state, **names, "examined": job.examined}
+        row |= {"repetition": job.spec.game, "steps": 1}
+        for side, name in names.items():
+            won = 3 if name in ("ohto", "meo") and "medium" in names.values() else 2 if name == "medium" else 0
+            row |= {f"{side}_captures": won, f"{side}_collisions": 0}
+        return row
+
+    monkeypatch.setattr(played, "play_game", played_game)
+    chosen = settings(teams=("ohto", "meo", "medium", "easy"), qualifying=True, finalists=2)
+    run = Tournament(chosen, ResultStore(tmp_path / "run"))
+    run.run()
+    table = {line["team"]: line for line in _qualifying(run.rows(), chosen)}
+    assert {line["games"] for line in table.values()} == {10}
+    assert table["medium"]["score"] == 1.6  # two games against itself are drawn
+    assert "medium" in {row["blue"] for row in run.rows() if row["phase"] == "final"}
+
+
 def played_by_rank(job: GameJob):
     """A game in which meo never captures and all others do."""
     row = {"phase": job.phase, "state": job.state, "blue": job.spec.own, "red": job.spec.opponent}
-    row |= {"repetition": job.spec.game, "steps": 1}
+    row |= {"repetition": job.spec.game, "steps": 1, "examined": job.examined}
     for side in ("blue", "red"):
         row |= {f"{side}_captures": int(row[side] in ("ohto", "hold")), f"{side}_collisions": 0}
     return row

@@ -88,8 +88,8 @@ def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tm
 
     base = settings_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
     spoiled = tmp_path / "training-collision_on-seed_0"
-    spoiled.mkdir()
-    (spoiled / "final.npz").write_bytes(b"no weights")
+    (spoiled / "checkpoints").mkdir(parents=True)
+    (spoiled / "checkpoints" / "00000001.npz").write_bytes(b"no checkpoint")
     with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
         run_study(base, tmp_path, 1, 1, lambda done, words: None)
     assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7

@@ -4,9 +4,12 @@ from steerclear.experiments.training.config_file import read_config
 from steerclear.experiments.training.each_game import EachGame
 from steerclear.experiments.training.games import core_of, learners_of
 from steerclear.experiments.training.pool import Pool
-from steerclear.experiments.training.settings import League, Stage, settings_of
+from steerclear.experiments.training.settings import SELF, League, Stage, settings_of
+from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.platforms import layout as L
+
+NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +39,7 @@ def test_a_file_that_is_none_or_no_yaml(tmp_path):
     with pytest.raises(ConfigError, match="cannot read"):
         read_config(tmp_path / "none.yaml")
     (tmp_path / "bad.yaml").write_text("a: [")
-    with pytest.raises(ConfigError, match="is no YAML"):
+    with pytest.raises(ConfigError, match="bad.yaml: line "):
         read_config(tmp_path / "bad.yaml")
 
 
@@ -60,6 +63,25 @@ def test_those_who_beat_the_learner_come_more_often():
     assert pool.weights() == pytest.approx({"hold": 0.1, "easy": 1.1})
     draws = [pool._draw() for _ in range(600)]
     assert 0.85 < draws.count("easy") / 600 < 0.97
+
+
+def test_a_game_keeps_its_opponent_to_its_end():
+    """Also a snapshot that made room for a later one: it is drawn no more."""
+    core = core_of(settings_of({}), 20, 0)
+    core.reset(seed=0)
+    pool = Pool(Stage(("hold", SELF)), League(keep=1), 0)
+    network = Network([np.zeros((1, core.n_obs, 17), np.float32)], [np.zeros((1, 17), np.float32)], NONE, "tanh",
+                      "discrete", 10, core.n_obs)  # fmt: skip
+    pool.add_snapshot(network, 1)
+    pool.reset(core, 1, 0)
+    before = pool.playing.copy()
+    assert set(before) == {"hold", "self_1"}
+    pool.add_snapshot(network, 2)
+    pool.act(core, 1)
+    assert (pool.playing == before).all()
+    pool.restart(np.ones(20, np.bool_), 1)
+    assert set(pool.playing) == {"hold", "self_2"}
+    assert set(pool.members) == {"hold", "self_2"}
 
 
 def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_rules_say():
