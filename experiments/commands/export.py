@@ -14,15 +14,14 @@ from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 
 from ..runs.new_file import NEW
-from ..training.checkpoints import is_checkpoint, network_in
-from ..training.submission import write_submission
+from ..training.export import write_submission
 from .console import command, out
 from .files import check_ending
 
 Model = Annotated[
     Path,
     typer.Argument(
-        metavar="MODEL", help="A model.zip of PPO or A2C, exported weights or a training's checkpoint (.npz)."
+        metavar="MODEL", help="A model.zip of PPO or A2C, a training's checkpoint (.zip) or exported weights (.npz)."
     ),
 ]
 Weights = Annotated[
@@ -60,7 +59,7 @@ def export(model: Model, file: Weights = None, submission: Submission = None, in
 
 def _read(model: Path, interval: int | None) -> Network:
     if model.suffix.lower() == ".npz":
-        network = network_in(model) if is_checkpoint(model) else read_weights(model)
+        network = read_weights(model)
         return network if interval is None else _held(network, interval)
     return read_sb3(model, interval)
 

@@ -14,7 +14,6 @@ from steerclear.shield.extras import install_command
 
 from ..runs.folder_lock import lock_folder
 from ..training.config_file import read_config
-from ..training.unused import check_used
 from .console import Interrupted, command, err, out
 from .plain_progress import PlainProgress
 
@@ -34,7 +33,6 @@ def train(config: Config, out_folder: Folder = None, resume: Resume = False) -> 
     Exit status: 0 done, 2 bad input or a loss that is not finite, 130 interrupted (all is kept, --resume goes on).
     """
     settings = read_config(config)
-    check_used(settings)
     folder = out_folder or Path("trainings") / config.stem
     if settings.algorithm != "cloning":
         check_extra()
@@ -67,13 +65,13 @@ def check_extra() -> None:
 
 
 def _training_of(settings: Any, folder: Path, resume: bool) -> Any:
-    from ..training.algorithms import training_of
+    from ..training.training import training_of
 
     return training_of(settings, folder, resume)
 
 
 def _run(training: Any, folder: Path) -> None:
-    total = training.settings.decisions
+    total = training.total
     if training.decisions >= total:
         err().print(
             f"nothing was left to do: all {total:,} decisions were made before; more decisions in the config go on "

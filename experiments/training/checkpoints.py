@@ -1,75 +1,74 @@
-"""Checkpoints: one ``.npz`` each, whole or not at all, read without running code."""
+"""Checkpoints: a model as Stable-Baselines3 saves it, and the state of the games; none of its pickles is read."""
 
 from __future__ import annotations
 
 import json
 import zipfile
 import zlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from steerclear.env.whole_file import whole_file
-from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.entrants.learned.sb3_file import network_of_tensors
+from steerclear.policies.entrants.learned.sb3_file import add_card
 from steerclear.shield.exceptions import ConfigError
 
 FOLDER, KEEP = "checkpoints", 2
-_UNUSABLE = (KeyError, ValueError, TypeError, IndexError)
+FACTS, ARRAYS = "steerclear_training.json", "steerclear_games.npz"
 _DAMAGED = (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError, zlib.error)
 
 
-def write_checkpoint(folder: Path, number: int, facts: dict[str, Any], arrays: dict[str, np.ndarray]) -> Path:
+def write_model(model: Any, to: Path | BytesIO, card: dict[str, Any], facts: Any = None, arrays: Any = None) -> None:
+    """Save a model with its card, and where facts are given with the state of a training; whole or not at all.
+
+    Raises:
+        ConfigError: it cannot be written.
+    """
+    file = BytesIO()
+    model.save(file)
+    add_card(file, card)
+    if facts is not None:
+        content = BytesIO()
+        names = list(arrays)
+        np.savez(content, **{f"a{k}": arrays[name] for k, name in enumerate(names)})
+        with zipfile.ZipFile(file, "a") as archive:
+            archive.writestr(FACTS, json.dumps({**facts, "names": names}))
+            archive.writestr(ARRAYS, content.getvalue())
+    if isinstance(to, BytesIO):
+        to.write(file.getvalue())
+    else:
+        with whole_file(to, ConfigError) as part:
+            part.write_bytes(file.getvalue())
+
+
+def write_checkpoint(folder: Path, content: bytes) -> None:
     """Write a checkpoint, then forget all but the last `KEEP`.
 
     Raises:
         ConfigError: it cannot be written.
     """
-    path = folder / FOLDER / f"{number:08d}.npz"
-    names = list(arrays)
-    with whole_file(path, ConfigError) as part, part.open("wb") as file:
-        content = {f"a{k}": arrays[name] for k, name in enumerate(names)}
-        np.savez(file, facts=np.array(json.dumps({**facts, "names": names})), **content)
-    for old in checkpoints_in(folder)[:-KEEP]:
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        number = json.loads(archive.read(FACTS))["rollouts"]
+    with whole_file(folder / FOLDER / f"{number:08d}.zip", ConfigError) as part:
+        part.write_bytes(content)
+    for old in sorted((folder / FOLDER).glob("[0-9]*.zip"))[:-KEEP]:
         old.unlink(missing_ok=True)
-    return path
 
 
-def is_checkpoint(path: Path) -> bool:
-    """Whether a file is a checkpoint of a training, and not weights or something else."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return "facts.npy" in archive.namelist()
-    except _DAMAGED:
-        return False
-
-
-def network_in(path: Path) -> Network:
-    """The actor that a checkpoint holds, as weights to play.
+def newest(folder: Path) -> Path | None:
+    """The last checkpoint of a training; None where there is none.
 
     Raises:
-        ConfigError: it is damaged, or holds only one network of two.
+        ConfigError: there are only those of an older version.
     """
-    facts, arrays = read_checkpoint(path)
-    at = "policy/"
-    tensors = {name.removeprefix(at): array for name, array in arrays.items() if name.startswith(at)}
-    try:
-        settings = facts["settings"]
-        if settings["options"]:
-            raise ConfigError(
-                f"{path} holds one network of two; go on with the training (--resume), which writes both to final.npz"
-            )
-        card = {"trained_with": "steerclear train", "preset": settings["preset"], "source": path.name}
-        return network_of_tensors(tensors, settings["net"]["activation"], None, card)
-    except ConfigError:
-        raise  # a kind of ValueError; says already what to do
-    except _UNUSABLE as error:
-        raise ConfigError(f"{path} holds no network this version can play ({type(error).__name__}: {error})") from error
-
-
-def checkpoints_in(folder: Path) -> list[Path]:
-    """Checkpoints, the oldest first."""
-    return sorted((folder / FOLDER).glob("[0-9]*.npz"))
+    found = sorted((folder / FOLDER).glob("[0-9]*.zip"))
+    if not found and any((folder / FOLDER).glob("[0-9]*.npz")):
+        raise ConfigError(
+            f"{folder} holds a training of 0.8.0 or before, which only that version goes on with; its best.npz and "
+            "final.npz play here and can be the start of another (start), in another --out"
+        )
+    return found[-1] if found else None
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -79,8 +78,10 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         ConfigError: it is cut short or none.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
-            facts = json.loads(str(found["facts"]))
+        with zipfile.ZipFile(path) as archive:
+            facts = json.loads(archive.read(FACTS))
+            content = BytesIO(archive.read(ARRAYS))
+        with np.load(content, allow_pickle=False) as found:
             return facts, {name: found[f"a{k}"] for k, name in enumerate(facts.pop("names"))}
     except _DAMAGED as error:
         why = " ".join(str(error).split())[:120] or type(error).__name__

@@ -17,80 +17,59 @@ from steerclear.policies.entrants.learned.teacher import Teacher
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import install_command
 
-from .checks import check_options
-from .curve import write_curve
-from .games import core_of
-from .settings import TrainingSettings
+from .config import CloningConfig, CloningOptions
+from .env import core_of
+from .training import BEST, FINAL, Notice, Training
 
-DEMONSTRATIONS = "demonstrations"
-RANGES = {
-    "epochs": (int, 1, 10**6),
-    "rate": (float, 1e-9, 1e3),
-    "hidden": (int, 1, 4096),
-    "batch": (int, 1, 10**7),
-}
-"""Options beside the demonstrations."""
 HELD_OUT = 0.2
 
 
-class CloningTraining:
+class CloningTraining(Training):
     """Demonstrations of the scripted demonstrator (or of people, from Parquet), and a network that chooses as it does.
 
     Args:
-        settings: ``options`` may hold ``demonstrations`` (a file of ``steerclear demonstrate``; none: games of the
-            scripted demonstrator, as many as ``games``), ``epochs``, ``rate``, ``hidden`` and ``batch``.
+        config: what it is to be; ``games`` are played where no demonstrations are given.
         folder: where everything goes.
         resume: is not looked at: it takes seconds.
-
-    Raises:
-        ConfigError: an option that is unknown or cannot be, or demonstrations that are none.
     """
 
-    def __init__(self, settings: TrainingSettings, folder: Path, resume: bool = False) -> None:
-        numbers = {name: value for name, value in settings.options.items() if name != DEMONSTRATIONS}
-        check_options("cloning", numbers, RANGES)
-        if not isinstance(settings.options.get(DEMONSTRATIONS, ""), str):
-            raise ConfigError("options.demonstrations is no name of a file; give one of steerclear demonstrate")
-        self.settings, self.folder, self.decisions = settings, folder, 0
+    def __init__(self, config: CloningConfig, folder: Path, resume: bool = False) -> None:
+        super().__init__(config, folder)
+        self.total = config.games
 
-    def run(self, notice: Any = lambda done, words: None) -> None:
-        """Play or read, learn, write."""
-        options = self.settings.options
-        source = options.get(DEMONSTRATIONS)
+    def run(self, notice: Notice = lambda done, words: None) -> None:
+        """Play or read, learn, write.
+
+        Raises:
+            ConfigError: demonstrations that are none.
+        """
+        source = self.config.options.demonstrations
         rows = _read(Path(source)) if source else self._played(notice)
-        chooser, curve = fitted(
-            rows,
-            int(options.get("epochs", 200)),
-            float(options.get("rate", 3e-3)),
-            int(options.get("hidden", 64)),
-            int(options.get("batch", 256)),
-            self.settings.seed,
-            {"demonstrations": "people" if source else "scripted demonstrator", "rows": len(rows)},
-        )
-        write_chooser(chooser, self.folder / "final.npz")
-        write_chooser(chooser, self.folder / "best.npz")
-        write_curve(self.folder, curve, self.settings)
-        self.decisions = self.settings.decisions
+        about = {"demonstrations": "people" if source else "scripted demonstrator", "rows": len(rows)}
+        chooser, curve = fitted(rows, self.config.options, self.config.seed, about)
+        write_chooser(chooser, self.folder / FINAL)
+        write_chooser(chooser, self.folder / BEST)
+        self.write_curve(curve)
+        self.decisions = self.total
         notice(self.decisions, f"agrees in {curve[-1]['agrees']:.0%} of held-out choices")
 
     def _played(self, notice: Any) -> list[dict[str, Any]]:
         """Rows of the scripted demonstrator's games."""
         rows: list[dict[str, Any]] = []
-        opponents = self.settings.stages[0].opponents
-        for game in range(self.settings.games):
-            rows += demonstrated(self.settings, opponents[game % len(opponents)], self.settings.seed + game)
-            self.decisions = int(self.settings.decisions * 0.9 * (game + 1) / self.settings.games)
-            notice(self.decisions, f"demonstrations, {len(rows):,} choices")
+        opponents = self.config.stages[0].opponents
+        for game in range(self.total):
+            rows += demonstrated(self.config, opponents[game % len(opponents)], self.config.seed + game)
+            notice(game, f"demonstrations, {len(rows):,} choices")
         return rows
 
 
-def demonstrated(settings: TrainingSettings, opponent: str, seed: int) -> list[dict[str, Any]]:
+def demonstrated(config: CloningConfig, opponent: str, seed: int) -> list[dict[str, Any]]:
     """Rows of one game of the scripted demonstrator."""
-    config = core_of(settings, 1, seed).config
-    env = MctfEnv(config, action_kind="continuous")
+    rules = core_of(config, 1, seed).config
+    env = MctfEnv(rules, action_kind="continuous")
     observations, infos = env.reset(seed=seed)
     teacher, foe = Teacher(), make(opponent)
-    own, others = list(config.agent_ids[: config.team_size]), list(config.agent_ids[config.team_size :])
+    own, others = list(rules.agent_ids[: rules.team_size]), list(rules.agent_ids[rules.team_size :])
     teacher.reset(env, own, seed)
     foe.reset(env, others, seed + 1)
     while env.agents:
@@ -116,7 +95,7 @@ def _read(path: Path) -> list[dict[str, Any]]:
 
 
 def fitted(
-    rows: list[dict[str, Any]], epochs: int, rate: float, hidden: int, batch: int, seed: int, card: dict[str, Any]
+    rows: list[dict[str, Any]], options: CloningOptions, seed: int, card: dict[str, Any]
 ) -> tuple[Chooser, list[dict[str, Any]]]:
     """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out.
 
@@ -135,13 +114,13 @@ def fitted(
     learned = order[len(held) :]
     if len(learned) < 10:
         raise ConfigError(f"{len(rows)} choices are too few; record 20 at least")
-    chooser = Chooser.fresh(names, hidden, rng, card)
+    chooser = Chooser.fresh(names, options.hidden, rng, card)
     chooser.scale_to(seen[learned])
-    curve, optimiser = [], _Adam(chooser.parameters(), rate)
-    for epoch in range(epochs):
-        for part in np.array_split(rng.permutation(learned), max(1, len(learned) // batch)):
+    curve, optimiser = [], _Adam(chooser.parameters(), options.rate)
+    for epoch in range(options.epochs):
+        for part in np.array_split(rng.permutation(learned), max(1, len(learned) // options.batch)):
             optimiser.step(chooser.gradients(seen[part], chosen[part]))
-        if epoch % 10 == 9 or epoch == epochs - 1:
+        if epoch % 10 == 9 or epoch == options.epochs - 1:
             agrees = float(np.mean(chooser.choices(seen[held]) == chosen[held]))
             curve.append({"decisions": (epoch + 1) * len(learned), "epoch": epoch + 1, "agrees": agrees})
     return chooser, curve

@@ -1,15 +1,27 @@
 """QMIX (Rashid et al. 2018): values of each boat's actions, mixed monotonically into one value of the team.
 
 Q_tot(s, u) = f_s(Q_1(o_1, u_1), ..., Q_n(o_n, u_n)) with df_s / dQ_i >= 0, so each boat's best action is the team's.
-The weights of f are made from the state by networks of their own, their absolute values taken.
+The weights of f are made from the state by networks of their own, their absolute values taken. On the games: a replay
+of decisions, exploration that fades, the boats' network exported as any other.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import time
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 import torch
+from steerclear.policies.entrants.learned.network import Network
+from steerclear.shield.exceptions import ConfigError
 from torch import nn
+
+from .config import QmixConfig
+from .env import TrainEnv
+from .policy import TeamFeatures, features_of
+from .training import DivergedError, Notice, Training, card_of, threads
 
 
 class Transitions(NamedTuple):
@@ -57,20 +69,12 @@ class MonotoneMixer(nn.Module):
         return mixed
 
 
-class AdditiveMixer(nn.Module):
-    """The sum of the values (Sunehag et al. 2018): what QMIX is to beat."""
-
-    def forward(self, values: torch.Tensor, state: torch.Tensor) -> torch.Tensor:
-        """Q_tot (N,)."""
-        return values.sum(1)
-
-
 class Qmix:
     """Learner of values and mixer, with target networks and double Q-learning.
 
     Args:
         agent: network from what a boat sees to its actions' values.
-        mixer: `MonotoneMixer` or `AdditiveMixer`.
+        mixer: of their values.
         copies: builds another agent and mixer of the same shapes, for the targets.
         rate: of Adam.
         discount: per decision.
@@ -118,3 +122,144 @@ class Qmix:
         if self.updates % self.target_every == 0:
             self._copy()
         return float(loss.detach())
+
+
+class QmixTraining(Training):
+    """QMIX in a folder; checkpoints are not kept: it begins anew.
+
+    Args:
+        config: the network is shared, actions are discrete.
+        folder: where everything goes.
+        resume: refused.
+
+    Raises:
+        ConfigError: ``resume``, or a setting that cannot be.
+    """
+
+    def __init__(self, config: QmixConfig, folder: Path, resume: bool = False) -> None:
+        if resume:
+            raise ConfigError("qmix begins anew; leave out --resume")
+        super().__init__(config, folder)
+        torch.manual_seed(config.seed)
+        self._rng = np.random.default_rng([config.seed, 9])
+        self.env = TrainEnv(config)
+        core = self.env.batch.core
+        self.boats, self._features = len(self.env.batch.boats), features_of(core, config.net.features)
+        looks = TeamFeatures(_Space(core.n_obs), self._features, core.n_obs, config.interval)
+        self.agent = _agent(looks, self._features.size(core.n_obs), config)
+        mixer = MonotoneMixer(self.boats, self.boats * core.n_obs)
+        copies = (deepcopy(self.agent), deepcopy(mixer))
+        self.learner = Qmix(self.agent, mixer, copies, config.options.rate, config.ppo.discount)
+        self._replay = _Replay(config.options.replay, self.boats, core.n_obs)
+
+    def run(self, notice: Notice = lambda done, words: None) -> None:
+        """Train to the end."""
+        with threads(self.config.threads):
+            seen = self.env.begin(self.config.seed)
+            began, losses, nets, learners = time.perf_counter(), [0.0], [0.0], self.env.num_envs
+            while self.decisions < self.total:
+                seen, loss = self._decide(seen)
+                losses.append(loss)
+                nets += [one["captures"] - one["captures_against"] for one in self.env.ended()]
+                if (self.decisions // learners) % 200 == 0:
+                    self._note(losses[-200:], nets[-100:], began)
+                    notice(self.decisions, f"net {np.mean(nets[-100:]):+.1f} a game")
+            self.write_last()  # before the evaluation: an error in its games must not lose them
+            self._note(losses[-200:], nets[-100:], began, evaluate=True)
+
+    def _decide(self, seen: Any) -> tuple[Any, float]:
+        """A decision of all games; what is seen then, and the loss of what was learned."""
+        games, options = self.config.games, self.config.options
+        with torch.no_grad():
+            best = self.agent(torch.as_tensor(seen)).argmax(1).numpy()
+        random = self._rng.random(len(best)) < self._exploration()
+        actions = np.where(random, self._rng.integers(0, 17, len(best)), best)
+        out = self.env.decide(actions)
+        shape = (games, self.boats, -1)
+        rewards = out.rewards.reshape(games, self.boats).mean(axis=1)
+        over = out.terminated.reshape(games, self.boats)[:, 0]
+        last = out.final_observations.reshape(shape)
+        self._replay.add(seen.reshape(shape), actions.reshape(games, self.boats), rewards, last, over)
+        self.decisions += self.env.num_envs
+        loss = 0.0
+        if self._replay.size >= 4 * options.batch:
+            for _ in range(options.updates):
+                loss = self.learner.update(self._replay.draw(options.batch, self._rng))
+            if not np.isfinite(loss):
+                raise DivergedError("the loss is no longer finite; lower options.rate, earlier work is kept")
+        return out.observations, loss
+
+    def _exploration(self) -> float:
+        end, share = self.config.options.explore_end, self.config.options.explore_share
+        return max(end, 1.0 - (1.0 - end) * self.decisions / max(1.0, share * self.total))
+
+    def _note(self, losses: list[float], nets: list[float], began: float, evaluate: bool = False) -> None:
+        row = {"decisions": self.decisions, "loss": float(np.mean(losses)), "net": float(np.mean(nets))}
+        row["wall"] = {"total_s": time.perf_counter() - began}
+        if evaluate:
+            row["evaluation"] = self.evaluate()
+        self.curve.append(row)
+        self.write_curve(self.curve)
+
+    def network(self) -> Network:
+        """The boats' network in numpy; its outputs are values, whose best is played."""
+        layers = [layer for layer in self.agent if isinstance(layer, nn.Linear)]
+        weights = [layer.weight.detach().numpy().T[None].copy() for layer in layers]
+        biases = [layer.bias.detach().numpy()[None].copy() for layer in layers]
+        card = {**card_of(self.config), "algorithm": "qmix"}
+        n_obs, held = self.env.batch.core.n_obs, self.config.interval
+        return Network(weights, biases, self._features, self.config.net.activation, "discrete", held, n_obs, card)
+
+
+class _Space:
+    """The shape of observations, for `TeamFeatures`."""
+
+    def __init__(self, size: int) -> None:
+        self.shape = (size,)
+
+
+def _agent(looks: nn.Module, size: int, config: QmixConfig) -> nn.Sequential:
+    act = nn.Tanh if config.net.activation == "tanh" else nn.ReLU
+    layers: list[nn.Module] = [_Each(looks)]
+    for width in config.net.hidden:
+        layers += [nn.Linear(size, width), act()]
+        size = width
+    return nn.Sequential(*layers, nn.Linear(size, 17))
+
+
+class _Each(nn.Module):
+    """Features of (..., n_obs)."""
+
+    def __init__(self, looks: nn.Module) -> None:
+        super().__init__()
+        self.looks = looks
+
+    def forward(self, seen: torch.Tensor) -> torch.Tensor:
+        flat = self.looks(seen.reshape(-1, seen.shape[-1]))
+        return flat.reshape(*seen.shape[:-1], -1)
+
+
+class _Replay:
+    """The last moments, in a ring."""
+
+    def __init__(self, capacity: int, boats: int, n_obs: int) -> None:
+        self.size = self._next = 0
+        self._seen = np.zeros((capacity, boats, n_obs), np.float32)
+        self._after = np.zeros_like(self._seen)
+        self._actions = np.zeros((capacity, boats), np.int64)
+        self._rewards, self._ended = np.zeros(capacity, np.float32), np.zeros(capacity, np.float32)
+
+    def add(self, seen: Any, actions: Any, rewards: Any, after: Any, ended: Any) -> None:
+        """Add the moments of all games."""
+        at = (self._next + np.arange(len(rewards))) % len(self._rewards)
+        self._seen[at], self._actions[at], self._rewards[at] = seen, actions, rewards
+        self._after[at], self._ended[at] = after, ended
+        self._next = int((at[-1] + 1) % len(self._rewards))
+        self.size = min(self.size + len(rewards), len(self._rewards))
+
+    def draw(self, count: int, rng: np.random.Generator) -> Transitions:
+        """So many at random."""
+        at = rng.integers(0, self.size, count)
+        seen, after = torch.as_tensor(self._seen[at]), torch.as_tensor(self._after[at])
+        numbers = [torch.as_tensor(one[at]) for one in (self._actions, self._rewards, self._ended)]
+        return Transitions(seen, seen.flatten(1), numbers[0], numbers[1], after, after.flatten(1), numbers[2])

@@ -16,8 +16,8 @@ from steerclear.policies.entrants.undertow.shape import NAMES
 from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
-from .learner import ACTIVATIONS, DivergedError, device_of
-from .settings import TrainingSettings
+from .config import RaidsConfig
+from .training import DivergedError, device_of
 
 NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 CRITIC_RATE, FIRST_GAIN = 1e-3, 1e-3
@@ -49,24 +49,22 @@ class RaidsLearner:
     """Actor and critic.
 
     Args:
-        settings: of the training.
-        spread: deviation of what is drawn at first, in units of `shape.LIMITS`.
-        furthest: mean Kullback-Leibler divergence at which a rollout's learning of the actor ends.
+        config: of the training; what is drawn deviates in units of `shape.LIMITS`.
 
     Raises:
         ConfigError: the device is not there, or the weights to begin with are of another network.
     """
 
-    def __init__(self, settings: TrainingSettings, spread: float, furthest: float) -> None:
-        torch.manual_seed(settings.seed)
-        self._settings, self._furthest, self._learned = settings, furthest, 0
-        self._device = device_of(settings.device)
-        self._rng = np.random.default_rng([settings.seed, 21])
-        self.actor, self.critic = _network(settings, len(NAMES)), _network(settings, 1)
-        self.spread = nn.Parameter(torch.full((len(NAMES),), float(np.log(spread))))
+    def __init__(self, config: RaidsConfig) -> None:
+        torch.manual_seed(config.seed)
+        self._config, self._learned = config, 0
+        self._device = device_of(config.device)
+        self._rng = np.random.default_rng([config.seed, 21])
+        self.actor, self.critic = _network(config, len(NAMES)), _network(config, 1)
+        self.spread = nn.Parameter(torch.full((len(NAMES),), float(np.log(config.options.spread))))
         for part in (self.actor, self.critic):
             part.to(self._device)
-        rate = settings.ppo.learning_rate
+        rate = config.ppo.learning_rate
         self._optimiser = torch.optim.Adam([*self.actor.parameters(), self.spread], lr=rate, eps=1e-5)
         self._critics = torch.optim.Adam(self.critic.parameters(), lr=CRITIC_RATE, eps=1e-5)
 
@@ -106,20 +104,20 @@ class RaidsLearner:
         chances = self._tensor(np.array([one.chance for one in answers], np.float32))
         gains, values = self._gains(games, answers, seen)
         wanted, gain = self._tensor(gains + values), self._tensor((gains - gains.mean()) / (gains.std() + 1e-8))
-        ppo, further, far = self._settings.ppo, self._learned >= self._settings.ppo.critic_first, [0.0]
+        ppo, further, far = self._config.ppo, self._learned >= self._config.ppo.critic_first, [0.0]
         for _ in range(ppo.epochs):
             for some in torch.as_tensor(self._rng.permutation(len(answers))).split(ppo.batch):
                 self._step(self._critics, ((self.critic(seen[some])[:, 0] - wanted[some]) ** 2).mean())
                 if further:
                     far.append(self._improve(seen[some], units[some], chances[some], gain[some]))
-            further = further and float(np.mean(far[-3:])) <= self._furthest
+            further = further and float(np.mean(far[-3:])) <= self._config.options.furthest
         self._learned += 1
         explained = 1.0 - float(np.mean(gains**2) / (np.var(gains + values) + 1e-9))
         return {"answers": len(answers), "explained": explained, "divergence": far[-1], "spread": self._mean_spread()}
 
     def _gains(self, games: Any, answers: Sequence[Answer], seen: Any) -> tuple[Floats, Floats]:
         """Advantages by GAE over times of different lengths, and values, of all answers."""
-        ppo = self._settings.ppo
+        ppo = self._config.ppo
         after = self._tensor(np.stack([one.seen if one.after is None else one.after for one in answers]))
         with torch.no_grad():
             values, later = (self.critic(told)[:, 0].cpu().numpy() for told in (seen, after))
@@ -135,7 +133,7 @@ class RaidsLearner:
 
     def _improve(self, seen: Any, units: Any, chances: Any, gain: Any) -> float:
         """A step of the actor; how far it is from who answered."""
-        ppo = self._settings.ppo
+        ppo = self._config.ppo
         now = (-0.5 * ((units - self.actor(seen)) / self.spread.exp()) ** 2 - self.spread).sum(1)
         ratio = torch.exp(now - chances)
         kept = torch.minimum(ratio * gain, ratio.clamp(1.0 - ppo.clip, 1.0 + ppo.clip) * gain)
@@ -148,7 +146,7 @@ class RaidsLearner:
         optimiser.zero_grad()
         loss.backward()
         for group in optimiser.param_groups:
-            nn.utils.clip_grad_norm_(group["params"], self._settings.ppo.max_grad_norm)
+            nn.utils.clip_grad_norm_(group["params"], self._config.ppo.max_grad_norm)
         optimiser.step()
 
     def _mean_spread(self) -> float:
@@ -162,15 +160,15 @@ class RaidsLearner:
         layers = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
         weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in layers]
         biases = [layer.bias.detach().cpu().numpy()[None].copy() for layer in layers]
-        settings, n = self._settings, weights[0].shape[1]
-        return Network(weights, biases, NONE, settings.net.activation, "raids", settings.interval, n, card)
+        config, n = self._config, weights[0].shape[1]
+        return Network(weights, biases, NONE, config.net.activation, "raids", config.interval, n, card)
 
 
-def _network(settings: TrainingSettings, outputs: int) -> nn.Sequential:
+def _network(config: RaidsConfig, outputs: int) -> nn.Sequential:
     """Layers; the last begins near nothing, so that raids begin as the script's."""
-    sizes, layers = (SEEN, *settings.net.hidden, outputs), []
+    sizes, layers = (SEEN, *config.net.hidden, outputs), []
     for before, after in pairwise(sizes):
-        layers += [nn.Linear(before, after), ACTIVATIONS[settings.net.activation]()]
+        layers += [nn.Linear(before, after), nn.Tanh() if config.net.activation == "tanh" else nn.ReLU()]
         nn.init.orthogonal_(layers[-2].weight, 2.0**0.5)
         nn.init.zeros_(layers[-2].bias)
     nn.init.orthogonal_(layers[-2].weight, FIRST_GAIN)

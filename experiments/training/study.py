@@ -5,9 +5,8 @@ Trainings with the same games are made once: without a shield and with one at de
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,9 @@ from ..runs.json_file import read_json
 from ..runs.pool import run_all
 from ..runs.provenance import machine, versions
 from ..runs.store import finite, write_json
-from .algorithms import training_of
-from .curve import CURVE
-from .playing import play_games, summary_of
-from .settings import SHIELDS, TrainingSettings
+from .config import SHIELDS, PpoConfig
+from .evaluation import play_games, summary_of
+from .training import CURVE, FINAL, training_of
 
 COMMAND, RESULTS = "train-study", "results.json"
 COLLISION = {"off": 0.0, "on": 0.25}
@@ -54,20 +52,20 @@ def cells(seeds: int, first: int = 0) -> Iterator[Cell]:
                 yield Cell(shield, collision, seed)
 
 
-def settings_of_cell(base: TrainingSettings, cell: Cell) -> TrainingSettings:
+def settings_of_cell(base: PpoConfig, cell: Cell) -> PpoConfig:
     """The base's settings for a cell's training."""
     rewards = {name: weight for name, weight in base.rewards.items() if name not in ("collision", "intervention")}
     if COLLISION[cell.collision]:
         rewards["collision"] = COLLISION[cell.collision]
     shield = "none" if cell.shield == "deployment" else cell.shield
-    return replace(base, shield=shield, rewards=rewards, seed=base.seed + cell.seed)
+    return base.model_copy(update={"shield": shield, "rewards": rewards, "seed": base.seed + cell.seed})
 
 
 @dataclass(frozen=True)
 class Training:
     """One training of a study, and the cells that play its network: what a worker is handed."""
 
-    base: TrainingSettings
+    base: PpoConfig
     folder: Path
     games: int
     cells: tuple[Cell, ...]
@@ -78,7 +76,7 @@ class Training:
         return self.cells[0].training
 
 
-def trainings_of(base: TrainingSettings, folder: Path, seeds: int, games: int) -> list[Training]:
+def trainings_of(base: PpoConfig, folder: Path, seeds: int, games: int) -> list[Training]:
     """The trainings of a study, each once."""
     sharing: dict[str, list[Cell]] = {}
     for cell in cells(seeds):
@@ -87,7 +85,7 @@ def trainings_of(base: TrainingSettings, folder: Path, seeds: int, games: int) -
 
 
 def run_study(
-    base: TrainingSettings, folder: Path, seeds: int, games: int, notice: Callable[[int, str], None], jobs: int = 1
+    base: PpoConfig, folder: Path, seeds: int, games: int, notice: Callable[[int, str], None], jobs: int = 1
 ) -> dict[str, Any]:
     """Train and play every cell; what a folder holds already is taken from there.
 
@@ -123,7 +121,7 @@ def run_study(
     return _results(base, seeds, games, rows)
 
 
-def _check_same(base: TrainingSettings, folder: Path) -> None:
+def _check_same(base: PpoConfig, folder: Path) -> None:
     """Refuse a folder whose trainings are of other settings: its networks would count as those of this config.
 
     Raises:
@@ -135,8 +133,8 @@ def _check_same(base: TrainingSettings, folder: Path) -> None:
     content = read_json(folder / RESULTS, "the results of a study", remedy)
     if not isinstance(content, dict) or content.get("command") != COMMAND:
         raise ConfigError(f"{folder / RESULTS} holds no study; {remedy}")
-    before, now = content["settings"]["training"], finite(asdict(base))
-    other = [name for name in now if json.loads(json.dumps(now[name])) != before.get(name)]
+    before, now = content["settings"]["training"], finite(base.model_dump(mode="json"))
+    other = [name for name in now if now[name] != before.get(name)]
     if other:
         raise ConfigError(f"{folder} holds a study of another config ({', '.join(other)}); give its own, or {remedy}")
 
@@ -146,13 +144,13 @@ def _rows_of(training: Training) -> dict[Cell, list[dict[str, Any]]]:
     return {cell: _cell_rows(training.base, cell, training.folder, training.games) for cell in training.cells}
 
 
-def _cell_rows(base: TrainingSettings, cell: Cell, folder: Path, games: int) -> list[dict[str, Any]]:
+def _cell_rows(base: PpoConfig, cell: Cell, folder: Path, games: int) -> list[dict[str, Any]]:
     settings, place = settings_of_cell(base, cell), folder / cell.training
     place.mkdir(parents=True, exist_ok=True)
     lock = lock_folder(place)  # a worker of a study that was killed may still be at it
     training_of(settings, place, resume=True).run()  # of one that is finished nothing is left to do
     del lock
-    network = read_weights(place / "final.npz")
+    network = read_weights(place / FINAL)
     curve = read_json(place / CURVE, "the curve of a training", "delete its folder to train it again")
     learning = learning_of(curve["rows"])
     rows = []
@@ -187,9 +185,7 @@ def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
     return float(np.average([row[name] for row in rows], weights=[row["games"] for row in rows]))
 
 
-def _results(
-    base: TrainingSettings, seeds: int, games: int, rows: Mapping[Cell, list[dict[str, Any]]]
-) -> dict[str, Any]:
+def _results(base: PpoConfig, seeds: int, games: int, rows: Mapping[Cell, list[dict[str, Any]]]) -> dict[str, Any]:
     in_order = [row for cell in cells(seeds) for row in rows.get(cell, ())]
-    about = {"seeds": seeds, "games": games, "training": asdict(base)}
+    about = {"seeds": seeds, "games": games, "training": base.model_dump(mode="json")}
     return {"command": COMMAND, "settings": about, "rows": in_order, "versions": versions(), "machine": machine()}

@@ -18,7 +18,7 @@ from ..measure.statistics import (
     student_interval,
 )
 from ..report.markdown import MADE, line, table
-from .settings import SHIELDS
+from .config import SHIELDS
 
 HEADS = (
     "shield", "collision term", "net captures", "of each training", "captures", "against", "hits", "steps changed",

@@ -52,7 +52,7 @@ def read_sb3(path: str | Path, interval: int | None = None) -> Network:
         raise PolicyError(f"{file} has no actor this can play ({type(error).__name__}: {why}); {REMEDY}") from error
 
 
-def add_card(file: Path, card: Mapping[str, Any]) -> None:
+def add_card(file: Path | io.BytesIO, card: Mapping[str, Any]) -> None:
     """Put a card, such as the preset a model learned in, into its zip."""
     with zipfile.ZipFile(file, "a") as archive:
         archive.writestr(CARD, json.dumps(dict(card)))

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from steerclear.experiments.training.unused import NO_USE, NO_USE_IN_STAGE
 
 pytest.importorskip("stable_baselines3", reason="the extra [train]")
 
@@ -27,15 +26,21 @@ def tiny_content():
     return TINY
 
 
-def of_use(algorithm):
-    """The tiny config without what an algorithm has no use for."""
-    content = deepcopy(TINY)
-    for dotted in NO_USE[algorithm]:
-        *parts, name = dotted.split(".")
-        (content.get(parts[0], {}) if parts else content).pop(name, None)
-    if algorithm in NO_USE_IN_STAGE:
-        content["stages"] = [{"opponents": ["hold"]}]
-    return content
+OF_ALL = ("preset", "rules", "games")
+OF_LEARNING = (*OF_ALL, "decisions", "interval")
+
+
+def content_of(algorithm):
+    """The tiny config, as an algorithm takes it."""
+    if algorithm == "ppo":
+        return deepcopy(TINY)
+    if algorithm == "qmix+ppo":
+        return {**deepcopy(TINY), "stages": [{"opponents": ["hold"]}]}
+    kept = {name: TINY[name] for name in (OF_ALL if algorithm == "cloning" else OF_LEARNING)}
+    kept["stages"] = [{"opponents": ["hold"]}]
+    if algorithm != "cloning":
+        kept |= {"net": {"hidden": [16]}, "evaluation": {"games": 2}}
+    return kept
 
 
 @pytest.fixture
@@ -44,7 +49,7 @@ def tiny(tmp_path):
 
     def write(name="tiny.yaml", **changes) -> Path:
         path = tmp_path / name
-        path.write_text(yaml.safe_dump({**of_use(changes.get("algorithm", "ppo")), **changes}))
+        path.write_text(yaml.safe_dump({**content_of(changes.get("algorithm", "ppo")), **changes}))
         return path
 
     return write

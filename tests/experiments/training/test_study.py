@@ -3,7 +3,7 @@ import json
 import pytest
 from steerclear.experiments.pages.docs_pages import write_pages
 from steerclear.experiments.runs.store import write_json
-from steerclear.experiments.training.settings import settings_of
+from steerclear.experiments.training.config_file import config_of
 from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
 from steerclear.shield.exceptions import ConfigError
 
@@ -13,7 +13,7 @@ def test_a_deployed_shield_shares_the_training_without_one():
     assert len(found) == 16
     assert len({cell.training for cell in found}) == 12
     bare, deployed = (next(c for c in found if c.shield == shield) for shield in ("none", "deployment"))
-    base = settings_of({"rewards": {"sparse": 1.0, "collision": 9.0}})
+    base = config_of({"rewards": {"sparse": 1.0, "collision": 9.0}})
     assert settings_of_cell(base, bare) == settings_of_cell(base, deployed)
     assert settings_of_cell(base, bare).rewards == {"sparse": 1.0}
     with_term = next(cell for cell in found if cell.collision == "on")
@@ -57,7 +57,7 @@ def test_trainings_at_once_give_what_they_give_one_after_another(tiny_content, t
     pytest.importorskip("stable_baselines3")
     from steerclear.experiments.training.study import run_study
 
-    base = settings_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+    base = config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
     told = []
     rows = [
         run_study(base, tmp_path / str(jobs), 1, 1, lambda done, words: told.append(done), jobs)["rows"]
@@ -73,8 +73,8 @@ def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
     pytest.importorskip("stable_baselines3")
     from steerclear.experiments.training.study import RESULTS, _results, run_study
 
-    base = settings_of({"decisions": 100})
-    write_json(tmp_path / RESULTS, _results(settings_of({"decisions": 200}), 1, 1, {}))
+    base = config_of({"decisions": 100})
+    write_json(tmp_path / RESULTS, _results(config_of({"decisions": 200}), 1, 1, {}))
     with pytest.raises(ConfigError, match=r"holds a study of another config \(decisions\); give its own, or name"):
         run_study(base, tmp_path, 1, 1, lambda done, words: None)
     (tmp_path / RESULTS).write_text('{"command": "ablate"}')
@@ -86,10 +86,10 @@ def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tm
     pytest.importorskip("stable_baselines3")
     from steerclear.experiments.training.study import RESULTS, run_study
 
-    base = settings_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+    base = config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
     spoiled = tmp_path / "training-collision_on-seed_0"
     (spoiled / "checkpoints").mkdir(parents=True)
-    (spoiled / "checkpoints" / "00000001.npz").write_bytes(b"no checkpoint")
+    (spoiled / "checkpoints" / "00000001.zip").write_bytes(b"no checkpoint")
     with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
         run_study(base, tmp_path, 1, 1, lambda done, words: None)
     assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7

@@ -1,21 +1,14 @@
 import subprocess
 import sys
 import zipfile
-from inspect import Parameter, signature
 from pathlib import Path
 
 import pytest
-import yaml
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands import train
 from steerclear.experiments.runs.folder_lock import _HELD
-from steerclear.experiments.training.ids import make_learners
-from steerclear.experiments.training.settings import settings_of
 from steerclear.policies.submissions.made_for import made_for
-from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
-
-ROOT = Path(__file__).parents[3]
 
 
 def call(*words):
@@ -83,37 +76,11 @@ def test_bad_input_is_one_line(tiny, tmp_path):
     assert "is not a Stable-Baselines3 model" in result.output
 
 
-@pytest.mark.parametrize(
-    ("shield_settings", "words"),
-    [
-        ({"dwellll_s": 1}, "unknown shield setting 'dwellll_s'"),
-        ({"profile": "pirates"}, "pirates"),
-        ({"separation_m": 500}, "the shorter side of the field, 40 m"),
-    ],
-)
-@pytest.mark.parametrize("mode", ["none", "deployment", "training"])
-def test_a_bad_shield_setting_is_found_before_the_first_rollout(tiny, tmp_path, shield_settings, words, mode):
-    result = call("train", tiny(shield=mode, shield_settings=shield_settings), "--out", tmp_path / "x")
-    assert result.exit_code == 2
-    assert words in result.output
-    assert not list(tmp_path.glob("x/checkpoints/*"))
-
-
 def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_path):
     result = call("train", tiny(shield="deployment", shield_settings={"dt_s": 0.7}), "--out", tmp_path / "x")
     assert result.exit_code == 2
     assert "0.7 s" in result.output
     assert not list(tmp_path.glob("x/checkpoints/*"))
-
-
-def test_every_team_has_a_config_that_can_be_read():
-    found = sorted((ROOT / "policies/entrants/learned/teams").glob("*.yaml"))
-    names = {"crowley", "jin", "leprell", "ours", "richley", "riptide", "surge", "swell"}
-    assert {path.stem for path in found} == names
-    for path in found:
-        settings_of(yaml.safe_load(path.read_text()))
-        weights = path.with_suffix(".npz")
-        assert not weights.exists() or weights.stat().st_size <= 1_000_000
 
 
 def test_playing_exported_weights_needs_no_torch():
@@ -124,21 +91,6 @@ def test_playing_exported_weights_needs_no_torch():
     assert subprocess.run([sys.executable, "-c", words], timeout=120, check=False).returncode == 0
 
 
-def test_the_page_lists_every_option_of_the_environment_with_its_default():
-    page = (ROOT / "docs" / "train.md").read_text()
-    for name, one in signature(make_learners).parameters.items():
-        if one.kind is not Parameter.VAR_KEYWORD:
-            default = f'"{one.default}"' if isinstance(one.default, str) else one.default
-            assert f"| `{name}` | `{default}` |" in page
-
-
 @pytest.mark.parametrize("command", ["train", "export", "train-study"])
 def test_the_commands_are_there(command):
     assert call(command, "--help").exit_code == 0
-
-
-@pytest.mark.parametrize("shield", ["none", {"separation_m": 3.0}, 1, None])
-def test_a_shield_of_the_id_is_there_or_not(shield):
-    """A name or settings are true: "none" would be a shield, and settings would not be kept."""
-    with pytest.raises(ConfigError, match=r"shield is .*; give True or False, or build one with settings from parts"):
-        make_learners(num_envs=3, shield=shield)

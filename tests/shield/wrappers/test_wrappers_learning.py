@@ -83,18 +83,6 @@ def test_the_three_ways_to_begin_anew(mode):
     assert envs.step(stop)[3].all()
 
 
-def test_gymnasium_makes_them_by_id():
-    envs = gymnasium.make_vec("steerclear.experiments.training.ids:steerclear/Mctf-v0", num_envs=6, max_time_s=1.0)
-    observations, _ = envs.reset(seed=0)
-    assert observations.shape == (6, 61)
-    infos = envs.step(envs.action_space.sample())[4]
-    assert {"captures", "grabs", "tags", "hits", "interventions"} <= infos.keys()
-    with pytest.raises(ConfigError, match="give a multiple of 3"):
-        gymnasium.make_vec("steerclear/Mctf-v0", num_envs=4)
-    with pytest.raises(ConfigError, match=r"call gymnasium\.make_vec\("):
-        gymnasium.make("steerclear.experiments.training.ids:steerclear/Mctf-v0")
-
-
 def test_unknown_ways_are_refused():
     with pytest.raises(ConfigError, match="unknown autoreset_mode 'never'"):
         MctfVectorEnv(batch(), "never")

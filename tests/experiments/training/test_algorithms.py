@@ -1,13 +1,16 @@
+"""Cloning, QMIX, and QMIX with PPO behind it."""
+
 import json
 
 import numpy as np
 import pytest
+import torch
 from steerclear.experiments.cli import app
-from steerclear.experiments.training.algorithms import training_of
 from steerclear.experiments.training.cloning import fitted
+from steerclear.experiments.training.config import CloningOptions
 from steerclear.experiments.training.config_file import read_config
-from steerclear.experiments.training.games import learners_of
-from steerclear.experiments.training.taking_over import FirstPart
+from steerclear.experiments.training.qmix import MonotoneMixer
+from steerclear.experiments.training.training import training_of
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, read_chooser
@@ -25,7 +28,7 @@ def test_a_clone_agrees_with_a_rule_it_was_shown():
     for _ in range(600):
         x, y = rng.uniform(0, 80), rng.uniform(0, 40)
         rows.append({"time_s": 0.0, "option": "attack" if x + y > 60 else "guard", "own_x": x, "own_y": y})
-    _, curve = fitted(rows, 60, 1e-2, 16, 64, 0, {})
+    _, curve = fitted(rows, CloningOptions(epochs=60, rate=1e-2, hidden=16, batch=64), 0, {})
     assert curve[-1]["agrees"] > 0.93
 
 
@@ -77,7 +80,7 @@ def test_qmix_keeps_its_weights_where_the_evaluation_fails(tiny, tmp_path, monke
     def failing(*arguments):
         raise RuntimeError("an opponent's file is gone")
 
-    monkeypatch.setattr("steerclear.experiments.training.playing.play_games", failing)
+    monkeypatch.setattr("steerclear.experiments.training.evaluation.play_games", failing)
     training = training_of(read_config(tiny(algorithm="qmix", decisions=24)), tmp_path / "run", False)
     with pytest.raises(RuntimeError, match="is gone"):
         training.run()
@@ -86,7 +89,8 @@ def test_qmix_keeps_its_weights_where_the_evaluation_fails(tiny, tmp_path, monke
 
 def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(tiny, tmp_path):
     rules = {"max_time_s": 30.0}
-    changes = {"options": {"batch": 8, "updates": 1, "play_share": 0.5}, "decisions": 72, "rules": rules}
+    options = {"batch": 8, "updates": 1, "play_share": 0.5}
+    changes = {"options": options, "decisions": 72, "rules": rules, "stages": [{"opponents": ["hold"]}]}
     settings = read_config(tiny(algorithm="qmix+ppo", **changes))
     training_of(settings, tmp_path / "run", False).run()
     pair, play = read_weights(tmp_path / "run" / "final.npz"), read_weights(tmp_path / "run" / "play" / "final.npz")
@@ -136,41 +140,16 @@ def test_both_networks_of_a_pair_hold_decisions_as_long_as_export_is_asked(tmp_p
     assert (team.interval, team.carrying.interval) == (5, 5)
 
 
-def test_the_first_part_decides_where_nobody_holds_the_flag(tiny):
-    settings = read_config(tiny())
-    batch = learners_of(settings, None)
-    batch.reset(0)
-    play = Network([np.zeros((1, 61, 17), np.float32)], [np.eye(17, dtype=np.float32)[3][None]], NONE, "tanh",
-                   "discrete", 10, 61)  # fmt: skip
-    asked = []
-    batch.step = lambda actions: asked.append(actions.tolist())
-    step = FirstPart(batch, play)
-    step(np.full(6, 16))
-    batch.core.has_flag[1, 0] = True
-    batch.core.observe()
-    step(np.full(6, 16))
-    assert asked == [[3] * 6, [3, 3, 3, 16, 16, 16]]
+def test_the_mixture_never_falls_where_a_value_rises():
+    torch.manual_seed(0)
+    mixer, state = MonotoneMixer(3, 5), torch.randn(64, 5)
+    values = torch.randn(64, 3, requires_grad=True)
+    mixer(values, state).sum().backward()
+    assert float(values.grad.min()) >= 0.0
+    assert float(values.grad.max()) > 0.0
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "options", "why"),
-    [
-        ("cloning", {"epochs": -1}, "options.epochs is -1; give a whole number from 1"),
-        ("cloning", {"demonstrations": 3}, "no name of a file"),
-        ("qmix", {"rate": -3}, "options.rate is -3; give a number from"),
-        ("qmix", {"updates": "many"}, "options.updates is 'many'"),
-        ("qmix", {"explore_share": 7}, "options.explore_share is 7"),
-        ("qmix+ppo", {"play_share": 1.6}, "options.play_share is 1.6; give a number from 0 to 1"),
-        ("qmix+ppo", {"foo": 1}, r"unknown option 'foo' of qmix\+ppo; choose one of play_share"),
-    ],
-)
-def test_options_that_cannot_be_are_refused(tiny, tmp_path, algorithm, options, why):
-    with pytest.raises(ConfigError, match=why):
-        training_of(read_config(tiny(algorithm=algorithm, options=options)), tmp_path, False)
-
-
-def test_unknown_options_are_refused(tiny, tmp_path):
-    for algorithm in ("qmix", "cloning"):
-        config = read_config(tiny(algorithm=algorithm, options={"epoch": 3}))
-        with pytest.raises(ConfigError, match="unknown option 'epoch'"):
-            training_of(config, tmp_path, False)
+@pytest.mark.parametrize("algorithm", ["qmix", "raids"])
+def test_what_begins_anew_does_not_resume(tiny, tmp_path, algorithm):
+    with pytest.raises(ConfigError, match="leave out --resume"):
+        training_of(read_config(tiny(algorithm=algorithm)), tmp_path, True)

@@ -1,4 +1,4 @@
-"""The torch side of a policy: features, a network per role, and the way to numpy."""
+"""The torch side of a policy: features, a network per role, and the ways to numpy and back."""
 
 from __future__ import annotations
 

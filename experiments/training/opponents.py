@@ -1,20 +1,25 @@
-"""Opponents from a pool: each game of a batch has one of them, drawn by the league's matching rule."""
+"""Opponents from a pool: each game of a batch has one of them, drawn by the league's matching rule, to its end."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.env.observe import observe_games  # noqa: F401 (its kernel fills the twin's observations)
 from steerclear.policies.entrants.learned import LearnedBatch
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.registry import plays_batches
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.platforms import layout as L
 
-from .each_game import EachGame
-from .settings import SELF, League, Stage
+from ..entries.team import make_team
+from .config import SELF, Draws, Stage
 
 LAST = 50
 """Games that a mean score is over."""
@@ -47,7 +52,7 @@ class Pool:
         every: game steps between two questions to members that play one game after another.
     """
 
-    def __init__(self, stage: Stage, league: League, seed: int, every: int = 1) -> None:
+    def __init__(self, stage: Stage, league: Draws, seed: int, every: int = 1) -> None:
         names = stage.opponents
         self.name = ",".join(names)
         self.league = league
@@ -67,10 +72,14 @@ class Pool:
         if len(ours) >= self.league.keep:
             del self.scores[ours[0]]
             self._forget_unused()
-        self.members[name] = LearnedBatch(network, name, sample=network.kind == "discrete")
+        self.members[name] = self._playing(network, name)
         self.scores[name] = deque(maxlen=LAST)
         if self._core is not None:
             self.members[name].reset(self._core, self._team, self._seed)
+
+    @staticmethod
+    def _playing(network: Network, name: str) -> LearnedBatch:
+        return LearnedBatch(network, name, sample=network.kind == "discrete")
 
     def _forget_unused(self) -> None:
         """Let go of snapshots that are not drawn any more and that no game plays against."""
@@ -130,6 +139,31 @@ class Pool:
         share = np.array(list(weights.values()))
         return str(self._rng.choice(list(weights), p=share / share.sum()))
 
+    def facts(self) -> dict[str, Any]:
+        """What it remembers beside arrays, ready for JSON."""
+        return {
+            "members": list(self.members),
+            "seed": self._seed,
+            "playing": [str(name) for name in self.playing],
+            "waits_s": self.waits_s.tolist(),
+            "scores": {name: list(scores) for name, scores in self.scores.items()},
+            "rng": self._rng.bit_generator.state,
+        }
+
+    def remember(self, names: Sequence[str], snapshots: Callable[[str], Network]) -> None:
+        """Have the members that were told, snapshots read anew; before `reset`."""
+        self.members = {
+            name: self.members[name] if name in self.members else self._playing(snapshots(name), name) for name in names
+        }
+
+    def put(self, facts: dict[str, Any]) -> None:
+        """Go on with what `facts` told of a pool with the same members; after `reset`."""
+        self._seed = facts["seed"]
+        self.playing[:] = facts["playing"]
+        self.waits_s[:] = facts["waits_s"]
+        self.scores = {name: deque(scores, maxlen=LAST) for name, scores in facts["scores"].items()}
+        self._rng.bit_generator.state = facts["rng"]
+
 
 def hold_back(core: Any, team: int, cooldown_s: Array) -> None:
     """Slow the clocks that a team's boats recharge by, so that a whole cool-down takes ``cooldown_s`` (B,).
@@ -141,3 +175,70 @@ def hold_back(core: Any, team: int, cooldown_s: Array) -> None:
     share = np.minimum(1.0, whole_s / np.maximum(cooldown_s, 1e-9))[:, None]
     rests = (elapsed_s[:, boats] > 0.0) & (elapsed_s[:, boats] < whole_s)
     elapsed_s[:, boats] -= rests * (1.0 - share) * core.config.decision_s
+
+
+class EachGame:
+    """A `BatchPolicy` round a policy for single games, slow: each game has a policy and a twin of the game of its own.
+
+    Args:
+        name: of the policy, as `steerclear.policies.make` takes it.
+        every: game steps between two questions to it. The policy is told that a step is so long, and what it answers is
+            held as a course steered: cheaper, and a coarser player of the same kind.
+    """
+
+    def __init__(self, name: str, every: int = 1) -> None:
+        policies.check(name)
+        self.name, self.every = name, every
+        self._teams: dict[int, Any] = {}
+
+    def reset(self, core: Any, team: int, seed: int) -> None:
+        """Begin all games."""
+        self._team = team
+        self._own = np.flatnonzero(core.team == team)
+        self._seeds = {game: seed + game for game in range(core.n_games)}
+        self._twins: dict[int, Any] = {}
+        self._out = np.zeros((core.n_games, self._own.size, 2))
+        self._mine = np.ones(core.n_games, np.bool_)
+        self._left = np.zeros(core.n_games, np.int64)
+        self._course_deg = np.zeros((core.n_games, self._own.size))
+
+    def plays(self, games: BoolArray) -> None:
+        """Only these games (B,) are played from now on."""
+        self._mine = games
+
+    def restart(self, chosen: BoolArray, seed: int) -> None:
+        """Begin the chosen games (B,) anew."""
+        for game in np.flatnonzero(chosen):
+            self._seeds[int(game)] = seed + int(game)
+            self._twins.pop(int(game), None)
+        self._left[chosen] = 0
+
+    def act(self, core: Any, team: int) -> Array:
+        """Commands (B, n_team, 2); the array is reused by the next call."""
+        heading_deg = core.state[:, self._own, L.HEADING]
+        self._out[..., 1] = (self._course_deg - heading_deg + 180.0) % 360.0 - 180.0
+        for game in np.flatnonzero(self._mine & (self._left == 0)):
+            self._out[game] = self._ask(core, int(game))
+            self._course_deg[game] = heading_deg[game] + self._out[game, :, 1]
+            self._left[game] = self.every
+        self._left[self._mine] -= 1
+        return self._out
+
+    def _seen_as(self, config: GameConfig) -> GameConfig:
+        """The rules with steps as long as the time between two questions."""
+        return config if self.every == 1 else config.replace(decision_steps=config.decision_steps * self.every)
+
+    def _ask(self, core: Any, game: int) -> Array:
+        fresh = game not in self._twins
+        if fresh:
+            self._twins[game] = MctfEnv(self._seen_as(core.config), action_kind="continuous")
+            self._twins[game].reset(seed=0)
+        env = self._twins[game]
+        env.core.restore(core.view(game))
+        env.core.observe()
+        ids = [core.config.agent_ids[i] for i in self._own]
+        if fresh:
+            self._teams.setdefault(game, make_team(self.name)).reset(env, ids, self._seeds[game])
+        seen = {agent: env.core.observations[0, i].copy() for i, agent in enumerate(core.config.agent_ids)}
+        actions = self._teams[game].act(seen, env.infos())
+        return env.decode(actions)[self._own]

@@ -3,45 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from steerclear.policies.entrants.learned import batch_of
 from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
 from ..measure.statistics import mean_interval
-from .games import core_of, shield_of
-from .pool import opponent_of
-from .settings import TrainingSettings
+from .config import Learning
+from .env import core_of, shield_of
+from .opponents import opponent_of
 
 FIGURES = ("net", *EVENTS)
 
 
 def play_games(
-    settings: TrainingSettings, own: Any, opponent: str, games: int, seed: int, shielded: bool, side: str = "blue"
+    config: Learning, own: Any, opponent: str, games: int, seed: int, shielded: bool, side: str = "blue"
 ) -> list[dict[str, float]]:
     """One row per game: captures for less against (``net``) and the counts of `EVENTS`, hits over the whole team.
 
     Args:
-        settings: whose rules are played.
+        config: whose rules are played.
         own: network, batch policy or name of one.
         opponent: name of the opponent.
         games: how many.
         seed: of starts and policies.
-        shielded: the team has the settings' shield.
+        shielded: the team has the config's shield.
         side: colour of the team.
     """
-    core = core_of(settings, games, seed)
+    core = core_of(config, games, seed)
     team = 0 if side == "blue" else 1
     core.reset(seed=seed)
     ours = batch_of(own) if isinstance(own, Network) else opponent_of(own) if isinstance(own, str) else own
     foe = opponent_of(opponent)
     ours.reset(core, team, seed)
     foe.reset(core, 1 - team, seed + 1)
-    shield = shield_of(settings, core, side) if shielded else None
+    shield = shield_of(config, core, side) if shielded else None
     return _played(core, ours, foe, team, shield)
 
 
@@ -79,19 +77,10 @@ def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     return {"games": len(rows), **found}
 
 
-def evaluation_of(settings: TrainingSettings, network: Network) -> dict[str, Any]:
-    """Summaries by opponent of the games that a training's settings ask for."""
-    wanted, shielded = settings.evaluation, settings.shield != "none"
+def evaluation_of(config: Learning, network: Network) -> dict[str, Any]:
+    """Summaries by opponent of the games that a training's config asks for."""
+    wanted, shielded = config.evaluation, config.shield != "none"
     return {
-        name: summary_of(play_games(settings, network, name, wanted.games, wanted.seed, shielded))
+        name: summary_of(play_games(config, network, name, wanted.games, wanted.seed, shielded))
         for name in wanted.opponents
     }
-
-
-def keep_best(found: Mapping[str, Any], best: float, network: Network, path: Path) -> float:
-    """Write a network whose evaluation is better than the best so far; the mean net captures of the best now."""
-    mean = float(np.mean([one["net"] for one in found.values()]))
-    if mean > best:
-        write_weights(network, path)
-        return mean
-    return best

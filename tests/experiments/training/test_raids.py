@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from steerclear.experiments.training.algorithms import training_of
-from steerclear.experiments.training.config_file import read_config
-from steerclear.experiments.training.games import core_of
-from steerclear.experiments.training.pool import Pool
-from steerclear.experiments.training.raid_moments import KINDS, PLACE, BeginInRaids, RaidMoments, Recorder, recorded
+from steerclear.experiments.training.config import Layers, League, Stage
+from steerclear.experiments.training.config_file import config_of, read_config
+from steerclear.experiments.training.env import core_of
+from steerclear.experiments.training.export import write_submission
+from steerclear.experiments.training.opponents import Pool
+from steerclear.experiments.training.raid_starts import KINDS, PLACE, BeginInRaids, Recorder, StartStates, recorded
 from steerclear.experiments.training.raids_learner import Answer, RaidsLearner
-from steerclear.experiments.training.settings import League, Stage, settings_of
-from steerclear.experiments.training.submission import write_submission
+from steerclear.experiments.training.training import training_of
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.raids import SEEN
@@ -35,7 +35,7 @@ def moments_of(core, times_s):
             memory.append([Phase.RUN, True, True, False, -12.0, -40.0, False])
         core.step(np.tile([1.5, 20.0], (1, core.n_boats, 1)))
     games = {name: np.array([place[name] for place in places]) for name in PLACE}
-    return RaidMoments(games, np.array(memory, float), np.arange(4), np.array(["medium"] * 4, object))
+    return StartStates(games, np.array(memory, float), np.arange(4), np.array(["medium"] * 4, object))
 
 
 def pool_of(core):
@@ -47,13 +47,13 @@ def pool_of(core):
 
 @pytest.fixture
 def some():
-    core = core_of(settings_of({}), 1, 5)
+    core = core_of(config_of({}), 1, 5)
     core.reset(seed=5)
     return moments_of(core, (1.0, 2.0, 3.0, 4.0))
 
 
 def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(some):
-    core = core_of(settings_of({}), 200, 1)
+    core = core_of(config_of({}), 200, 1)
     begun = BeginInRaids(core, some, [0.0, 3.0, 0.0, 1.0, 0.0, 0.0], 3)
     core.reset(seed=1)
     assert 0.6 < (begun.drawn == 1).mean() < 0.9
@@ -69,7 +69,7 @@ def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(som
 
 
 def test_a_mirrored_game_goes_on_as_the_mirror_of_the_game_and_so_does_its_raid(some):
-    core = core_of(settings_of({}), 2, 1)
+    core = core_of(config_of({}), 2, 1)
     begun = BeginInRaids(core, some, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 3)
     while begun.mirrored.tolist() != [False, True]:
         core.reset(seed=None)
@@ -88,7 +88,7 @@ def test_a_mirrored_game_goes_on_as_the_mirror_of_the_game_and_so_does_its_raid(
 
 
 def test_a_recorder_keeps_the_moment_a_raid_begins():
-    core = core_of(settings_of({}), 1, 1)
+    core = core_of(config_of({}), 1, 1)
     core.reset(seed=1)
     for boat, at in enumerate(PLACES):
         core.games.state[0, boat, [L.X, L.Y]] = at
@@ -99,9 +99,9 @@ def test_a_recorder_keeps_the_moment_a_raid_begins():
     recorder.advance(np.arange(1))
     found = [(memory[0], KINDS[kind], opponent) for _, memory, kind, opponent in recorder.found]
     assert found == [(Phase.BAIT, "bait", "hold")]
-    assert RaidMoments.of(recorder.found, [1, 0, 0, 0, 0, 0]).kind.tolist() == [0]
+    assert StartStates.of(recorder.found, [1, 0, 0, 0, 0, 0]).kind.tolist() == [0]
     with pytest.raises(ConfigError, match="no raid came to 'drag'"):
-        RaidMoments.of(recorder.found, [1, 1, 0, 0, 0, 0])
+        StartStates.of(recorder.found, [1, 1, 0, 0, 0, 0])
 
 
 def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_same_opponent_and_last(tiny, tmp_path):
@@ -118,14 +118,21 @@ def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_sam
 
 
 def test_games_that_are_too_short_for_raids_are_one_error():
-    settings = settings_of({"games": 1, "rules": {"max_time_s": 1.0}})
+    config = config_of({"algorithm": "raids", "games": 1, "rules": {"max_time_s": 1.0}})
     with pytest.raises(ConfigError, match="no raid came to 'bait'"):
-        RaidMoments.of(recorded(settings, 0.0, 1), [1] * 6)
+        StartStates.of(recorded(config, 0.0, 1), [1] * 6)
 
 
 def learner(**ppo):
     given = {"learning_rate": 0.02, "batch": 64, "epochs": 8, **ppo}
-    return RaidsLearner(settings_of({"device": "cpu", "ppo": given, "net": {"hidden": [16]}}), 0.5, 1.0)
+    content = {
+        "algorithm": "raids",
+        "device": "cpu",
+        "ppo": given,
+        "net": {"hidden": [16]},
+        "options": {"furthest": 1.0},
+    }
+    return RaidsLearner(config_of(content))
 
 
 def test_gains_look_ahead_over_the_time_that_answers_are_held():
@@ -183,39 +190,17 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
     network = read_weights(tmp_path / "run" / "final.npz")
     assert (network.kind, network.interval, network.preset) == ("raids", 10, "aamas2024")
     assert make_batch(f"weights:{tmp_path / 'run' / 'best.npz'}").network.kind == "raids"
-    begun = replace(settings, start=str(tmp_path / "run" / "final.npz"), decisions=1)
+    begun = settings.model_copy(update={"start": str(tmp_path / "run" / "final.npz"), "decisions": 1})
     again = training_of(begun, tmp_path / "again", False)
     for one, two in zip(again.network().weights, network.weights, strict=True):
         np.testing.assert_array_equal(one, two)
     with pytest.raises(ConfigError, match="no entry is told"):
         write_submission(network, tmp_path / "solution.zip")
-    wider = replace(begun, net=replace(settings.net, hidden=(17,)))
+    wider = begun.model_copy(update={"net": Layers(hidden=(17,))})
     with pytest.raises(ConfigError, match="start does not fit"):
         training_of(wider, tmp_path / "wider", False)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"options": {"share": [1]}}, "unknown option 'share'.*shares"),
-        ({"options": {"spread": 0}}, "options.spread is 0"),
-        ({"options": {"recorded": []}}, "options.recorded is"),
-        ({"options": {"shares": [1, 1]}}, "give a list of 6 numbers"),
-        ({"options": {"shares": [0, 0, 0, 0, 0, 0]}}, "give one above 0"),
-        ({"stages": [{"opponents": ["hold"]}, {"opponents": ["medium"]}]}, "one stage"),
-        ({"net": {"hidden": [16], "roles": "each"}}, "no use for net.roles"),
-        ({"shield": "training", "shield_every": 10}, "no use for shield_every"),
-        ({"rules": {"team_size": 2}}, "teams of 3 boats"),
-        ({"actions": "normalised"}, "no use for actions"),
-        ({"ppo": {"value": 1.0}}, "no use for ppo.value"),
-        ({"net": {"hidden": [16], "features": False}}, "no use for net.features"),
-    ],
-)
-def test_what_raids_cannot_be_trained_with_is_one_error(tiny, tmp_path, changes, words):
-    with pytest.raises(ConfigError, match=words):
-        training_of(tiny_raids(tiny, **changes), tmp_path / "run", False)
-
-
-def test_raids_do_not_resume(tiny, tmp_path):
-    with pytest.raises(ConfigError, match="leave out --resume"):
-        training_of(tiny_raids(tiny), tmp_path / "run", True)
+def test_raids_are_for_teams_of_three(tiny, tmp_path):
+    with pytest.raises(ConfigError, match="teams of 3 boats"):
+        training_of(tiny_raids(tiny, rules={"team_size": 2}), tmp_path / "run", False)

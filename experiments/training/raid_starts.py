@@ -18,9 +18,9 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from .games import core_of, set_tags, shield_of
-from .pool import Pool
-from .settings import TrainingSettings
+from .config import RaidsConfig
+from .env import core_of, pool_of, set_tags, shield_of
+from .opponents import Pool
 
 PLACE = (
     "state",
@@ -50,7 +50,7 @@ Moment = tuple[dict[str, Array], list[float], int, str]
 
 
 @dataclass(frozen=True)
-class RaidMoments:
+class StartStates:
     """K moments.
 
     Attributes:
@@ -66,7 +66,7 @@ class RaidMoments:
     opponent: Array
 
     @staticmethod
-    def of(found: Sequence[Moment], shares: Sequence[float]) -> RaidMoments:
+    def of(found: Sequence[Moment], shares: Sequence[float]) -> StartStates:
         """Some moments, one at least of each kind that has a share.
 
         Raises:
@@ -81,7 +81,7 @@ class RaidMoments:
             )
         places, memory, _, opponents = zip(*found, strict=True)
         games = {name: np.array([place[name] for place in places]) for name in PLACE}
-        return RaidMoments(games, np.array(memory, float), np.array(kinds), np.array(opponents, object))
+        return StartStates(games, np.array(memory, float), np.array(kinds), np.array(opponents, object))
 
 
 class Recorder(RaidsBatch):
@@ -128,18 +128,18 @@ class _Drawn:
         return self._spread * self._rng.normal(size=(len(seen), len(NAMES)))
 
 
-def recorded(settings: TrainingSettings, spread: float, seed: int) -> list[Moment]:
+def recorded(config: RaidsConfig, spread: float, seed: int) -> list[Moment]:
     """Moments of as many games as a training plays at once, with its rules and shield, against its opponents."""
-    stage = settings.stages[0]
-    core = core_of(settings, settings.games, seed, stage)
+    stage = config.stages[0]
+    core = core_of(config, config.games, seed, stage)
     set_tags(core, stage)
     core.reset(seed=seed)
-    foe = Pool(stage, settings.league, seed, settings.entrants_every)
-    recorder = Recorder(settings.interval, spread, seed, foe)
+    foe = pool_of(config.model_copy(update={"seed": seed}), stage)
+    recorder = Recorder(config.interval, spread, seed, foe)
     recorder.reset(core, 0, seed)
     foe.reset(core, 1, seed + 1)
-    shielded = settings.shielded_training and stage.shielded
-    command_filter = shield_of(settings, core).filter_for(0) if shielded else None
+    shielded = config.shielded_training and stage.shielded
+    command_filter = shield_of(config, core, stage=stage).filter_for(0) if shielded else None
     commands = np.zeros((core.n_games, core.n_boats, 2))
     own, others = np.flatnonzero(core.team == 0), np.flatnonzero(core.team == 1)
     while not (core.terminated | core.truncated).all():
@@ -162,7 +162,7 @@ class BeginInRaids:
         mirrored: (B,) whether it was mirrored.
     """
 
-    def __init__(self, core: Any, moments: RaidMoments, shares: Sequence[float], seed: int) -> None:
+    def __init__(self, core: Any, moments: StartStates, shares: Sequence[float], seed: int) -> None:
         self._core, self._reset, self.moments = core, core.reset, moments
         self._shares = np.array(shares) / np.sum(shares)
         self._of_kind = [np.flatnonzero(moments.kind == number) for number in range(len(KINDS))]

@@ -1,0 +1,288 @@
+"""`TrainEnv`: the games of a training as a vector environment of Stable-Baselines3, stage after stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from steerclear.env.core import BatchedMctf
+from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.game_facts import facts_of_games
+from steerclear.shield.jit import Array
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.shared import share
+from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers.tallies import OWN_EVENTS
+from steerclear.shield.wrappers.team_batch import Stepped
+
+from .config import Games, Learning, Stage
+from .opponents import Pool
+from .rewards import WeightedSum
+
+
+def core_of(config: Games, games: int, seed: int, stage: Stage | None = None) -> BatchedMctf:
+    """So many games by a config's rules, a stage's or those of evaluations, starts drawn from the seed.
+
+    Raises:
+        ConfigError: the rules cannot be.
+    """
+    return BatchedMctf(config.game(stage), n_games=games, seed=seed)
+
+
+def shield_of(config: Learning, core: BatchedMctf, team: str = "blue", stage: Stage | None = None) -> Any:
+    """The shield of a config for some games, of a stage or of evaluations."""
+    settings = ShieldConfig.of(**{**facts_of_games(core).settings(), **config.shield_of(stage)})
+    return games_shield(core, settings, team=team)
+
+
+def pool_of(config: Learning, stage: Stage) -> Pool:
+    """The opponents of a stage."""
+    return Pool(stage, config.league, config.seed, config.entrants_every)
+
+
+def set_tags(core: BatchedMctf, stage: Stage) -> None:
+    """Let tags succeed as often as a stage says."""
+    chance = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
+    core.rules = share(core.rules._replace(tag_probability=float(chance)))
+
+
+class AskedShield:
+    """A command filter that asks another in the first game step of a decision and every so many after it.
+
+    Asked seldom it costs less and guarantees nothing in between, where what it said is held as a course and speed:
+    then it is a teacher only. Evaluations ask in every game step.
+
+    Args:
+        batch: the games; from now on its filter is this one.
+        every: game steps between questions.
+
+    Attributes:
+        spent_s: time it was asked for, s.
+    """
+
+    def __init__(self, batch: TeamBatch, every: int) -> None:
+        self._ask, self._boats, self._every = batch._filter, batch.boats, every
+        self.moved, self.spent_s = 0, 0.0
+        batch._filter = self
+
+    def __call__(self, core: Any, commands: Array) -> Array:
+        """Commands (B, n, 2) to obey."""
+        began = time.perf_counter()
+        heading_deg = core.state[:, self._boats, L.HEADING]
+        if self.moved % self._every == 0:
+            answer = np.array(self._ask(core, commands))
+            self._speed_mps = answer[:, self._boats, 0].copy()
+            self._course_deg = heading_deg + answer[:, self._boats, 1]
+        else:
+            answer = np.array(commands)
+            answer[:, self._boats, 0] = self._speed_mps
+            answer[:, self._boats, 1] = (self._course_deg - heading_deg + 180.0) % 360.0 - 180.0
+        self.moved += 1
+        self.spent_s += time.perf_counter() - began
+        return answer
+
+
+class TrainEnv(MctfVecEnv):
+    """Every blue boat of every game is a learner; opponents, rewards, shield and rules are those of the stage.
+
+    Where networks are told places or each place has its own, observations end in the boat's place, one-hot.
+
+    Args:
+        config: of the training.
+        first: network that decides where nobody of the team holds the flag. What the learner chose there changes
+            nothing, so that what it learns from it is zero on average.
+
+    Attributes:
+        batch: the games of the stage under way.
+        stage: its number.
+        spent_s: time in the games, s, shield included.
+
+    Raises:
+        ConfigError: the rules of a stage change what boats see, or a setting, reward or opponent cannot be.
+    """
+
+    def __init__(self, config: Learning, first: Any = None) -> None:
+        self.config, self.stage, self._first = config, 0, first
+        self.spent_s, self._ended = 0.0, []  # type: float, list[dict[str, float]]
+        self.batch = self._games(0)
+        self._check_stages()
+        super().__init__(self.batch)
+        core, boats = self.batch.core, len(self.batch.boats)
+        self._carriers, self._roles = carriers_of(core), np.tile(np.arange(boats), core.n_games)
+        told = getattr(config.net, "roles", "shared") != "shared"  # type: ignore[attr-defined]
+        self._places = np.tile(np.eye(boats, dtype=np.float32), (core.n_games, 1)) if told else None
+        if told:
+            self.observation_space = Box(-1.0, 1.0, (core.n_obs + boats,), np.float32)
+
+    def _games(self, number: int) -> TeamBatch:
+        config, stage = self.config, self.config.stages[number]
+        core = core_of(config, config.games, config.seed, stage)
+        shield = shield_of(config, core, stage=stage) if config.shield != "none" else None
+        batch = TeamBatch(
+            core,
+            pool_of(config, stage),
+            shield=shield if config.shielded_training else None,
+            actions=getattr(config, "actions", "discrete"),
+            seed=config.seed,
+            interval=config.interval,
+            reward=WeightedSum(config.reward_weights(stage)),
+        )
+        asked = AskedShield(batch, getattr(config, "shield_every", 1)) if config.shielded_training else None
+        self._guard = (batch.shield, asked)
+        return batch
+
+    def _check_stages(self) -> None:
+        """Build every pool and reward once, so that what is missing is found before long work."""
+        seen = core_of(self.config, 1, 0).observation_high
+        for stage in self.config.stages:
+            pool_of(self.config, stage)
+            WeightedSum(self.config.reward_weights(stage))
+            if stage.rules and not np.array_equal(core_of(self.config, 1, 0, stage).observation_high, seen):
+                raise ConfigError(
+                    f"rules {dict(stage.rules)!r} of a stage change what boats see or its bounds (field, teams, "
+                    "obstacles, top speed of the fastest boat, scores, cool-down); leave those as in the training's "
+                    "rules"
+                )
+        for name in self.config.evaluation.opponents:
+            Pool(Stage(opponents=(name,)), self.config.league, 0)
+
+    def enter(self, number: int) -> None:
+        """Go to a stage, in games of its own where its rules or shield are others; `begin` starts them."""
+        before, stage = self.config.stages[self.stage], self.config.stages[number]
+        self.stage = number
+        same_shield = self.config.shield_of(before) == self.config.shield_of(stage)
+        if self.config.game(stage) == self.batch.core.config and same_shield:
+            self.batch.opponent = pool_of(self.config, stage)
+        else:
+            self.batch = self._games(number)
+
+    def begin(self, seed: int) -> Any:
+        """Start all games of the stage; the observations.
+
+        Clocks are put forward by random times, so that games do not all end in the same step.
+        """
+        self.play_as_stage_says()
+        self.batch._seed = seed
+        seen = self.reset()
+        core = self.batch.core
+        decision_s = core.config.decision_s * self.batch.interval
+        latest = max(1, int(0.9 * core.config.max_time_s / decision_s))
+        core.time_s[:] = np.random.default_rng([seed, 5]).integers(0, latest, core.n_games) * decision_s
+        return seen
+
+    def play_as_stage_says(self) -> None:
+        """Let tags, shield and rewards of the games be those of the stage."""
+        stage, batch = self.config.stages[self.stage], self.batch
+        set_tags(batch.core, stage)
+        batch.shield, batch._filter = self._guard if stage.shielded else (None, None)
+        batch.reward = WeightedSum(self.config.reward_weights(stage))
+        batch.reward.begin(batch, np.ones(batch.core.n_games, np.bool_))
+
+    def reset(self) -> Any:
+        """As `MctfVecEnv.reset`."""
+        return self._placed(super().reset())
+
+    def decide(self, actions: Any) -> Stepped:
+        """A decision of all learners, held for the config's interval."""
+        began = time.perf_counter()
+        if self._guard[1] is not None:
+            self._guard[1].moved = 0
+        out = self.batch.step(actions if self._first is None else self._by_first(actions))
+        done, boats = out.terminated | out.truncated, len(self.batch.boats)
+        for game in np.flatnonzero(done[::boats]) * boats:
+            whole = {name: float(np.sum(out.episodes[name][game : game + boats])) for name in OWN_EVENTS}
+            self._ended.append({name: float(totals[game]) for name, totals in out.episodes.items()} | whole)
+        self.spent_s += time.perf_counter() - began
+        return out
+
+    def step_wait(self) -> Any:
+        """As `MctfVecEnv.step_wait`."""
+        out = self.decide(self._actions)
+        began, done = time.perf_counter(), out.terminated | out.truncated
+        infos = self._infos(out, done)
+        for i in np.flatnonzero(done) if self._places is not None else ():
+            last = infos[i]["terminal_observation"]
+            infos[i]["terminal_observation"] = np.concatenate([last, self._places[i]])
+        seen, rewards = self._placed(out.observations), out.rewards.astype(np.float32)
+        self.spent_s += time.perf_counter() - began
+        return seen, rewards, done, infos
+
+    def _placed(self, observations: Any) -> Any:
+        return observations if self._places is None else np.concatenate([observations, self._places], axis=1)
+
+    def _by_first(self, actions: Any) -> Any:
+        seen = self.batch.core.observations[:, self.batch.boats].reshape(self.batch.learners, -1)
+        free = ~(seen[:, self._carriers] > 0.0).any(axis=1)
+        own = np.array(actions)
+        if free.any():
+            own[free] = np.argmax(self._first.outputs(seen[free], self._roles[free]), axis=1)
+        return own
+
+    def ended(self) -> list[dict[str, float]]:
+        """Totals of games that have ended since the last call; hits and interventions are all its boats' together."""
+        games, self._ended = self._ended, []
+        return games
+
+    def taken(self) -> dict[str, float]:
+        """Time spent since the last call, s: simulator with opponents and rewards, and shield."""
+        shield_s = 0.0
+        if self._guard[1] is not None:
+            shield_s, self._guard[1].spent_s = self._guard[1].spent_s, 0.0
+        games_s, self.spent_s = self.spent_s, 0.0
+        return {"simulator_s": games_s - shield_s, "shield_s": shield_s}
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays of games, counts, rewards, shield and opponents that go on from decision to decision, live."""
+        batch = self.batch
+        found = dict(_arrays_in(batch.core.games, "games")) | {"observations": batch.core.observations}
+        found |= dict(_arrays_in(batch.tallies, "tallies"))
+        for name, term in batch.reward.terms.items():
+            found |= dict(_arrays_in(term, f"reward/{name}"))
+        if batch.shield is not None:
+            found |= {f"shield/{name}": values for name, values in batch.shield.remembered.items()}
+        for name, member in batch.opponent.members.items():
+            if not hasattr(member, "plays"):  # those that do play game after game, and begin anew
+                found |= dict(_arrays_in(member, f"opponent/{name}"))
+        return found
+
+    def put(self, saved: dict[str, np.ndarray], seed: int, pool: dict[str, Any], snapshots: Any) -> None:
+        """Go on where the arrays, and what the pool told, were taken in this stage.
+
+        Args:
+            saved: copies of `arrays`.
+            seed: the batch's.
+            pool: `Pool.facts`.
+            snapshots: reads the network of a snapshot's name.
+
+        Raises:
+            ConfigError: they are those of another training.
+        """
+        self.play_as_stage_says()
+        self.batch.opponent.remember(pool["members"], snapshots)
+        self.batch.reset(seed)
+        self.batch.opponent.put(pool)
+        for name, live in self.arrays().items():
+            if name not in saved or saved[name].shape != live.shape:
+                raise ConfigError(f"the checkpoint holds other {name}; resume with the config it was made with")
+            live[...] = saved[name]
+
+
+def carriers_of(core: Any) -> np.ndarray:
+    """Numbers of an observation that tell who of the own team holds the flag."""
+    keys = [key if isinstance(key, str) else "/".join(key) for key in core.observation_keys]
+    own = [k for k, key in enumerate(keys) if key.endswith("has_flag") and not key.startswith("opponent")]
+    return np.array(own, np.int64)
+
+
+def _arrays_in(thing: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays that an object or named tuple holds, by name; they are the live ones."""
+    items = zip(thing._fields, thing, strict=True) if hasattr(thing, "_fields") else sorted(vars(thing).items())
+    for key, value in items:
+        if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+            yield f"{name}/{key}", value
+        elif hasattr(value, "_fields"):
+            yield from _arrays_in(value, f"{name}/{key}")

@@ -1,0 +1,191 @@
+"""PPO: gone on with to the same curve, exported as it plays, begun with weights, stopped in words."""
+
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from steerclear.experiments.cli import app
+from steerclear.experiments.training.checkpoints import FACTS, newest, read_checkpoint
+from steerclear.experiments.training.config_file import read_config
+from steerclear.experiments.training.ppo import PpoTraining
+from steerclear.experiments.training.training import DivergedError
+from steerclear.policies.entrants.learned import read_weights
+from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
+
+SHIELDED = {
+    "shield": "training",
+    "shield_every": 5,
+    "stages": [
+        {"opponents": ["hold"], "games": 2, "net": -5, "shielded": False, "rewards": {"tagging": 0.5}},
+        {"opponents": ["medium"], "games": 2, "net": -5, "rules": {"catch_radius_m": 5.0, "max_time_s": 9.0}},
+        {"opponents": ["medium"], "cooldown_s": [10, 40], "shield_settings": {"separation_m": 1.0}},
+    ],
+}
+
+
+def without_time(curve):
+    return [{name: value for name, value in row.items() if name != "wall"} for row in curve]
+
+
+def stop_at(decisions):
+    def stop(done, words):
+        if done >= decisions:
+            raise KeyboardInterrupt
+
+    return stop
+
+
+def trained(config, folder, resume=False):
+    training = PpoTraining(read_config(config), folder, resume)
+    training.run()
+    return training
+
+
+def numbers(network):
+    return [*network.weights, *network.biases]
+
+
+def changes_of(one, two):
+    return max(float(np.abs(a - b).max()) for a, b in zip(numbers(one), numbers(two), strict=True))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"net": {"hidden": [16], "roles": "placed"}}, {"net": {"hidden": [16], "roles": "each"}}, SHIELDED],
+    ids=["placed", "each", "stages"],
+)
+def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, changes):
+    reference = trained(tiny(**changes), tmp_path / "whole")
+    for stop in (36, 108):
+        with pytest.raises(KeyboardInterrupt):
+            PpoTraining(read_config(tiny(**changes)), tmp_path / "half", resume=True).run(stop_at(stop))
+        rows = json.loads((tmp_path / "half" / "curve.json").read_text())["rows"]
+        assert rows[-1]["decisions"] == stop
+    again = trained(tiny(**changes), tmp_path / "half", resume=True)
+    assert without_time(again.curve) == without_time(reference.curve)
+    assert changes_of(again.network(), reference.network()) == 0.0
+
+
+def test_a_snapshot_stays_as_the_learner_was_and_equals_its_file(tiny, tmp_path):
+    training = PpoTraining(read_config(tiny(net={"hidden": [16], "roles": "each"})), tmp_path / "run")
+    with pytest.raises(KeyboardInterrupt):
+        training.run(stop_at(108))
+    pool = training.env.batch.opponent.members
+    names = [name for name in pool if name.startswith("self_")]
+    assert names
+    for name in names:
+        assert changes_of(pool[name].network, read_weights(tmp_path / "run" / "snapshots" / f"{name}.npz")) == 0.0
+    assert changes_of(pool[names[0]].network, training.network()) > 0.0
+
+
+def test_the_critic_may_learn_alone_at_first_and_a_resumed_training_knows_how_long(tiny, tmp_path):
+    config = tiny(ppo={"steps": 6, "batch": 18, "epochs": 2, "critic_first": 3})
+    begun = PpoTraining(read_config(config), tmp_path / "run")
+    at_first = begun.network()
+    with pytest.raises(KeyboardInterrupt):
+        begun.run(stop_at(72))
+    resumed = PpoTraining(read_config(config), tmp_path / "run", resume=True)
+    with pytest.raises(KeyboardInterrupt):
+        resumed.run(stop_at(108))
+    assert changes_of(at_first, resumed.network()) == 0.0
+    resumed.run()
+    assert changes_of(at_first, resumed.network()) > 0.0
+
+
+def test_an_evaluation_that_fails_loses_nothing_and_is_made_up_for(tiny, tmp_path, monkeypatch):
+    def failing(*arguments):
+        raise RuntimeError("an opponent's file is gone")
+
+    config, folder = tiny(evaluation={"every": 100, "games": 2}, decisions=72), tmp_path / "run"
+    with monkeypatch.context() as patched:
+        patched.setattr("steerclear.experiments.training.evaluation.play_games", failing)
+        with pytest.raises(RuntimeError, match="is gone"):
+            trained(config, folder)
+    facts, _ = read_checkpoint(newest(folder))
+    assert facts["decisions"] == 72
+    assert "evaluation" not in facts["curve"][-1]
+    kept = read_weights(folder / "final.npz")
+    gone_on = trained(config, folder, resume=True)
+    assert gone_on.curve[-1]["evaluation"]["medium"]["games"] == 2
+    assert changes_of(kept, gone_on.network()) == 0.0
+
+
+def test_a_loss_that_is_not_finite_ends_in_one_line_and_keeps_what_was(tiny, tmp_path):
+    training = PpoTraining(read_config(tiny()), tmp_path / "run")
+
+    def poison(done, words):
+        for parameter in training.model.policy.parameters():
+            parameter.data.fill_(float("nan"))
+
+    with pytest.raises(DivergedError, match=r"no longer finite; lower ppo\.learning_rate"):
+        training.run(poison)
+    path = newest(tmp_path / "run")
+    assert read_checkpoint(path)[0]["rollouts"] == 1
+    export = CliRunner().invoke(app, ["export", str(path), "--out", str(tmp_path / "team.npz")])
+    assert export.exit_code == 0, export.output
+    assert "for games of preset aamas2024" in export.output
+    assert all(np.isfinite(values).all() for values in numbers(read_weights(tmp_path / "team.npz")))
+
+
+def test_a_damaged_or_foreign_checkpoint_is_refused_in_one_line_and_kept(tiny, tmp_path):
+    folder = tmp_path / "run"
+    trained(tiny(decisions=36), folder)
+    with pytest.raises(ConfigError, match="another net; resume with its own config"):
+        PpoTraining(read_config(tiny(net={"hidden": [8]}, decisions=36)), folder, resume=True)
+    path = newest(folder)
+    whole = path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    for change, words in (
+        (lambda facts: facts.pop("pool"), "'pool' is missing"),
+        (lambda facts: facts.pop("settings"), "'settings' is missing"),
+        (lambda facts: facts.update(stage=99), "out of range"),
+    ):
+        facts = json.loads(content[FACTS])
+        change(facts)
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, value in {**content, FACTS: json.dumps(facts)}.items():
+                archive.writestr(name, value)
+        with pytest.raises(ConfigError, match=rf"damaged or of another version.*{words}.*delete it"):
+            PpoTraining(read_config(tiny(decisions=36)), folder, resume=True)
+    path.write_bytes(whole[:500])
+    with pytest.raises(ConfigError, match=r"no whole checkpoint.*delete it"):
+        PpoTraining(read_config(tiny(decisions=36)), folder, resume=True)
+    path.rename(path.with_suffix(".npz"))
+    with pytest.raises(ConfigError, match=r"a training of 0\.8\.0 or before, which only that version goes on with"):
+        PpoTraining(read_config(tiny(decisions=36)), folder, resume=True)
+
+
+@pytest.mark.parametrize("roles", ["shared", "placed", "each"])
+def test_exported_networks_play_as_the_trained_ones(tiny, tmp_path, roles):
+    import torch
+
+    training = trained(tiny(net={"hidden": [16, 8], "roles": roles}, decisions=36), tmp_path / "run")
+    network = read_weights(tmp_path / "run" / "final.npz")
+    seen = np.random.default_rng(0).uniform(-1, 1, (300, network.n_obs)).astype(np.float32)
+    places = np.arange(300) % 3
+    told = seen if roles == "shared" else np.concatenate([seen, np.eye(3, dtype=np.float32)[places]], axis=1)
+    with torch.no_grad():
+        logits = training.model.policy.get_distribution(torch.as_tensor(told)).distribution.logits.numpy()
+    ours = network.outputs(seen, places)
+    assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
+
+
+@pytest.mark.parametrize("roles", ["shared", "placed"])
+def test_a_wider_network_begins_exactly_as_the_one_it_starts_with_and_then_learns_with_all_of_it(tiny, tmp_path, roles):
+    trained(tiny(net={"hidden": [16, 8], "roles": roles}, decisions=36), tmp_path / "narrow")
+    path = tmp_path / "narrow" / "final.npz"
+    narrow = read_weights(path)
+    net = {"hidden": [24, 20], "roles": roles}
+    wide = PpoTraining(read_config(tiny(net=net, start=str(path), decisions=36)), tmp_path / "wide")
+    seen, places = np.random.default_rng(0).uniform(-1, 1, (300, narrow.n_obs)).astype(np.float32), np.arange(300) % 3
+    np.testing.assert_allclose(wide.network().outputs(seen, places), narrow.outputs(seen, places), atol=1e-5)
+    wide.run()
+    after = wide.network()
+    assert (after.weights[1][:, 16:, :8] != 0.0).all()
+    assert (after.weights[2][:, 8:] != 0.0).all()
+    again = tiny(net={"hidden": [16, 8], "roles": roles}, start=str(tmp_path / "wide" / "final.npz"))
+    with pytest.raises(ConfigError, match="does not fit this network: a layer of shape"):
+        PpoTraining(read_config(again), tmp_path / "again")
