@@ -157,9 +157,14 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
 
         return _call(load_weights, text, options, text.removeprefix(WEIGHTS_PREFIX))
     if text.startswith(SB3_PREFIX):
-        from .sb3 import load_sb3
+        from .entrants.learned import load_trained
+        from .sb3 import load_sb3, trained_here
 
-        return _call(load_sb3, text, options, text.removeprefix(SB3_PREFIX))
+        path = text.removeprefix(SB3_PREFIX)
+        if trained_here(path):
+            options.pop("allow_code", None)  # none of its code runs
+            return _call(load_trained, text, options, path)
+        return _call(load_sb3, text, options, path)
     if (own := own_code(text)) is not None:
         return _call(load_own, text, options, *own)
     if looks_like_path(text):

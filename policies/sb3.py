@@ -20,11 +20,12 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.extras import install_command
 
 from .guard import Answer, ForeignCode, GuardedTeam, game_facts
-from .protocol import TeamPolicy
 from .submissions.stage import ENTRY_FILE, check_members
 
 ALGORITHMS = ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG")
 _MARKS = (("clip_range", "PPO"), ("exploration_fraction", "DQN"), ("target_entropy", "SAC"), ("policy_delay", "TD3"))
+CARD, MOST_CARD_BYTES = "steerclear_card.json", 2**16
+"""Member of a zip of ``steerclear train`` that says what game the model learned; SB3 does not look at it."""
 MAX_BYTES, MAX_DATA_BYTES = 1024**3, 64 * 1024**2
 """Largest size of a model, unpacked, and of the settings in it, bytes."""
 ENTRIES = frozenset({"entries", "entry", "submissions", "submission", "tournament", "tournaments"})
@@ -207,16 +208,37 @@ def _is_unit_box(space: Any) -> bool:
 
 
 def trained_here(path: str | Path) -> bool:
-    """Whether a model is one of ``steerclear train``, by the card in its zip: its numbers play, its pickles never run.
-
-    A file that cannot be read is none.
-    """
-    from .entrants.learned.sb3_file import read_card
-
+    """Whether a model is one of ``steerclear train``, by the card in its zip; a file that cannot be read is none."""
     try:
         return bool(read_card(Path(path).expanduser()).get("trained_with"))
     except PolicyError:
         return False
+
+
+def read_card(file: Path) -> dict[str, Any]:
+    """The card of a model of ours; empty where there is none. Nothing else of the zip is read.
+
+    Raises:
+        PolicyError: the zip or its card cannot be read.
+    """
+    try:
+        return _card(file)
+    except UNREADABLE as error:
+        why = " ".join(str(error).split())[:160]
+        raise PolicyError(f"{file} is not a Stable-Baselines3 model: {why}; give the zip model.save wrote") from error
+
+
+def _card(file: Path) -> dict[str, Any]:
+    """The card, or what is wrong with it as one of `UNREADABLE`."""
+    with zipfile.ZipFile(file) as archive:
+        if CARD not in archive.namelist():
+            return {}
+        if archive.getinfo(CARD).file_size > MOST_CARD_BYTES:
+            raise ValueError("its card is too large")
+        card = json.loads(archive.read(CARD))
+    if not isinstance(card, dict):
+        raise ValueError("its card is none")
+    return card
 
 
 def load_sb3(
@@ -225,12 +247,11 @@ def load_sb3(
     name: str | None = None,
     allow_code: bool | None = None,
     max_bytes: int = MAX_BYTES,
-) -> TeamPolicy:
+) -> GuardedTeam:
     """A saved Stable-Baselines3 model as a team policy.
 
-    One of ``steerclear train`` plays what was trained: its tensors are read as `load_weights` reads exported ones, with
-    its interval and its networks by place, and no code of it runs. Any other is asked anew in every step of the game,
-    and loading it runs code of whoever made it; that is logged before.
+    It is asked anew in every step of the game, and loading it runs code of whoever made it; that is logged before. One
+    of ``steerclear train`` is refused: `make` plays what was trained, from its tensors alone.
 
     Args:
         path: the zip ``model.save`` wrote.
@@ -243,9 +264,9 @@ def load_sb3(
     Raises:
         PolicyError: the extra ``[train]`` is missing, the file is no such model, too large, or refused.
     """
-    if algorithm is None and trained_here(path):
-        from .entrants.learned.play import LearnedTeam
-        from .entrants.learned.sb3_file import read_sb3
-
-        return LearnedTeam(read_sb3(path), name or Path(path).stem)
+    if trained_here(path):
+        raise PolicyError(
+            f"{path} was made by steerclear train and holds each decision for a time, which no other code knows of; "
+            f"play it by name as sb3:{path}, or weights:final.npz of its training"
+        )
     return GuardedTeam(name or Path(path).stem, Sb3Code(path, algorithm, allow_code, max_bytes))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from steerclear import policies
 from steerclear.env.config import GameConfig
-from steerclear.policies.entrants.learned.sb3_file import check_whole, read_card
+from steerclear.policies.entrants.learned.sb3_file import check_whole
 from steerclear.policies.registry import SB3_PREFIX
-from steerclear.policies.sb3 import check_origin, code_warning
+from steerclear.policies.sb3 import check_origin, code_warning, read_card
 
 from ..entries.team import is_entry, make_team
 from ..play.learned_elsewhere import words_of_elsewhere, words_of_shield

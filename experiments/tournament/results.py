@@ -114,7 +114,8 @@ def _qualifying(rows: Sequence[Row], settings: TournamentSettings) -> list[dict[
                 (row, side)
                 for row in rows
                 for side in SIDES
-                if row["phase"] == QUALIFYING and row["state"] == state and row["examined"] == side and row[side] == team
+                if row["phase"] == QUALIFYING and row["state"] == state
+                if row["examined"] == side and row[side] == team
             ]
             if seats:
                 scores = [_primary(row, side, settings.penalty) for row, side in seats]

@@ -43,6 +43,13 @@ def load_weights_batch(path: str | Path, sample: bool = False) -> LearnedBatch |
     return batch_of(read_weights(path), Path(path).stem, sample)
 
 
+def load_trained(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedTeam:
+    """A model of ``steerclear train`` as a team policy: what was trained, read as numbers; see `load_sb3_batch`."""
+    from .sb3_file import read_sb3
+
+    return LearnedTeam(read_sb3(path, interval), Path(path).stem, sample)
+
+
 def load_sb3_batch(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedBatch:
     """A saved Stable-Baselines3 model for a batch of games. Its tensors alone are read: none of its pickles runs.
 
@@ -78,8 +85,8 @@ def learned_in(name: str) -> str:
     Raises:
         PolicyError: its file cannot be read.
     """
+    from ...sb3 import read_card
     from .entered import FILES
-    from .sb3_file import read_card
 
     if name.startswith(SB3):
         return preset_in(read_card(Path(name.removeprefix(SB3)).expanduser()))

@@ -14,14 +14,12 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.extras import install_command
 
-from ...sb3 import UNREADABLE, algorithm_of, saved_settings
+from ...sb3 import CARD, UNREADABLE, algorithm_of, read_card, saved_settings
 from .network import Features, Network
 
 PLAYABLE = ("PPO", "A2C")
 ABOUT = "steerclear."
 """Our own tensors among a model's begin like this."""
-CARD, MOST_CARD_BYTES = "steerclear_card.json", 2**16
-"""Member of the zip that says what game the model learned; SB3 does not look at it."""
 TAKES_OVER = "takes_over"
 """Entry of the card: the model plays only while the flag is held, and another network until then."""
 REMEDY = "give a PPO or A2C zip with an MlpPolicy, or one of steerclear train"
@@ -58,19 +56,6 @@ def add_card(file: Path | io.BytesIO, card: Mapping[str, Any]) -> None:
         archive.writestr(CARD, json.dumps(dict(card)))
 
 
-def read_card(file: Path) -> dict[str, Any]:
-    """The card of a model of ours; empty where there is none. Nothing else of the zip is read.
-
-    Raises:
-        PolicyError: the zip or its card cannot be read.
-    """
-    try:
-        return _card(file)
-    except UNREADABLE as error:
-        why = " ".join(str(error).split())[:160]
-        raise PolicyError(f"{file} is not a Stable-Baselines3 model: {why}; {REMEDY}") from error
-
-
 def check_whole(file: Path, card: Mapping[str, Any]) -> None:
     """Refuse a model that is half of what plays.
 
@@ -82,19 +67,6 @@ def check_whole(file: Path, card: Mapping[str, Any]) -> None:
             f"{file} holds one network of two, the one that takes over while the flag is held; give final.npz or "
             "best.npz of its training, which hold both (to play: weights:FINAL.npz)"
         )
-
-
-def _card(file: Path) -> dict[str, Any]:
-    """The card, or what is wrong with it as one of `UNREADABLE`."""
-    with zipfile.ZipFile(file) as archive:
-        if CARD not in archive.namelist():
-            return {}
-        if archive.getinfo(CARD).file_size > MOST_CARD_BYTES:
-            raise ValueError("its card is too large")
-        card = json.loads(archive.read(CARD))
-    if not isinstance(card, dict):
-        raise ValueError("its card is none")
-    return card
 
 
 def _tensors(file: Path) -> dict[str, Any]:
