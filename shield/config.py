@@ -11,6 +11,7 @@ from typing import Any
 from .exceptions import ConfigError
 
 COORDINATION = ("team", "per_boat")
+BEYOND_THEN = ("flee", "stop")
 
 
 PROFILES = {"players": (12.0, 7.0), "rammers": (math.inf, math.inf), "hold-course": (0.0, 0.0)}
@@ -75,6 +76,9 @@ class ShieldConfig:
         max_track_age_s: tracks older than this are refused, s.
         delay_s: time from decision to effect, s, rounded up to whole steps: boats are run on by it before deciding.
         edge_m: distance to keep from the field edge, m; None: the edge is not kept.
+        beyond_m: how far outside the field's edge its hard line lies, m; None: there is none.
+        beyond_then: what becomes of a boat beyond the hard line: "flee" lets it go on to keep clear of others, "stop"
+            stops it there, and before obstacles, whatever else is in its way, see `filter.last_line`.
         hull_m: distance to keep from walls of obstacles, m. Where nobody gives it, a wrapper or `games_shield` takes
             the radius of its game's boats, if that is larger and there are obstacles.
         barriers: names of registered barriers that are kept as obstacles are, see `barriers.registry.register_barrier`;
@@ -112,6 +116,8 @@ class ShieldConfig:
     max_track_age_s: float = 2.0
     delay_s: float = 0.0
     edge_m: float | None = 0.2
+    beyond_m: float | None = None
+    beyond_then: str = "flee"
     hull_m: float = Unsaid(1.0)
     barriers: tuple[str, ...] = ()
 
@@ -131,6 +137,8 @@ class ShieldConfig:
             raise ConfigError(f"unknown certificate {self.certificate!r}; choose one of {', '.join(CERTIFICATES)}")
         if self.coordination not in COORDINATION:
             raise ConfigError(f"unknown coordination {self.coordination!r}; choose one of {', '.join(COORDINATION)}")
+        if self.beyond_then not in BEYOND_THEN:
+            raise ConfigError(f"unknown beyond_then {self.beyond_then!r}; choose one of {', '.join(BEYOND_THEN)}")
         check_solver(self.solver)
         if self.move_s is not None and abs(self.moves - self.dt_s / self.move_s) > 1e-6:
             raise ConfigError(f"dt_s is {self.dt_s:g}, no whole number of moves of {self.move_s:g} s (move_s)")
@@ -189,7 +197,7 @@ def _names(barriers: object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-_TEXTS = {"certificate", "coordination", "profile", "solver"}
+_TEXTS = {"beyond_then", "certificate", "coordination", "profile", "solver"}
 _RATES = {"response_per_s", "table_response_per_s", "fixed_response_per_s"}
 _POSITIVE = _RATES | {"search_limit", "give_way_after_s", "separation_m", "dt_s", "move_s", "speed_weight", "horizon_s"}
 RANGES = {
@@ -197,6 +205,7 @@ RANGES = {
     "buffer_m": (0.0, 50.0),
     "hull_m": (0.0, 200.0),
     "edge_m": (0.0, 200.0),
+    "beyond_m": (0.0, 1000.0),
     "position_error_m": (0.0, 100.0),
     "table_margin_m": (0.0, 50.0),
     "current_mps": (0.0, 10.0),
@@ -217,7 +226,7 @@ cap of margins would weigh more than the field's edge. Lengths and speeds beyond
 the water would be closed."""
 _UNITS = {"m": ("mm", "m"), "s": ("ms", "s"), "mps": ("mm/s", "m/s"), "weight": ("", ""), "limit": ("", "clearances")}
 """By the end of a setting's name: the unit a thousand times smaller in which it may have been given, and its own."""
-_MAY_BE_NONE = {"adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m"}
+_MAY_BE_NONE = {"adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m", "beyond_m"}
 _MAY_BE_INFINITE = _RATES | {"adversary_s", "visitor_s", "max_track_age_s", "give_way_after_s", "search_limit"}
 
 

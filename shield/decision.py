@@ -46,9 +46,17 @@ class Reason(IntEnum):
     """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
     LIMITED = plan.LIMITED
     """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its backup."""
+    STOPPED = plan.STOPPED
+    """The boat is beyond the hard line, or would else touch an obstacle, where the settings say "stop"
+    (`ShieldConfig.beyond_then`): it is told to stop on its course, and its link's own stop is asked for."""
 
 
-FALLBACKS = {Reason.BACKUP: "backup manoeuvre", Reason.BEST_EFFORT: "best effort", Reason.HELD: "hold"}
+FALLBACKS = {
+    Reason.BACKUP: "backup manoeuvre",
+    Reason.BEST_EFFORT: "best effort",
+    Reason.HELD: "hold",
+    Reason.STOPPED: "stop",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +81,7 @@ class Decision:
             decisions read from a black box.
         cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
             the best that was verified until then.
+        outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
         feared_s: how long from now this boat, an opponent, was taken to do its worst before it holds its course, s
             (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
     """
@@ -92,6 +101,7 @@ class Decision:
     no_table: tuple[str, ...] | None = None
     cut_short: bool = False
     feared_s: float | None = None
+    outside_m: float = 0.0
 
     def __eq__(self, other: object) -> bool:
         return self._said() == other._said() if isinstance(other, Decision) else NotImplemented
@@ -125,6 +135,7 @@ class Decisions(Sequence[Decision]):
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
         feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
         barriers: names of the registered barriers that are kept.
+        area: (xmin, ymin, xmax, ymax) of the field decided in, m; None: there is none.
 
     Raises:
         FleetError: indexed by a name that no boat has, or by what is neither place nor name.
@@ -144,6 +155,7 @@ class Decisions(Sequence[Decision]):
     cut_short: BoolArray | None = None
     feared_s: Array | None = None
     barriers: tuple[str, ...] = ()
+    area: tuple[float, float, float, float] | None = None
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -200,6 +212,7 @@ class Decisions(Sequence[Decision]):
             no_table=self._no_table(i),
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
             feared_s=self._feared_s(i),
+            outside_m=float(self.outside_m[i]),
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:
@@ -231,6 +244,15 @@ class Decisions(Sequence[Decision]):
             "  ".join(f"{cell:{'<' if k in left else '>'}{widths[k]}}" for k, cell in enumerate(row)) for row in rows
         ]
         return "\n".join(line.rstrip() for line in lines)
+
+    @property
+    def outside_m(self) -> Array:
+        """(n,) how far outside the field's edge each boat was seen, m; 0 inside, or where there is no field."""
+        if self.area is None:
+            return np.zeros(len(self))
+        xmin, ymin, xmax, ymax = self.area
+        x, y = self.fleet.position_m.T
+        return np.maximum.reduce([xmin - x, ymin - y, x - xmax, y - ymax, np.zeros(len(self))])
 
     @property
     def count_intervened(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from .jit import Array, BoolArray, IntArray, lean_kernel
 from .shared import share
 
-PASSED, QP, QP_RELAXED, BACKUP, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY, LIMITED = range(9)
+PASSED, QP, QP_RELAXED, BACKUP, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY, LIMITED, STOPPED = range(10)
 
 LARGEST_COMMAND = 1e6
 """Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""

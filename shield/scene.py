@@ -107,6 +107,10 @@ class Static(NamedTuple):
         segment_m: distance to keep from segments, m.
         side_m: distance from a segment within which it is not known on which side of it a boat is, m.
         current_mps: bound on the speed of a current whose direction is not known, m/s.
+        line: (xmin, ymin, xmax, ymax) of the hard line that stops boats, m; infinite where none does.
+        last_circles, last_segments: how many of the first circles and segments stop boats before them, whatever else
+            is in their way.
+        last_m: how much nearer than the distance to keep these do, m.
     """
 
     field: Array
@@ -116,6 +120,10 @@ class Static(NamedTuple):
     segment_m: float
     side_m: float
     current_mps: float
+    line: Array
+    last_circles: int
+    last_segments: int
+    last_m: float
 
 
 class Registered(NamedTuple):

@@ -191,6 +191,7 @@ class Shield:
             cut_short=decided.cut_short,
             feared_s=decided.feared_s,
             barriers=self.config.barriers,
+            area=(self.surroundings if surroundings is None else surroundings).field,
         )
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:

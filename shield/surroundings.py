@@ -24,6 +24,9 @@ from .shared import share
 
 Point = tuple[float, float]
 
+LAST_SHARE = 0.5
+"""Boats are stopped before an obstacle when within this share of the hull of it: until then they may turn away."""
+
 
 @dataclass(frozen=True)
 class Surroundings:
@@ -87,8 +90,18 @@ class Surroundings:
                 segment_m=config.hull_m + wider_m,
                 side_m=wider_m,
                 current_mps=float(config.current_mps),
+                line=self._line(config),
+                last_circles=len(self.circles) if config.beyond_then == "stop" else 0,
+                last_segments=len(segments) if config.beyond_then == "stop" else 0,
+                last_m=LAST_SHARE * config.hull_m,
             )
         )
+
+    def _line(self, config: ShieldConfig) -> Array:
+        """The rectangle (xmin, ymin, xmax, ymax) beyond which boats are stopped, m; infinite where none are."""
+        if self.field is None or config.beyond_m is None or config.beyond_then != "stop":
+            return np.array([-np.inf, -np.inf, np.inf, np.inf])
+        return np.array(self.field, np.float64) + config.beyond_m * np.array([-1.0, -1.0, 1.0, 1.0])
 
     def _edge(self, config: ShieldConfig) -> Array:
         """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""

@@ -38,6 +38,7 @@ WHY = {
     Reason.NOT_COVERED: ("-", "dim"),
     Reason.RIGHT_OF_WAY: ("way", "cyan"),
     Reason.LIMITED: ("limit", "yellow"),
+    Reason.STOPPED: ("stopped", "bold red"),
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..memory import Memory
+from ..plan import STOPPED
 from ..platforms import layout as L
 from ..scene import Scene
 from ..work import Work
@@ -134,7 +135,9 @@ def lay_first(scene: Scene, done: int, who: BoolArray) -> None:
     """Give each boat of ``who`` the manoeuvre to begin with: the one in memory, else the first of the family."""
     state, memory, work = scene.state, scene.memory, scene.work
     for i in range(state.shape[0]):
-        if who[i]:
+        if who[i] and scene.plan.reason[i] == STOPPED:
+            lay_path(i, i, 1.0, 0.0, 0.0, done, scene)
+        elif who[i]:
             heading = work.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
             first = IN_MEMORY if remembered(i, done, heading, memory) else FAMILY
             side, togo, speed = candidate(i, first, scene.plan.commands[i, 0], heading, scene)
@@ -163,7 +166,7 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
     for sweep in range(SWEEPS):
         changed = False
         for i in range(n):
-            if not who[i]:
+            if not who[i] or scene.plan.reason[i] == STOPPED:
                 continue
             best_of = done == 0 and sweep == 0
             if not best_of:
@@ -182,6 +185,6 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
             stale = False
             break
     for i in range(n):
-        if ours[i] and (stale or not who[i]):
+        if ours[i] and (stale or not who[i] or scene.plan.reason[i] == STOPPED):
             refresh(i, scene)
     return all_keep(ALL, ours, work)

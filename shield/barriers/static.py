@@ -24,6 +24,7 @@ from ..platforms import layout as L
 from ..scene import Boats, Registered, Scene, Static
 from .clearance import FAR, MARGIN, lower
 from .constraints import SIDES, count_all, count_obstacles, margin_at, registered_number, wall_number
+from .edge import to_side
 from .registered import LOST_M
 from .walls import goes_through
 from .way_back import PARTS, RETURN_S, straight_on, worth_of_way_back
@@ -212,3 +213,12 @@ def clear_of_near_obstacles(i: int, slot: int, scene: Scene, most_m: float, out:
     out[MARGIN] = most_m
     here, path = scene.state[i], scene.work.path[slot]
     return clear_of_constraints(True, here, path, _sampling(i, 0.0, scene), scene.static, scene.registered, out)
+
+
+@lean_kernel
+def beyond_line(i: int, scene: Scene) -> bool:
+    """Whether boat i is beyond the hard line, and that stops boats."""
+    x, y, line = scene.state[i, L.X], scene.state[i, L.Y], scene.static.line
+    return min(to_side(x, y, 0, line)[0], to_side(x, y, 1, line)[0]) < 0.0 or (
+        min(to_side(x, y, 2, line)[0], to_side(x, y, 3, line)[0]) < 0.0
+    )

@@ -24,6 +24,7 @@ from ..platforms.usv import wrap_degrees
 from ..scene import Scene
 from .easing import any_may_be_eased, ease
 from .groups import close_groups, make_groups, open_group
+from .last_line import keep_last_line
 from .least_change import ROUNDS, accept, among_mates, begin_program, end_program, linearise
 from .linearised import solve_compiled
 from .screening import screen
@@ -125,6 +126,7 @@ def _name_unchanged(scene: Scene) -> None:
 def end(scene: Scene) -> None:
     """Say what binds and why, and remember what was decided."""
     close_groups(scene)
+    keep_last_line(scene)
     commit(scene)
     _name_unchanged(scene)
     _name_static(scene)

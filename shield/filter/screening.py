@@ -6,9 +6,10 @@ from ..backup.assign import assign_plans
 from ..barriers.clearance import FAR
 from ..barriers.neighbours import find_neighbours
 from ..barriers.registered import unknown_at
+from ..barriers.static import beyond_line
 from ..jit import copy_row, lean_kernel
 from ..liveness.right_of_way import apply_right_of_way
-from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED
+from ..plan import HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, STOPPED
 from ..platforms import layout as L
 from ..platforms.usv import wrap_degrees
 from ..scene import Boats, Scene
@@ -82,6 +83,10 @@ def screen(scene: Scene) -> bool:
         if not usable or unknown_at(i, scene) >= 0:
             plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
             plan.reason[i] = HELD
+        if beyond_line(i, scene):
+            plan.commands[i, 0], plan.commands[i, 1], plan.reason[i] = 0.0, 0.0, STOPPED
+            predict(i, plan.commands, scene)
+            continue
         apply_right_of_way(i, scene)
         predict(i, plan.commands, scene)
         plan.wanted_turn[i] = wrap_degrees(work.next_state[i, L.HEADING] - state[i, L.HEADING])

@@ -27,7 +27,7 @@ from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
 from ..jit import lean_kernel
-from ..plan import BACKUP, BEST_EFFORT, Plan
+from ..plan import BACKUP, BEST_EFFORT, STOPPED, Plan
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..scene import Scene
@@ -197,6 +197,6 @@ def back_up(scene: Scene) -> None:
     _find_backups(pick_movers(scene), scene)
     for i in range(ours.shape[0]):
         keeps = work.kept[i] >= OPPONENTS
-        if ours[i] and (plan.moving[i] or not keeps):
+        if ours[i] and plan.reason[i] != STOPPED and (plan.moving[i] or not keeps):
             plan.reason[i] = BACKUP if keeps else BEST_EFFORT
             plan.slack_m[i] = _given_up(i, scene)

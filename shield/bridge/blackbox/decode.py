@@ -51,6 +51,7 @@ def _tick(message: Mapping[str, Any], platforms: Mapping[str, Platform]) -> Tick
     rows = message["boats"]
     fleet = _fleet(rows, platforms) if message["has_fleet"] else None
     wanted = Commands(_table(rows, "wanted", 2), message["wanted_relative"]) if message["has_wanted"] else None
+    around = _surroundings(message["surroundings"][0]) if message["surroundings"] else None
     return Tick(
         number=int(message["number"]),
         due_s=from_json(message["due_s"]),
@@ -60,8 +61,8 @@ def _tick(message: Mapping[str, Any], platforms: Mapping[str, Platform]) -> Tick
         contacts=tuple(Contact(**_floats(row, _CONTACT)) for row in message["contacts"]),
         fleet=fleet,
         wanted=wanted,
-        surroundings=_surroundings(message["surroundings"][0]) if message["surroundings"] else None,
-        decisions=_decisions(message, fleet, wanted),
+        surroundings=around,
+        decisions=_decisions(message, fleet, wanted, around),
         shield_reset=bool(message["shield_reset"]),
         sent={row["boat"]: Sent(**_floats(row, _SENT)) for row in message["sent"]},
         policy_age_s=from_json(message["policy_age_s"]),
@@ -70,7 +71,9 @@ def _tick(message: Mapping[str, Any], platforms: Mapping[str, Platform]) -> Tick
     )
 
 
-def _decisions(message: Mapping[str, Any], fleet: Fleet | None, wanted: Commands | None) -> Decisions | None:
+def _decisions(
+    message: Mapping[str, Any], fleet: Fleet | None, wanted: Commands | None, around: Surroundings | None
+) -> Decisions | None:
     if not message["has_decisions"] or fleet is None or wanted is None:
         return None
     rows = message["boats"]
@@ -85,6 +88,7 @@ def _decisions(message: Mapping[str, Any], fleet: Fleet | None, wanted: Commands
         bound=_column(rows, "bound", int).astype(np.int64),
         cut_short=_column(rows, "cut_short", bool).astype(np.bool_) if rows and "cut_short" in rows[0] else None,
         solve_time_s=from_json(message["solve_time_s"]),
+        area=None if around is None else around.field,
     )
 
 

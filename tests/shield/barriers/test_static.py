@@ -16,7 +16,8 @@ NO_WALL = np.zeros((0, 4))
 
 def things(circles=NONE, walls=NO_WALL, hull_m=0.0, side_m=0.0, field=NO_EDGE, keep_out=NONE):
     """Static constraints, as compiled code takes them."""
-    return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0))
+    line = np.array([-np.inf, -np.inf, np.inf, np.inf])
+    return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0, line, 0, 0, 0.0))
 
 
 NONE_REGISTERED = Registered(

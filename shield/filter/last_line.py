@@ -1,0 +1,134 @@
+"""The last line: beyond it, and before what nobody may touch, a boat is stopped, whatever else is in its way.
+
+Edges yield to boats, since who turns back into a pursuer is hit; so a boat may be chased far out. Where the settings
+say "stop" (`ShieldConfig.beyond_then`) a boat beyond the hard line is stopped there, and nothing it is told leads it
+onto an obstacle: behind every command lies its manoeuvre or a stop that stays clear of all of them, until it is at
+rest. Where a command has neither, the stop of now or the manoeuvre of the last decision still does, by the same rule.
+"""
+
+from __future__ import annotations
+
+from ..backup.assign import refresh
+from ..backup.candidates import IN_MEMORY, candidate, remembered
+from ..backup.laying import lay_path
+from ..backup.paths import sail
+from ..barriers.circles import to_circle
+from ..barriers.clearance import FAR
+from ..barriers.static import STATIC, beyond_line
+from ..barriers.walls import goes_through, to_wall
+from ..jit import Array, copy_row, lean_kernel
+from ..plan import BEST_EFFORT, STOPPED
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..scene import Scene, Static
+from .exact_check import predict
+from .switching import set_off
+
+AT_REST_MPS = 0.05
+"""Speed below which a boat is taken to lie still, m/s."""
+
+ROUNDING_M = 1e-6
+"""A boat that is too near already may come nearer by this, m."""
+
+LONGEST_STOP_S = 90.0
+"""Time after which a boat that is told to stop is taken to lie still, s."""
+
+
+@lean_kernel
+def _room(x: float, y: float, static: Static) -> float:
+    """Distance, m, from all that nobody may touch, less than 0 where it is touched."""
+    least = FAR
+    for c in range(static.last_circles):
+        least = min(least, to_circle(x, y, static.circles[c])[0])
+    for w in range(static.last_segments):
+        least = min(least, to_wall(x, y, static.segments[w], static.segment_m)[0])
+    return least + static.last_m
+
+
+@lean_kernel
+def _through(x: float, y: float, row: Array, static: Static) -> bool:
+    """Whether the way from a place to that of a state goes through a wall."""
+    through = False
+    for w in range(static.last_segments):
+        through = through or goes_through(x, y, row[L.X], row[L.Y], static.segments[w])
+    return through
+
+
+@lean_kernel
+def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
+    """Whether boat i stays clear from a state on: on a manoeuvre for the horizon, and then stopping.
+
+    At no speed it is told to stop from the first step on. A boat that is too near already must come no nearer.
+    """
+    boats, static, row, dt_s = scene.boats, scene.static, scene.work.row, scene.tuning.model_s
+    params, x, y = boats.params[i], scene.state[i, L.X], scene.state[i, L.Y]
+    least = min(0.0, _room(x, y, static)) - ROUNDING_M
+    copy_row(row, start)
+    if _through(x, y, row, static):
+        return False
+    run = boats.samples[i] * boats.stride if speed_mps > 0.0 else 0
+    skip = 0
+    for step in range(run + int(LONGEST_STOP_S / dt_s)):
+        x, y = row[L.X], row[L.Y]
+        if step < run:
+            togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
+        else:
+            step_boat(params, row, 0.0, 0.0, dt_s)
+        skip -= 1
+        if skip <= 0:
+            room = _room(row[L.X], row[L.Y], static)
+            if room < least or _through(x, y, row, static):
+                return False
+            skip = int((room - least) / (max(boats.fastest_mps[i], row[L.SPEED]) * dt_s))
+        if step >= run and row[L.SPEED] < AT_REST_MPS:
+            return True
+    return True
+
+
+@lean_kernel
+def _stop(i: int, scene: Scene) -> None:
+    """Tell boat i to stop on its course, and rate that."""
+    plan, work = scene.plan, scene.work
+    plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
+    predict(i, plan.commands, scene)
+    lay_path(i, i, 1.0, 0.0, 0.0, 1, scene)
+    refresh(i, scene)
+    plan.reason[i], work.bound[i] = STOPPED, STATIC
+
+
+@lean_kernel
+def _go_on_as_before(i: int, scene: Scene) -> bool:
+    """Make boat i's command that of the manoeuvre in memory, if it has one and it stays clear."""
+    state, memory, plan, work = scene.state, scene.memory, scene.plan, scene.work
+    if not remembered(i, 0, state[i, L.HEADING], memory):
+        return False
+    side, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
+    if not _stays_clear(i, state[i], side, togo, speed, scene):
+        return False
+    lay_path(i, i, side, togo, speed, 0, scene)
+    set_off(i, scene)
+    predict(i, plan.commands, scene)
+    side, togo, speed = candidate(i, IN_MEMORY, 0.0, work.next_state[i, L.HEADING], scene)
+    lay_path(i, i, side, togo, speed, 1, scene)
+    refresh(i, scene)
+    plan.reason[i], work.bound[i] = BEST_EFFORT, STATIC
+    return True
+
+
+@lean_kernel
+def keep_last_line(scene: Scene) -> None:
+    """Stop the boats that are beyond the hard line, or that would else touch what nobody may."""
+    state, static, work = scene.state, scene.static, scene.work
+    for i in range(scene.ours.shape[0]):
+        if not scene.ours[i]:
+            continue
+        if beyond_line(i, scene):
+            _stop(i, scene)
+        elif static.last_circles + static.last_segments > 0 and not _stays_clear(
+            i, work.next_state[i], 1.0, 0.0, 0.0, scene
+        ):
+            ahead = work.plan[i]
+            if _stays_clear(i, work.next_state[i], ahead[0], ahead[1], ahead[2], scene):
+                continue
+            if _stays_clear(i, state[i], 1.0, 0.0, 0.0, scene) or not _go_on_as_before(i, scene):
+                _stop(i, scene)

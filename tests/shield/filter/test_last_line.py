@@ -1,0 +1,127 @@
+"""The hard line, and obstacles nobody may touch: a boat is stopped there, whatever is behind it."""
+
+import numpy as np
+import pytest
+from shield_loops import sail, sail_games, scattered
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.surroundings import Surroundings
+
+FIELD = (0.0, 0.0, 80.0, 40.0)
+STOP_WAY_M = {"heron": 9.7, "ardurover_boat": 4.5}
+SHORE = [(90.0, -60.0), (120.0, -60.0), (120.0, 100.0), (90.0, 100.0)]
+
+
+def fleet_at(x, y, heading_deg=90.0, speed_mps=2.0, behind_m=4.0, platform="heron"):
+    """A boat of ours, and an opponent so far behind it."""
+    back = np.radians(heading_deg)
+    other = x - behind_m * np.sin(back), y - behind_m * np.cos(back)
+    return Fleet.of(
+        position_m=[(x, y), other],
+        heading_deg=[heading_deg] * 2,
+        speed_mps=[speed_mps] * 2,
+        team=[0, 1],
+        platforms=platform,
+    )
+
+
+def chase(step, state):
+    """All boats at full speed: ours east, the opponent at it."""
+    to = state[0, :2] - state[1, :2]
+    turn = (np.degrees(np.arctan2(to[0], to[1])) - state[1, 2] + 180.0) % 360.0 - 180.0
+    return np.array([[3.0, 90.0 - state[0, 2]], [3.0, turn]])
+
+
+@pytest.mark.parametrize("platform", ["heron", "ardurover_boat"])
+def test_no_boat_goes_farther_beyond_the_line_than_it_takes_to_stop(platform):
+    shield = Shield(profile="rammers", beyond_m=10.0, beyond_then="stop", surroundings=Surroundings(field=FIELD))
+    run = sail(shield, fleet_at(84.0, 20.0, behind_m=3.0, platform=platform), chase, 150)
+    out_m = run.position[:, 0, 0] - FIELD[2]
+    assert 10.0 < out_m.max() <= 10.0 + STOP_WAY_M[platform]
+    beyond = out_m[:-1] > 10.0
+    assert (run.reason[beyond, 0] == Reason.STOPPED).all()
+    assert (run.sent[beyond, 0] == 0.0).all()
+    assert (run.reason[~beyond, 0] != Reason.STOPPED).all()
+
+
+def test_who_may_flee_does_as_without_a_line():
+    around = Surroundings(field=FIELD)
+    runs = [
+        sail(Shield(profile="rammers", surroundings=around, **more), fleet_at(84.0, 20.0, behind_m=3.0), chase, 100)
+        for more in ({}, {"beyond_m": 3.0}, {"beyond_m": 3.0, "beyond_then": "flee"})
+    ]
+    assert runs[0].position[:, 0, 0].max() > FIELD[2] + 10.0
+    for run in runs[1:]:
+        np.testing.assert_array_equal(run.sent, runs[0].sent)
+
+
+@pytest.mark.parametrize("platform", ["heron", "ardurover_boat"])
+def test_nobody_is_driven_ashore(platform):
+    around = Surroundings(field=FIELD, polygons=[SHORE])
+    touched = {}
+    for then in ("flee", "stop"):
+        shield = Shield(profile="rammers", beyond_then=then, surroundings=around)
+        run = sail(shield, fleet_at(70.0, 20.0, platform=platform), chase, 300)
+        touched[then] = (run.position[:, 0, 0] > SHORE[0][0] - 0.5).any(), (run.reason[:, 0] == Reason.STOPPED).any()
+    assert touched["stop"][0] == False  # noqa: E712 - numpy's
+    assert touched["flee"][1] == False  # noqa: E712
+
+
+def test_a_wall_is_stopped_before_that_no_other_rule_keeps():
+    """A boat told to go on into a corner of walls by opponents on all sides stops."""
+    around = Surroundings(polygons=[SHORE])
+    shield = Shield(profile="rammers", beyond_then="stop", surroundings=around)
+    start = Fleet.of(
+        position_m=[(80.0, 20.0), (77.0, 23.0), (77.0, 17.0), (76.5, 20.0)],
+        heading_deg=[90.0] * 4,
+        speed_mps=[2.0] * 4,
+        team=[0, 1, 1, 1],
+        platforms="heron",
+    )
+    run = sail(shield, start, lambda _, state: np.stack([np.full(4, 2.0), 90.0 - state[:, 2]], axis=-1), 200)
+    assert (run.position[:, 0, 0] <= SHORE[0][0] - 0.5 + 1e-6).all()
+
+
+def test_a_batch_stops_the_same_boats():
+    config = ShieldConfig(profile="rammers", beyond_m=2.0, beyond_then="stop")
+    around = Surroundings(field=(0.0, 0.0, 25.0, 25.0), polygons=[SHORE])
+    kinds, team = ("heron",) * 4, (0, 0, 1, 1)
+    state = scattered(np.random.default_rng(3), 3, kinds, 25.0, gap_m=5.0)
+
+    def ram(step, state):
+        to = state[..., [2, 3, 0, 1], :2] - state[..., :2]
+        turn = np.degrees(np.arctan2(to[..., 0], to[..., 1])) - state[..., 2]
+        turn[..., :2] = 70.0 - state[..., :2, 2]
+        return np.stack([np.full(turn.shape, 2.0), (turn + 180.0) % 360.0 - 180.0], axis=-1)
+
+    games = sail_games(config, state, kinds, team, ram, 200, surroundings=around)
+    assert (games.reason == Reason.STOPPED).any()
+    for g in range(3):
+        fleet = Fleet(state[g], np.array(team), kinds, np.array(team) == 0, ("a", "b", "c", "d"))
+        one = sail(Shield(config, around), fleet, ram, 200)
+        np.testing.assert_array_equal(one.sent, games.sent[:, g])
+        np.testing.assert_array_equal(one.reason, games.reason[:, g])
+
+
+def test_a_decision_says_how_far_outside_and_that_it_stops():
+    shield = Shield(beyond_m=5.0, beyond_then="stop", surroundings=Surroundings(field=FIELD))
+    fleet = Fleet.of(
+        position_m=[(87.0, 43.0), (40.0, 20.0)],
+        heading_deg=[0.0] * 2,
+        speed_mps=[1.0] * 2,
+        team=[0, 0],
+        platforms="heron",
+    )
+    decisions = shield.decide(fleet, Commands.relative_deg([(2.0, 180.0), (2.0, 0.0)]))
+    out, inside = decisions
+    assert (out.outside_m, inside.outside_m) == (7.0, 0.0)
+    assert (out.reason, out.fallback, out.binding, out.sent_speed_mps) == (Reason.STOPPED, "stop", ("field",), 0.0)
+    assert inside.reason == Reason.PASSED
+    assert Shield().decide(fleet, Commands.relative_deg([(1.0, 0.0)] * 2)).outside_m.tolist() == [0.0, 0.0]
+
+
+def test_settings_of_the_line_are_checked():
+    with pytest.raises(ConfigError, match="unknown beyond_then 'turn'; choose one of flee, stop"):
+        ShieldConfig(beyond_then="turn")
+    with pytest.raises(ConfigError, match="beyond_m is -1"):
+        ShieldConfig(beyond_m=-1.0)
