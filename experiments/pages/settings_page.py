@@ -63,6 +63,8 @@ COSTS = {
         "s", "boats are decided for where they will be: the longer, the sooner", "[conditions](conditions.md)"
     ),
     "edge_m": Cost("m", "None: the field's edge is not kept", _METHOD),
+    "beyond_m": Cost("m", "with `beyond_then=stop`: the nearer, the more boats are stopped and hit", _METHOD),
+    "beyond_then": Cost("name", "stop: boats that are chased out are stopped, and may be hit there", _METHOD),
     "hull_m": Cost("m", "distance from walls", _METHOD),
     "barriers": Cost("names", "time of a decision: a call for every sample of a path", "[extend](extend.md)"),
 }

@@ -12,7 +12,7 @@ from steerclear.shield.backup.families import CERTIFICATES
 from steerclear.shield.config import COORDINATION, PROFILES, RANGES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 
-TEXTS = ("certificate", "coordination", "profile", "solver")
+TEXTS = ("beyond_then", "certificate", "coordination", "profile", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in (*TEXTS, "barriers")]
 NOT_ZERO = [
     "move_s",
@@ -26,7 +26,7 @@ NOT_ZERO = [
     "speed_weight",
     "horizon_s",
 ]
-MAY_BE_NONE = ["adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m"]
+MAY_BE_NONE = ["adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m", "beyond_m"]
 MAY_BE_INFINITE = [
     "adversary_s",
     "visitor_s",
