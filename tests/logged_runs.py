@@ -5,10 +5,8 @@ import math
 import numpy as np
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from steerclear.shield.bridge.blackbox import LoggedBoat, LogHeader, McapWriter, platforms_of
-from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.tick import Action, Tick
+from steerclear.shield.bridge.messages import Action, BoatReading, Contact, Sent, Tick
 from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from steerclear.shield.bridge.feed_sockets import socket_address
+from steerclear.shield.bridge.feed_sender import socket_address
 from steerclear.shield.bridge.fleet_checks import MOOS
 from steerclear.shield.exceptions import ConfigError
 

@@ -7,21 +7,21 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from steerclear.shield.bridge.blackbox import check_disk
-from steerclear.shield.bridge.loop import Loop
+from steerclear.shield.bridge.control_loop import ControlLoop
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.parts import Parts
+from steerclear.shield.bridge.control_loop import Parts
 from steerclear.shield.bridge.preflight.drill import Drill
 from steerclear.shield.bridge.preflight.link_checks import link_checks
 from steerclear.shield.bridge.preflight.missed import Missed
 from steerclear.shield.bridge.preflight.response import drill_checks
 from steerclear.shield.bridge.preflight.result import Check
-from steerclear.shield.bridge.roster import Roster
+from steerclear.shield.bridge.tracker import Tracker
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.situation import SITUATION, check_situation
-from steerclear.shield.bridge.tick import TickSink
+from steerclear.shield.bridge.messages import TickSink
 
 from .grounds import grounds_of
 from .preflight_file import check_drill
@@ -37,10 +37,10 @@ class _Look:
         self._station = station
 
     @cached_property
-    def roster(self) -> Roster:
+    def roster(self) -> Tracker:
         station = self._station
         fleet, clock = station.fleet, station.clock
-        roster = Roster(fleet, station.links)
+        roster = Tracker(fleet, station.links)
         due = clock.now_s()
         for _ in range(math.ceil(LOOK_S / fleet.dt_s)):
             due += fleet.dt_s
@@ -93,7 +93,7 @@ def drive_drill(station: VehicleSession, operator: Operator, sinks: Sequence[Tic
         grounds=grounds_of(fleet),
         sinks=(drill, missed, *sinks),
     )
-    loop = Loop(fleet, parts, operator, station.clock)
-    missed.foresight = loop.foresight
+    loop = ControlLoop(fleet, parts, operator, station.clock)
+    missed.model_error = loop.model_error
     loop.run(drill.seconds + 2.0 * fleet.dt_s)
     return drill_checks(drill, missed, fleet)

@@ -6,8 +6,9 @@ import threading
 from collections.abc import Sequence
 
 from steerclear.shield.bridge.clock import Clock
+from steerclear.shield.bridge.failsafe_table import DISABLES
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.operator import DISABLES, Operator
+from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import ConfigError
 
 STOP_KEYS = (" ", "s", "S")

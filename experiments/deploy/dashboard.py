@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.live import Live
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.tick import Tick
 
 from ..terminal import SafeConsole, SafeFormatter
 from .controls import Controls

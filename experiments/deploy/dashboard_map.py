@@ -10,7 +10,7 @@ from rich.console import Console, ConsoleOptions
 from rich.text import Text
 from steerclear.env.field import FieldGeometry, field_geometry
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import ConfigError, GameError
 
 from .braille import Canvas

@@ -12,10 +12,8 @@ from rich.console import Group, RenderableType
 from rich.layout import Layout
 from rich.table import Table
 from rich.text import Text
-from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.link import BoatReading
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import BoatReading, Contact, Tick
 from steerclear.shield.decision import Decision, Reason
 
 from .approach import Approach, approaches

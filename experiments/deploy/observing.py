@@ -13,7 +13,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.env.motion import is_on_side
 from steerclear.shield.bridge.feed import GameState, game_state
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L

@@ -10,10 +10,10 @@ from pathlib import Path
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_with_text
 from steerclear.shield.bridge.mavlink.signing import read_key
+from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
 from steerclear.shield.bridge.session import CONNECT_S
-from steerclear.shield.bridge.tick import TickSink
 from steerclear.shield.exceptions import ConfigError, FleetFileError
 
 from .preflight_file import measured_delay_s

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from steerclear.shield.bridge.blackbox.disk import explain
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError
 
 from ..terminal import SafeFormatter

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from steerclear import policies
 from steerclear.policies.actions import HOLD, ActionReader
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L

@@ -19,7 +19,7 @@ import numpy as np
 from steerclear.policies.registry import looks_like_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.wanted import Answer, Snapshot
+from steerclear.shield.bridge.messages import Answer, Snapshot
 from steerclear.shield.commands import Commands
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import PolicyError

@@ -9,7 +9,7 @@ import numpy as np
 from steerclear.shield import Fleet, Shield
 from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.water import Water
+from steerclear.shield.bridge.static_obstacles import StaticObstacles
 from steerclear.shield.exceptions import BridgeError, FleetFileError, SteerclearError
 from steerclear.shield.platforms import fresh_state
 from steerclear.shield.surroundings import Surroundings
@@ -42,7 +42,7 @@ def rehearse(fleet: FleetFile, grounds: Surroundings) -> None:
         FleetFileError: the shield's settings leave nothing of the water, or it would refuse these boats.
     """
     try:
-        for fixed in Water(fleet, grounds).forms:
+        for fixed in StaticObstacles(fleet, grounds).forms:
             Shield(fleet.shield_config, fixed)
         boats_of(fleet).check()
     except SteerclearError as error:

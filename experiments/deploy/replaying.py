@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield import Decisions, Shield, SteerclearError
 from steerclear.shield.bridge.blackbox import LogHeader
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 
 from .replaying_sent import SentCheck, Strayed
 

@@ -7,9 +7,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 from steerclear.shield.bridge.blackbox import LogHeader
-from steerclear.shield.bridge.link import Sent
 from steerclear.shield.bridge.mavlink.routes import CREEP_MPS, VelocityRoute
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Sent, Tick
 
 ROUNDED_MPS, ROUNDED_RAD = 1e-5, 1e-5
 """Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted."""

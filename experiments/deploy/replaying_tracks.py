@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.shield.bridge.assemble import GHOST
 from steerclear.shield.bridge.blackbox import LogHeader
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
+from steerclear.shield.bridge.tracker import GHOST
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import LogError
 from steerclear.shield.platforms import get_platform

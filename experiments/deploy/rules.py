@@ -11,9 +11,9 @@ import numpy as np
 from steerclear.env.arrays import CAPTURE
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import BoatStatus, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
 from steerclear.shield.jit import IntArray
 from steerclear.shield.platforms import Platform

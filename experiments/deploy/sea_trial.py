@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.tick import Tick
-from steerclear.shield.bridge.wanted import Answer, Snapshot
+from steerclear.shield.bridge.messages import Answer, Snapshot, Tick
 from steerclear.shield.commands import Commands
 from steerclear.shield.jit import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.decision import Reason
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L

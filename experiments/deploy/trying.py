@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from steerclear.shield.bridge.clock import MonotonicClock
-from steerclear.shield.bridge.loop import Loop
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.bridge.session import VehicleSession
-from steerclear.shield.bridge.tick import Tick
 
 from .boxes import open_box
 from .checks import checks_of
@@ -99,4 +98,4 @@ def _run(station: VehicleSession, trial: SeaTrial, box: Any, surface: Surface, o
             sinks=(box, trial, _End(trial, operator), *shown),
         )
         with undisturbed():
-            return Loop(fleet, parts, operator, station.clock).run(longest_s(len(station.links)))
+            return ControlLoop(fleet, parts, operator, station.clock).run(longest_s(len(station.links)))

@@ -17,7 +17,7 @@ from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
 from ..tracking.tracks import thrust_at, whole_steps
-from .link import BoatReading
+from .messages import BoatReading
 
 GAIN = 0.5
 """Share of a difference that is corrected at once: a filter of about 0.15 s at 10 Hz."""

@@ -244,7 +244,11 @@ class ModelLimit(Section):
 
 
 class Limits(Section):
-    """How old things may be, s, and what happens beyond."""
+    """How old things may be, s, and what happens beyond.
+
+    ``after_failsafe``: whether a boat that its autopilot's own fail-safe took waits for the operator once that is over,
+    or is taken back at once.
+    """
 
     navigation: NavigationLimit = NavigationLimit()
     contact: ContactLimit = ContactLimit()
@@ -254,6 +258,7 @@ class Limits(Section):
     geofence: FenceLimit = FenceLimit()
     log: LogLimit = LogLimit()
     model: ModelLimit = ModelLimit()
+    after_failsafe: Literal["wait", "retake"] = Field("wait", description="give wait or retake")
 
 
 class End(Section):

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from .clock import Clock
-from .contact import ContactSource
+from .messages import ContactSource
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
-from .link import Link
+from .messages import Link
 from .mavlink.endpoint import Endpoint, OnBytes
 from .mavlink.link import MavlinkLink
 from .mavlink.signing import Signing, read_key

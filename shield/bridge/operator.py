@@ -7,23 +7,13 @@ import threading
 from dataclasses import dataclass
 
 from ..exceptions import ConfigError
-from .tick import Action
+from .failsafe_table import DISABLES
+from .messages import Action
 
 LOG = logging.getLogger(__name__)
 
 LONGEST_OVERRIDE_S = 600.0
 """No override lasts longer; it can be given again."""
-
-DISABLES = {
-    "contact": "the response to an old or lost contact; once it is lost, boats no longer keep clear of it",
-    "policy": "the response to an old or unusable policy; the boat stands by with no speed instead",
-    "game": "the response to an old state of the game; the policy goes on with what it last saw",
-    "geofence": "the response to leaving the geofence; the shield still turns boats back at the edge",
-    "log": "the response to a black box that cannot be written; what follows is not recorded",
-    "model": "the response to a boat far outside its model; the shield foretells it wrongly",
-    "commander": "the response to a second commander; both steer the boat",
-}
-"""What can be overridden, and what that switches off. The shield itself, own navigation and lost links cannot be."""
 
 
 @dataclass(frozen=True)

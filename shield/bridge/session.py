@@ -11,12 +11,12 @@ from types import TracebackType
 from ..compat import Self
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
-from .contact import Contact, ContactSource, heard_from
+from .messages import Contact, ContactSource, heard_from
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
 from .links import LINK_MAKERS, BoatLink, LinkMaker, key_of
-from .parts import contact_of
+from .messages import contact_of
 
 LOG = logging.getLogger(__name__)
 

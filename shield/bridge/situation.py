@@ -12,30 +12,29 @@ from ..exceptions import SteerclearError
 from ..platforms import layout as L
 from ..shield import Shield
 from ..surroundings import OPEN_WATER, Surroundings
-from .assemble import assemble, seen_now
+from .failsafe import words
 from .fleet_file import FleetFile
-from .freshness import words
 from .preflight.result import CheckResult
-from .roster import Roster
-from .water import Water
+from .static_obstacles import StaticObstacles
+from .tracker import Tracker
 
 NEAR_MARGIN_M = 1e5
 """Margins beyond this mean that nobody is near."""
 
 
-def check_situation(name: str, fleet: FleetFile, roster: Roster, grounds: Surroundings = OPEN_WATER) -> CheckResult:
+def check_situation(name: str, fleet: FleetFile, roster: Tracker, grounds: Surroundings = OPEN_WATER) -> CheckResult:
     """One of `SITUATION`, of a roster that has just been updated.
 
     Args:
         name: of the check.
         fleet: the file.
         roster: what is known of all boats.
-        grounds: static constraints of the game, see `water.Water`.
+        grounds: static constraints of the game, see `water.StaticObstacles`.
     """
-    return SITUATION[name](fleet, roster, Water(fleet, grounds))
+    return SITUATION[name](fleet, roster, StaticObstacles(fleet, grounds))
 
 
-def check_known(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
+def check_known(fleet: FleetFile, roster: Tracker, water: StaticObstacles) -> CheckResult:
     """Every boat of the file has been seen, and lately."""
     limits, missing, ages = fleet.limits, [], []
     for name in fleet.names:
@@ -55,9 +54,9 @@ def check_known(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
     return CheckResult("known", True, f"all {len(ages)} boats seen, oldest fix {oldest:.2f} s", {"oldest_s": oldest})
 
 
-def check_geofence(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
+def check_geofence(fleet: FleetFile, roster: Tracker, water: StaticObstacles) -> CheckResult:
     """The geofence goes around all boats seen."""
-    seen = seen_now(roster)
+    seen = roster.seen_now()
     inside = [_inside_m(fleet, row) for row in seen]
     outside = [
         f"{name} ({row[0]:.0f}, {row[1]:.0f}) m"
@@ -73,14 +72,14 @@ def check_geofence(fleet: FleetFile, roster: Roster, water: Water) -> CheckResul
     return CheckResult("geofence", True, f"all boats at least {min(known):.1f} m inside", figures)
 
 
-def check_certificate(fleet: FleetFile, roster: Roster, water: Water) -> CheckResult:
+def check_certificate(fleet: FleetFile, roster: Tracker, water: StaticObstacles) -> CheckResult:
     """Each boat of ours has a backup now: its certificate is not negative when told to stop."""
     try:
-        given = assemble(roster, roster.commanded)
+        given = roster.assemble(roster.commanded)
         if given is None:
             return CheckResult("certificate", False, "no boat seen; check telemetry and feed")
         stop = np.column_stack([np.zeros(len(given)), given.heading_rad])
-        answer = Shield(fleet.shield_config, water.around(given)).decide(given, Commands.absolute_rad(stop))
+        answer = Shield(fleet.shield_config, water.around()).decide(given, Commands.absolute_rad(stop))
     except SteerclearError as error:
         return CheckResult("certificate", False, f"the shield cannot decide: {error}")
     own = np.flatnonzero(given.controlled)
@@ -110,7 +109,7 @@ def _nearest_m(state: np.ndarray, i: int) -> float:
     return float(np.hypot(*(others - state[i, [L.X, L.Y]]).T).min()) if len(others) else math.inf
 
 
-SITUATION: Mapping[str, Callable[[FleetFile, Roster, Water], CheckResult]] = {
+SITUATION: Mapping[str, Callable[[FleetFile, Tracker, StaticObstacles], CheckResult]] = {
     "known": check_known,
     "geofence": check_geofence,
     "certificate": check_certificate,

@@ -16,9 +16,7 @@ from ...jit import Array
 from ...platforms import PLATFORMS, Platform
 from ...platforms import layout as L
 from ...surroundings import Surroundings
-from ..contact import Contact
-from ..link import BoatReading, Sent
-from ..tick import Action, Tick
+from ..messages import Action, BoatReading, Contact, Sent, Tick
 from .header import platform_from
 from .numbers import from_json, row_from_json
 from .odd import put_back

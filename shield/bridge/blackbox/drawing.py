@@ -10,7 +10,7 @@ from ...decision import Decisions, Reason
 from ...fleet import LARGEST, Fleet
 from ...platforms import layout as L
 from ...surroundings import Surroundings
-from ..tick import Tick
+from ..messages import Tick
 from . import foxglove as fg
 from .foxglove import Message
 from .header import LogHeader

@@ -14,9 +14,7 @@ from ...decision import Decisions, Reason
 from ...fleet import Fleet
 from ...platforms import PLATFORMS, Platform
 from ...surroundings import Surroundings
-from ..contact import Contact
-from ..link import BoatReading, Sent
-from ..tick import Tick
+from ..messages import BoatReading, Contact, Sent, Tick
 from .header import platform_to_text
 from .numbers import row_to_json, to_json
 from .odd import take_odd

@@ -8,7 +8,7 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from ..tick import Action, Tick
+from ..messages import Action, Tick
 from . import foxglove as fg
 from .chain import ENDS, Chain, ChainHead, Link
 from .disk import Disk

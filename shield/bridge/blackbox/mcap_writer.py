@@ -12,7 +12,7 @@ from ...commands import Commands
 from ...decision import Decisions
 from ...exceptions import BridgeError
 from ...fleet import Fleet
-from ..tick import Tick
+from ..messages import Tick
 from . import foxglove as fg
 from .chain import GOES_ON, ChainHead, Link
 from .disk import Disk, explain

@@ -15,7 +15,7 @@ from mcap.records import Channel, Footer, Message
 
 from ...compat import Self
 from ...exceptions import LogError
-from ..tick import Tick
+from ..messages import Tick
 from .chain_check import ChainCheck
 from .decode import tick_from_json
 from .header import LogHeader

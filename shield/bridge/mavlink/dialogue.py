@@ -12,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..clock import Clock
-from ..link import never
+from ..messages import never
 from .routes import Abilities
 from .texts import Texts
 

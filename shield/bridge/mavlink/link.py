@@ -11,7 +11,7 @@ from ...compat import Self
 from ...exceptions import LinkError
 from ..clock import Clock
 from ..frame import FieldFrame
-from ..link import NEVER_S, BoatReading, Sent, never
+from ..messages import NEVER_S, BoatReading, Sent, never
 from .autopilot import Autopilot
 from .dialogue import Patience
 from .endpoint import Endpoint

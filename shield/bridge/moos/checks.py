@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from ..fleet_file import FleetFile
 from ..fleet_settings import MoosLinkSettings
-from ..link import BoatReading
+from ..messages import BoatReading
 from ..preflight.link_checks import check_spread
 from ..preflight.result import Check, CheckResult
 from .mission import mission_faults, read_mission

@@ -7,7 +7,7 @@ import math
 import threading
 from collections.abc import Collection, Mapping
 
-from ..contact import Alarm, Contact
+from ..messages import Alarm, Contact
 from ..frame import FieldFrame
 
 LONGEST_CHARACTERS = 1 << 16

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..frame import TWO_PI, FieldFrame
-from ..link import BoatReading
+from ..messages import BoatReading
 from .wire import DOUBLE, Message
 
 SILENCE_S = 1.0

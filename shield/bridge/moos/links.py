@@ -13,8 +13,8 @@ from ..clock import Clock
 from ..fleet_checks import MOOS, address_of
 from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
-from ..link import Link
-from ..wanted import Answer, Snapshot
+from ..messages import Link
+from ..messages import Answer, Snapshot
 from .contacts import MoosContacts
 from .helm_gate import Gate, HelmGate
 from .pid_gate import PidGate

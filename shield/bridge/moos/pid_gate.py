@@ -16,7 +16,7 @@ import numpy as np
 from ...platforms import Platform, fresh_state, step_boat
 from ...platforms import layout as L
 from ..frame import TWO_PI
-from ..link import BoatReading
+from ..messages import BoatReading
 from .helm_gate import Inputs, Nominal, standstill
 from .wire import Message
 

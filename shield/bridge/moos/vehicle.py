@@ -14,7 +14,7 @@ from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
-from ..link import NEVER_S, BoatReading, Sent, never
+from ..messages import NEVER_S, BoatReading, Sent, never
 from . import drivers, nav
 from .client import Health, MoosClient
 from .contacts import MoosContacts

@@ -15,9 +15,7 @@ import numpy as np
 from ...commands import Commands
 from ...jit import Array
 from ..fleet_file import FleetFile
-from ..link import BoatReading
-from ..tick import Tick
-from ..wanted import Answer, Snapshot
+from ..messages import Answer, BoatReading, Snapshot, Tick
 
 AHEAD_S = 8.0
 TURN_S = 7.0

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...platforms import Platform
 from ..clock import Clock
-from ..link import BoatReading
 from ..mavlink.fix import ENOUGH_FIX
 from ..mavlink.health import LinkHealth
+from ..messages import BoatReading
 from .parameters import STANDARD_TIMEOUT_S, parameter_faults
 from .result import Check, CheckResult
 from .watch import WATCH_S, Watch, Watched

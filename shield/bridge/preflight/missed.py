@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...platforms import Platform
-from ..foresight import AHEAD_S, ENOUGH_S, SHARE, TOLD_BY, Foresight
-from ..tick import Tick
+from ..messages import Tick
+from ..model_error import AHEAD_S, ENOUGH_S, SHARE, TOLD_BY, ModelErrorMonitor
 from .drill import Drill
 from .result import CheckResult
 
@@ -23,15 +23,15 @@ class Missed:
     """
 
     def __init__(self, drill: Drill) -> None:
-        self.foresight: Foresight | None = None
+        self.model_error: ModelErrorMonitor | None = None
         self.errors_m: dict[str, list[tuple[float, ...]]] = {name: [] for name in drill.samples}
         self._drill = drill
 
     def take(self, tick: Tick) -> None:
         """See `TickSink`."""
         boat, _ = self._drill.turn_of(tick.began_s)
-        if boat and self.foresight is not None:
-            self.errors_m[boat].append(self.foresight.latest_m(boat))
+        if boat and self.model_error is not None:
+            self.errors_m[boat].append(self.model_error.latest_m(boat))
 
     def close(self) -> None:
         """Nothing is held."""

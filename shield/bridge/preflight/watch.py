@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from ..clock import Clock
-from ..link import BoatReading
 from ..mavlink.health import LinkHealth
+from ..messages import BoatReading
 
 WATCH_S = 5.0
 LOOK_EVERY_S = 0.05

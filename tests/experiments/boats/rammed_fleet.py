@@ -14,8 +14,9 @@ from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.orders import _delay_s
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
-from steerclear.shield.bridge.loop import Loop, Parts
+from steerclear.shield.bridge.messages import Answer
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.platforms import layout as L
@@ -58,7 +59,7 @@ class Cruise:
         self.commands = Commands.absolute_rad(values)
 
     def latest(self):
-        return self.commands, 0.0, ""
+        return Answer(self.commands, 0.0)
 
     def close(self):
         pass
@@ -116,7 +117,7 @@ def sail(folder, told, true, minutes, seed, shielded):
     _while_moving(move, lambda: (station.connect(30.0), station.prepare(60.0)))
     parts = Parts(station.links, Cruise(fleet.names, seed), contacts=(station.feed,), sinks=())
     shield = None if shielded else Unheeded(fleet.shield_config, fleet.surroundings)
-    loop, found = Loop(fleet, parts, Operator(), clock, shield), Breaches()
+    loop, found = ControlLoop(fleet, parts, Operator(), clock, shield), Breaches()
     for _ in range(round(60.0 * minutes / TURN_S)):
         loop.turn(clock.now_s())
         for _ in range(round(TURN_S / STEP_S)):

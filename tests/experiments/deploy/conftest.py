@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from steerclear.experiments.deploy.rules import state_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import layout as L
 
 SEEN = [L.X, L.Y, L.HEADING, L.SPEED]

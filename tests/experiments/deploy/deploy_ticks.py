@@ -7,9 +7,7 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy.rules import game_config, player_names, state_of
 from steerclear.shield import Commands, Shield, ShieldConfig
-from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import BoatReading, Contact, Sent, Tick
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.surroundings import Surroundings

@@ -5,9 +5,7 @@ import math
 import numpy as np
 from steerclear.experiments.deploy.rules import player_names
 from steerclear.shield import Commands, Fleet, Reason
-from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import BoatReading, Contact, Sent, Tick
 from steerclear.shield.decision import Decisions
 from steerclear.shield.surroundings import Surroundings
 

@@ -27,9 +27,9 @@ from steerclear.experiments.deploy.dashboard_view import Moment, View
 from steerclear.experiments.deploy.keys import Keyboard
 from steerclear.experiments.terminal import SafeConsole
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.link import BoatReading
-from steerclear.shield.bridge.operator import DISABLES, Operator
-from steerclear.shield.bridge.tick import Action, Tick
+from steerclear.shield.bridge.failsafe_table import DISABLES
+from steerclear.shield.bridge.messages import Action, BoatReading, Tick
+from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import BridgeError, ConfigError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.surroundings import Surroundings

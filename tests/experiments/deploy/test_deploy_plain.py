@@ -25,8 +25,8 @@ from steerclear.experiments.deploy.quiet import (
 )
 from steerclear.experiments.deploy.tally import Tally, closest_m, distance_words
 from steerclear.shield import Commands, Shield, ShieldConfig, deciders
+from steerclear.shield.bridge.messages import Action
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.tick import Action
 from steerclear.shield.fleet import Fleet
 
 

@@ -21,11 +21,11 @@ from steerclear.experiments.deploy.run import deploy
 from steerclear.experiments.deploy.tally import Tally
 from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.shield.bridge.blackbox import LogReader, log_path
+from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.result import CheckResult
-from steerclear.shield.bridge.timing import Timing
 from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
 from typer.testing import CliRunner
 

@@ -12,7 +12,7 @@ from steerclear.experiments.deploy.rules import game_config, state_of
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.feed import game_state
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.water import Water
+from steerclear.shield.bridge.static_obstacles import StaticObstacles
 from steerclear.shield.exceptions import FleetFileError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.surroundings import OPEN_WATER
@@ -40,7 +40,7 @@ class Played:
     def __init__(self, fleet):
         env = MctfEnv(game_config(fleet))
         self.env = ShieldedParallelEnv(env, Shield(fleet.shield_config), team=fleet.team)
-        self.water = Water(fleet, grounds_of(fleet))
+        self.water = StaticObstacles(fleet, grounds_of(fleet))
         self.shield = Shield(fleet.shield_config, fleet.surroundings)
         self.names = [boat.name for boat in fleet.boats if boat.agent is not None]
         self.reader = MctfReader(env)

@@ -8,9 +8,9 @@ from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.deploy.hearing import Hearing
 from steerclear.experiments.deploy.referee import Referee
 from steerclear.shield.bridge.clock import MonotonicClock
-from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import FleetFileError
 
 FLEET = """

@@ -8,7 +8,7 @@ from logged_runs import Encounter, header_of
 from play_parts import Part, circumstance, judged, kinds, played, stale, summary, write_fleet
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.fleet_settings import Limits
-from steerclear.shield.bridge.tick import Action
+from steerclear.shield.bridge.messages import Action
 
 CALM = {"after_run": False, "unsteered_s": [0.0, 0.0], "faults": [], "kind": "opponent", "verdict": "unavoidable"}
 

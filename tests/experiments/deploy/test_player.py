@@ -11,7 +11,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy.observing import Observer, cast_of
 from steerclear.experiments.deploy.player import Orders, Player, load_player
 from steerclear.experiments.deploy.rules import game_config
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError
 from steerclear.shield.platforms import layout as L
 

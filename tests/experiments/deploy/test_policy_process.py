@@ -266,7 +266,7 @@ def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path, fleet_of):
         import time, numpy as np
         from steerclear.experiments.deploy.policy_process import PolicyProcess
         from steerclear.shield.bridge.fleet_file import parse_fleet
-        from steerclear.shield.bridge.wanted import Snapshot
+        from steerclear.shield.bridge.messages import Snapshot
         process = PolicyProcess(parse_fleet({fleet_text()!r}), {entry!r}, 1e6)
         process.start()
         while True:

@@ -19,9 +19,9 @@ from steerclear.experiments.deploy.referee import Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
 from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
-from steerclear.shield.bridge.contact import Contact
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
 from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import BridgeError, FleetFileError, GameError
 from steerclear.shield.platforms import layout as L
 from typer.testing import CliRunner

@@ -12,8 +12,8 @@ from steerclear.experiments.deploy.run import warm_up
 from steerclear.shield import Commands
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
-from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
 
@@ -81,7 +81,7 @@ def deployed(tmp_path_factory):
         )
         box = McapWriter(log_path(fleet.log_dir, ".mcap"), header)
         parts = Parts(links=station.links, policy=HeadOn(), ears=station.ears, sinks=(box,))
-        Loop(fleet, parts, Operator(), clock).run(SECONDS)
+        ControlLoop(fleet, parts, Operator(), clock).run(SECONDS)
         box.close()
     assert box.fault == ""
     return box.path, next(fleet.log_dir.glob("*.tlog"))

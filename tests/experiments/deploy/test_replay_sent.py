@@ -10,9 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.deploy.replaying import prove
 from steerclear.experiments.deploy.replaying_sent import SentCheck
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.link import Sent
 from steerclear.shield.bridge.mavlink.routes import AttitudeRoute, VelocityRoute
-from steerclear.shield.bridge.tick import Action
+from steerclear.shield.bridge.messages import Action, Sent
 
 HEADER = header_of()
 

@@ -11,7 +11,7 @@ from steerclear.experiments.commands.sea_trial import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
 from steerclear.experiments.fit.runs import runs_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 

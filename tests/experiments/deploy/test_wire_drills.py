@@ -17,8 +17,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
-from steerclear.shield.bridge.loop import Loop, Parts
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
@@ -87,7 +87,7 @@ class Lake:
             done.set()
             thread.join()
         parts = Parts(self.station.links, HeadOn(), sinks=(self,))
-        self.loop = Loop(self.station.fleet, parts, Operator(), self.clock)
+        self.loop = ControlLoop(self.station.fleet, parts, Operator(), self.clock)
         return self
 
     def __exit__(self, *_):

@@ -10,7 +10,7 @@ from steerclear.experiments.deploy.observing import NEED_NO_GAME, cast_of
 from steerclear.experiments.deploy.player import Orders, load_player
 from steerclear.experiments.deploy.rehearsal import rehearse
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetFileError
 
 PAGE = Path(__file__).parents[3] / "docs" / "your_boat.md"

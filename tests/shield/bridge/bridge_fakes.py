@@ -7,13 +7,11 @@ import math
 import numpy as np
 from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.contact import Contact
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.feed import FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.loop import Loop
+from steerclear.shield.bridge.messages import Answer, BoatReading, Contact, Sent
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.exceptions import BridgeError, LinkError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
@@ -189,7 +187,7 @@ class FakePolicy:
             self.asked_s = snapshot.taken_s
 
     def latest(self):
-        return self.answer, self.clock.now_s() - self.asked_s, self.fault
+        return Answer(self.answer, self.clock.now_s() - self.asked_s, self.fault)
 
     def close(self):
         pass
@@ -256,7 +254,7 @@ class World:
         parts = Parts(
             self.links, self.policy, contacts=(self.contacts,), game=game, grounds=grounds, sinks=(self.sink,)
         )
-        self.loop = Loop(fleet, parts, self.operator, self.clock, shield)
+        self.loop = ControlLoop(fleet, parts, self.operator, self.clock, shield)
         self.closest_m = math.inf
 
     @property
@@ -268,7 +266,7 @@ class World:
         for _ in range(round(seconds / DT_S)):
             if each is not None:
                 each(self)
-            self.loop._turn_or_stop(self.clock.now_s())
+            self.loop.turn_or_stop(self.clock.now_s())
             for link in self.links.values():
                 link.advance(DT_S)
             self.contacts.advance(DT_S)

@@ -6,8 +6,7 @@ import numpy as np
 from bridge_fakes import FakeContacts, World, fleet_of
 from feed_attack import CLOCK
 from steerclear.shield.bridge.feed import FeedReceiver, Packet
-from steerclear.shield.bridge.feed_packets import Fix
-from steerclear.shield.bridge.feed_seal import Seal
+from steerclear.shield.bridge.feed_packets import Fix, Seal
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.platforms import layout as L
 
@@ -54,9 +53,6 @@ class FedContacts(FakeContacts):
 
     def alarms(self):
         return self.receiver.alarms()
-
-    def rivals(self):
-        return self.receiver.rivals()
 
     def close(self):
         self.receiver.close()

@@ -5,8 +5,7 @@ import socket
 import time
 
 from steerclear.shield.bridge.feed import FlagStatus, GameState, Packet
-from steerclear.shield.bridge.feed_packets import Fix
-from steerclear.shield.bridge.feed_seal import Seal
+from steerclear.shield.bridge.feed_packets import Fix, Seal
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 
 GAME = GameState(1.0, {}, (FlagStatus(10.0, 20.0, False), FlagStatus(70.0, 20.0, False)))

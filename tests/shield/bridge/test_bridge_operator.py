@@ -4,7 +4,8 @@ import logging
 import threading
 
 import pytest
-from steerclear.shield.bridge.operator import DISABLES, LONGEST_OVERRIDE_S, Operator
+from steerclear.shield.bridge.failsafe_table import DISABLES
+from steerclear.shield.bridge.operator import LONGEST_OVERRIDE_S, Operator
 from steerclear.shield.exceptions import ConfigError
 
 

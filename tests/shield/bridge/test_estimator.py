@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.estimator import Estimator
-from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L

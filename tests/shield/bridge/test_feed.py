@@ -12,18 +12,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
-from steerclear.shield.bridge.feed import (
-    BoatStatus,
-    FeedReceiver,
-    FeedSender,
-    Fix,
-    FlagStatus,
-    GameState,
-    Packet,
-    game_state,
-    parse_packet,
-)
-from steerclear.shield.bridge.feed_order import Budget
+from steerclear.shield.bridge.feed import BoatStatus, Budget, FeedReceiver, FeedSender, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
 from steerclear.shield.bridge.feed_packets import MAX_BYTES
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.exceptions import BridgeError, ConfigError, FeedError
@@ -276,8 +265,8 @@ def test_senders_and_boats_without_end_do_not_fill_the_memory():
         for k in range(400):
             receiver.take(positions(*(contact(boat=f"b{k}_{j}") for j in range(8)), sender="hub_0", seq=k + 2), LOCAL)
         assert len(receiver.read()) == 256
-        assert len(receiver._order._senders) == 64
-        assert "hub_0" in receiver._order._senders, "who was there first stays"
+        assert len(receiver._senders) == 64
+        assert "hub_0" in receiver._senders, "who was there first stays"
         for k in range(400):
             receiver.take(positions(contact(boat="boat_0"), sender=f"liar_{k}"), LOCAL)
         assert len(receiver.read()) <= 256 + 8
@@ -310,7 +299,7 @@ def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(is_game, key, 
     flipped = bytearray(whole)
     flipped[at % len(flipped)] ^= byte
     receiver = QUIET
-    receiver._order.__init__()
+    receiver._senders.clear()
     for data in (whole, bytes(flipped)):
         receiver.take(data, LOCAL)
     for found in receiver.read():
@@ -366,8 +355,7 @@ def test_a_second_hub_on_the_same_file_is_said_and_the_first_goes_on():
             second.send_positions([Fix("red_1", 42.0001, -71.0, 75.0, 2.0, 0.0, 0.5)])
             first.send_positions([Fix("red_1", 42.0, -71.0, 75.0, 1.0, 0.0, 0.5)])
         wait_for(lambda: receiver.faults().get("second run") == 10)
-        assert [found.speed_mps for found in receiver.read()] == [1.0]
-        assert [found.speed_mps for found in receiver.rivals()] == [2.0], "it may be the right one"
+        assert [found.speed_mps for found in receiver.read()] == [1.0, 2.0], "the other may be the right one"
         (alarm,) = receiver.alarms()
         assert "two programs send as gps_hub; end one of them" in alarm.text
 

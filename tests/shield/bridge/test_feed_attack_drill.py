@@ -10,8 +10,7 @@ from steerclear.experiments.deploy.replaying import prove
 from steerclear.experiments.deploy.replaying_tracks import TrackBuilder
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet
 from steerclear.shield.bridge.feed import Packet
-from steerclear.shield.bridge.feed_packets import Fix
-from steerclear.shield.bridge.feed_seal import Seal
+from steerclear.shield.bridge.feed_packets import Fix, Seal
 
 OFF_M = 25.0
 

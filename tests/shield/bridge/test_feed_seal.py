@@ -11,8 +11,7 @@ import pytest
 from feed_attack import GAME, flood, forged, sealed
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, Packet
-from steerclear.shield.bridge.feed_packets import MAX_BYTES
-from steerclear.shield.bridge.feed_seal import SEAL_BYTES, Seal, body_of, is_sealed
+from steerclear.shield.bridge.feed_packets import MAX_BYTES, SEAL_BYTES, Seal, is_sealed
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.exceptions import ConfigError, FeedError
@@ -41,7 +40,7 @@ def test_a_sealed_packet_is_taken_once(receiver):
 def test_what_is_not_sealed_with_the_key_is_dropped_and_counted_by_kind(receiver, game):
     fixes = () if game else (TRUE,)
     good = sealed(KEY, 1, fixes=fixes, game=game)
-    bare = body_of(good)
+    bare = good[:-SEAL_BYTES]
     assert json.loads(bare)["stamp"] > 0
     changed = bare.replace(b'"seq":1', b'"seq":9') + good[-SEAL_BYTES:]
     for data in (bare, bare + b"\n", bare + b"\nhmac-sha256:" + b"0" * 63, b"", b"\nhmac-sha256:"):
@@ -153,10 +152,10 @@ def test_forged_packets_cost_a_tenth_so_that_more_of_them_leave_the_true_ones_ro
 
 
 def test_fixes_of_packets_that_were_held_back_are_not_fresh(receiver, monkeypatch):
-    now = receiver._order._clock.now
+    now = receiver._stamps.now
     held = [sealed(KEY, seq, fixes=(TRUE,)) for seq in (1, 2)]
     receiver.take(held[0], LOCAL)
-    monkeypatch.setattr(receiver._order._clock, "now", lambda: now() + 30 * 100_000)
+    monkeypatch.setattr(receiver._stamps, "now", lambda: now() + 30 * 100_000)
     receiver.take(held[1], LOCAL)
     (contact,) = receiver.read()
     assert 100.0 - contact.fixed_s == pytest.approx(30.0, abs=0.5)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from bridge_fakes import DT_S, World, fleet_of, straight
-from steerclear.shield.bridge.handover import nearing
+from steerclear.shield.bridge.failsafe import nearing
 from steerclear.shield.platforms import layout as L
 
 END = "end: {clear_s: 10.0, longest_s: 40.0}"
@@ -41,7 +41,7 @@ def lying(other, end=END, **more):
 
 
 def near(world):
-    return nearing(world.fleet, world.loop.roster, world.loop._readings)
+    return nearing(world.fleet, world.loop.tracker, world.loop._readings)
 
 
 def test_a_boat_that_is_hunted_at_the_end_is_kept_out_of_the_way_until_it_is_left_in_peace():

@@ -138,24 +138,3 @@ def test_a_wall_clock_that_steps_by_an_hour_changes_nothing(monkeypatch):
     for before, after in zip(plain.sink.ticks, stepped.sink.ticks, strict=True):
         np.testing.assert_array_equal(before.decisions.sent.values, after.decisions.sent.values)
         assert before.actions == after.actions
-
-
-def test_boats_that_obey_later_than_declared_are_told_of():
-    def weaving(snapshot):
-        heading = 1.0 if (snapshot.number // 40) % 2 else 0.0
-        return np.array([[2.0, heading], [0.0, 0.0]])
-
-    world = World(fleet_of(blue=1, red=1), [(20.0, 0.0, 0.0, 2.0)], weaving, others=[("red_1", 90.0, 50.0, 0.0, 0.0)])
-    link, queue = world.links["blue_1"], [None] * 4
-
-    def late(dt_s, advance=link.advance):
-        now = link.command
-        queue.append(now)
-        link.command = queue.pop(0)
-        advance(dt_s)
-        link.command = now
-
-    link.advance = late
-    world.run(15.0)
-    assert ("delay", "none") in world.responses("blue_1")
-    assert any("0.4 s" in action.text for action in world.last.actions)

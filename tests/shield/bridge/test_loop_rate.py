@@ -10,8 +10,7 @@ from bridge_fakes import World, fleet_of, straight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.overruns import Overruns
-from steerclear.shield.bridge.timing import Timing
+from steerclear.shield.bridge.control_loop import Overruns, Timing
 from steerclear.shield.platforms import layout as L
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bridge_fakes import DT_S, FakeGame, World, fleet_of, game_of
 from steerclear.shield import Commands, Fleet, Shield, Surroundings
-from steerclear.shield.bridge.wanted import Snapshot
+from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.surroundings import OPEN_WATER

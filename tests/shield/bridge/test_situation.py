@@ -4,16 +4,15 @@ import math
 
 import pytest
 from bridge_fakes import fleet_of
-from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.link import BoatReading
-from steerclear.shield.bridge.roster import Roster
+from steerclear.shield.bridge.messages import BoatReading, Contact
 from steerclear.shield.bridge.situation import SITUATION, check_situation
+from steerclear.shield.bridge.tracker import Tracker
 
 
 def at(**places):
     """A roster of two own boats and one other at (x, y, heading rad, speed); None: never seen."""
     fleet = fleet_of(blue=2, red=1)
-    roster = Roster(fleet, ["blue_1", "blue_2"])
+    roster = Tracker(fleet, ["blue_1", "blue_2"])
     readings, contacts = {}, []
     for name in ("blue_1", "blue_2", "red_1"):
         place = places.get(name, {"blue_1": (0, 0), "blue_2": (20, 0), "red_1": (40, 0)}[name])

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 
 
 def main(source: str, target: str, rate: str) -> None:

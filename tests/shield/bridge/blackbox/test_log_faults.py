@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from logged_runs import Encounter, header_of, write_log
 from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, TlogWriter, mcap_file
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError
 
 HERE = Path(__file__).parent

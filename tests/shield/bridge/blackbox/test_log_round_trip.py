@@ -14,9 +14,7 @@ from steerclear.shield import Commands, Fleet, ShieldConfig, Surroundings
 from steerclear.shield.bridge.blackbox.decode import tick_from_json
 from steerclear.shield.bridge.blackbox.encode import tick_to_json
 from steerclear.shield.bridge.blackbox.header import LogHeader, platforms_of
-from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.link import BoatReading, Sent
-from steerclear.shield.bridge.tick import Action, Tick
+from steerclear.shield.bridge.messages import Action, BoatReading, Contact, Sent, Tick
 from steerclear.shield.decision import Decisions
 from steerclear.shield.exceptions import LogError
 from steerclear.shield.platforms import PLATFORMS, get_platform

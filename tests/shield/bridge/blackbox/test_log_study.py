@@ -16,7 +16,7 @@ from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter
 from steerclear.shield.bridge.blackbox.mcap_file import McapFile
 from steerclear.shield.bridge.blackbox.mcap_writer import PART_S, _Store
 from steerclear.shield.bridge.blackbox.parts import part_path
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 
 pytestmark = pytest.mark.study
 HERE = Path(__file__).parent

@@ -9,7 +9,7 @@ from logged_runs import START_S, UNIX_NS, Encounter, header_of, reading_of, writ
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, log_path
-from steerclear.shield.bridge.tick import Tick
+from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError
 
 STEPS = 60

@@ -8,11 +8,11 @@ from fake_boat import FakeBoat, wait_for
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.link import NEVER_S
 from steerclear.shield.bridge.mavlink.endpoint import Endpoint
 from steerclear.shield.bridge.mavlink.link import MavlinkLink
 from steerclear.shield.bridge.mavlink.routes import ROUTES
 from steerclear.shield.bridge.mavlink.signing import Signing
+from steerclear.shield.bridge.messages import NEVER_S
 from steerclear.shield.exceptions import LinkError, LinkRefused
 
 FRAME = FieldFrame(42.0, -71.0, 30.0)

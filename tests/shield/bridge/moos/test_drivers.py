@@ -4,7 +4,7 @@ import math
 
 import pytest
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.moos.drivers import Drivers
 from steerclear.shield.bridge.moos.helm_gate import HelmGate
 from steerclear.shield.bridge.moos.mission import mission_faults, parse_mission

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.foresight import Foresight
-from steerclear.shield.bridge.link import BoatReading, Sent
+from steerclear.shield.bridge.messages import BoatReading, Sent, Snapshot, Tick
+from steerclear.shield.bridge.model_error import ModelErrorMonitor
 from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
 from steerclear.shield.bridge.preflight.missed import Missed, check_model
 from steerclear.shield.bridge.preflight.response import check_course, check_response, counted_words, drill_checks
 from steerclear.shield.bridge.preflight.result import run_checks
-from steerclear.shield.bridge.tick import Tick
-from steerclear.shield.bridge.wanted import Snapshot
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.proving import reference_models
@@ -68,8 +66,8 @@ class Water:
 def driven(boats=("blue_1",), bend=None, **water):
     """A drill that has been driven, and the water it was driven on; ``bend(s into it, values)`` stands for a shield."""
     drill, water = Drill(FLEET, boats), Water(**water)
-    foresight, water.missed = Foresight(FLEET, boats), Missed(drill)
-    water.missed.foresight = foresight
+    foresight, water.missed = ModelErrorMonitor(FLEET, boats), Missed(drill)
+    water.missed.model_error = foresight
     for k in range(round(drill.seconds / DT_S) + 5):
         now = 50.0 + DT_S * k
         readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}

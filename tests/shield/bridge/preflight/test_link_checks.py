@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.link import BoatReading
 from steerclear.shield.bridge.mavlink.health import LinkHealth
 from steerclear.shield.bridge.mavlink.preparation import OTHERS
+from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.preflight.link_checks import (
     check_autopilot,
     check_clock,

@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 from bridge_fakes import fleet_of
-from steerclear.shield.bridge.assemble import assemble, seen_now
-from steerclear.shield.bridge.contact import Contact
-from steerclear.shield.bridge.link import BoatReading
-from steerclear.shield.bridge.roster import Roster
+from steerclear.shield.bridge.messages import BoatReading, Contact
+from steerclear.shield.bridge.tracker import Tracker
 from steerclear.shield.platforms import layout as L
 
 
@@ -26,13 +24,13 @@ def own(x=0.0, now_s=100.0, age_s=0.0, **changed):
 
 def roster_of(**settings):
     fleet = fleet_of(blue=1, red=1, **settings)
-    return Roster(fleet, ["blue_1"])
+    return Tracker(fleet, ["blue_1"])
 
 
 def test_the_fleet_is_in_the_files_order_with_ages_and_errors():
     roster = roster_of(more="shield: {position_error_m: 0.1}")
     roster.update(100.0, {"blue_1": own()}, [contact(fixed_s=99.4)])
-    fleet = assemble(roster, {"blue_1"})
+    fleet = roster.assemble({"blue_1"})
     assert fleet.names == ("blue_1", "red_1")
     assert fleet.controlled.tolist() == [True, False]
     assert fleet.age_s == pytest.approx([0.0, 0.6])
@@ -43,17 +41,17 @@ def test_the_fleet_is_in_the_files_order_with_ages_and_errors():
 def test_a_boat_never_seen_is_left_out_and_one_once_seen_stays():
     roster = roster_of()
     roster.update(100.0, {"blue_1": own()}, [])
-    assert assemble(roster, {"blue_1"}).names == ("blue_1",)
+    assert roster.assemble({"blue_1"}).names == ("blue_1",)
     roster.update(100.1, {"blue_1": own(now_s=100.1)}, [contact()])
     roster.update(300.0, {"blue_1": own(now_s=300.0)}, [])
-    fleet = assemble(roster, {"blue_1"})
+    fleet = roster.assemble({"blue_1"})
     assert fleet.names == ("blue_1", "red_1")
     assert fleet.age_s[1] == pytest.approx(5.0), "a ghost grows no further"
-    assert assemble(roster, {"blue_1"}, without={"red_1"}).names == ("blue_1",)
+    assert roster.assemble({"blue_1"}, without={"red_1"}).names == ("blue_1",)
 
 
 def test_no_boat_no_fleet():
-    assert assemble(roster_of(), {"blue_1"}) is None
+    assert roster_of().assemble({"blue_1"}) is None
 
 
 @pytest.mark.parametrize(
@@ -90,7 +88,7 @@ def test_a_stranger_is_said_and_left_out():
     for k in range(400):
         roster.update(100.0 + k, {}, [contact(boat=f"nobody_{k}")])
     assert "not in the fleet file" in roster.faults["nobody_399"]
-    assert len(roster._told_s) <= 300, "names on the feed are anybody's: nothing may grow with them"
+    assert len(roster._logged_s) <= 300, "names on the feed are anybody's: nothing may grow with them"
 
 
 def test_an_own_boat_without_all_its_fields_is_unknown():
@@ -115,7 +113,7 @@ def test_an_old_track_of_ours_has_a_growing_error():
     errors = []
     for k in range(1, 100):
         roster.update(100.0 + 0.1 * k, {}, [])
-        errors.append(assemble(roster, set()).position_error_m[0])
+        errors.append(roster.assemble(set()).position_error_m[0])
     assert errors[9] == pytest.approx(0.5)
     assert max(errors) == pytest.approx(2.5)
     assert np.diff(errors).min() >= -1e-12
@@ -124,6 +122,6 @@ def test_an_old_track_of_ours_has_a_growing_error():
 def test_what_policies_see_is_run_on_to_now():
     roster = roster_of()
     roster.update(100.0, {"blue_1": own()}, [contact(fixed_s=99.0, speed_mps=2.0, heading_rad=math.pi / 2)])
-    seen = seen_now(roster)
+    seen = roster.seen_now()
     assert seen[1] == pytest.approx([12.0, 5.0, 90.0, 2.0])
-    assert np.isnan(seen_now(roster_of())).all()
+    assert np.isnan(roster_of().seen_now()).all()

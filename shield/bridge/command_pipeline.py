@@ -1,4 +1,7 @@
-"""`Helm`: the one place where wanted commands pass the shield and leave for boats. Nothing changes them after that."""
+"""`CommandPipeline`: the one way commands leave: nominal, checked, shielded, sent. Nothing changes them after that.
+
+What the shield itself asks to be stopped (`Reason.STOPPED`) is stopped by the link, past the command.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +13,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..commands import Commands
-from ..decision import Decisions
+from ..decision import Decisions, Reason
 from ..exceptions import BridgeError, FleetError
 from ..fleet import Fleet
-from ..jit import Array
 from ..platforms import layout as L
 from ..shield import Shield
 from ..surroundings import Surroundings
-from .assemble import assemble
 from .clock import Clock
+from .failsafe import Responder, Verdict, outside_of
 from .fleet_file import FleetFile
 from .frame import TWO_PI
-from .freshness import Verdict
-from .link import Link, Sent
-from .parts import GameState
-from .responses import Responder
-from .roster import Roster
-from .tick import Action
-from .water import Water
+from .messages import Action, Link, Sent
+from .tracker import Tracker
 
 LOG = logging.getLogger(__name__)
 
@@ -37,7 +34,7 @@ TALK_EVERY_S = 5.0
 
 @dataclass(frozen=True)
 class Steered:
-    """What went in and out of one decision; see `tick.Tick`."""
+    """What went in and out of one decision, see `messages.Tick`; and boats found beyond the hard line."""
 
     fleet: Fleet | None = None
     wanted: Commands | None = None
@@ -46,9 +43,10 @@ class Steered:
     shield_reset: bool = False
     sent: Mapping[str, Sent] = field(default_factory=dict)
     actions: tuple[Action, ...] = ()
+    beyond: frozenset[str] = frozenset()
 
 
-class Helm:
+class CommandPipeline:
     """Takes what boats should do to the shield and its answer to the boats.
 
     Args:
@@ -56,95 +54,81 @@ class Helm:
         shield: the one shield.
         links: of the boats this process commands, by name.
         clock: of all times.
-        water: what does not move around the boats; None: the file's geofence.
     """
 
-    def __init__(
-        self,
-        fleet: FleetFile,
-        shield: Shield,
-        links: Mapping[str, Link],
-        clock: Clock,
-        water: Water | None = None,
-    ) -> None:
-        self._file = fleet
-        self._shield = shield
-        self._links = links
-        self._clock = clock
-        self._water = Water(fleet) if water is None else water
-        self._responders = {name: Responder(fleet.platform_of[name], fleet.geofence) for name in links}
+    def __init__(self, fleet: FleetFile, shield: Shield, links: Mapping[str, Link], clock: Clock) -> None:
+        self._file, self._shield, self._links, self._clock = fleet, shield, links, clock
+        self._responders = {name: Responder(fleet.platform_of[name], fleet.geofence.box) for name in links}
         self._fresh = True
         self._failure = ("", -math.inf)
 
     def steer(
         self,
-        roster: Roster,
+        tracker: Tracker,
         answer: Commands | None,
         verdict: Verdict,
+        surroundings: Surroundings,
         mates: Collection[str] = (),
-        game: GameState | None = None,
-        game_age_s: float = math.inf,
     ) -> Steered:
         """Decide and send for all boats of this process.
 
         Args:
-            roster: what is known of all boats.
+            tracker: what is known of all boats.
             answer: the policy's absolute commands, all boats of the file; used for boats without a response due.
             verdict: responses due, boats whose state is unknown, boats that do not obey.
+            surroundings: static constraints now.
             mates: team-mates another process commands behind a shield of their own.
-            game: the referee's state of the game; None: none.
-            game_age_s: its age, s.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
         try:
-            fleet = assemble(roster, {*commanded, *mates}, verdict.dropped)
+            fleet = tracker.assemble({*commanded, *mates}, verdict.dropped)
             so_far = Steered(fleet)
             if fleet is None or not commanded:
                 return self._finish(so_far, verdict)
-            wanted = self._wanted(fleet, commanded, answer, verdict)
-            so_far = Steered(fleet, wanted, self._water.around(fleet, game, game_age_s))
-            reset = self._reset_if_due()
-            decisions = self._shield.decide(fleet, wanted, so_far.surroundings)
+            so_far = Steered(fleet, self._nominal(fleet, commanded, answer, verdict), surroundings)
+            reset, self._fresh = self._fresh, False
+            if reset:  # at the start and after a failure: half-made memory is not to be trusted
+                self._shield.reset()
+            decisions = self._shield.decide(fleet, so_far.wanted, surroundings)
         except Exception as error:  # whatever broke, no boat may go on with an old command
             return self._finish(self._failed(so_far, commanded, error), verdict)
         actions: list[Action] = []
-        sent = {name: self._send(name, decisions, fleet, actions) for name in commanded}
-        steered = replace(so_far, decisions=decisions, shield_reset=reset, sent=sent, actions=tuple(actions))
-        return self._finish(steered, verdict)
+        sent = {name: self._send(name, decisions, actions) for name in commanded}
+        beyond = frozenset(action.subject for action in actions if action.condition == "hard_line")
+        steered = replace(so_far, decisions=decisions, shield_reset=reset, sent=sent, beyond=beyond)
+        return self._finish(replace(steered, actions=tuple(actions)), verdict)
 
     def stop_all(self, names: Collection[str]) -> dict[str, Sent]:
         """Tell boats to stop by their links' surest way, past the shield."""
         return {name: self._links[name].stop() for name in names}
 
-    def _reset_if_due(self) -> bool:
-        """Forget all backups at the start and after a failure: half-made memory is not to be trusted."""
-        reset = self._fresh
-        if reset:
-            self._shield.reset()
-        self._fresh = False
-        return reset
-
-    def _wanted(self, fleet: Fleet, commanded: Collection[str], answer: Commands | None, verdict: Verdict) -> Commands:
+    def _nominal(self, fleet: Fleet, commanded: Collection[str], answer: Commands | None, verdict: Verdict) -> Commands:
         values = np.full((len(fleet), 2), np.nan)
         for i, name in enumerate(fleet.names):
             if name in commanded:
-                values[i] = self._wanted_row(name, fleet.state[i], answer, verdict)
+                response = verdict.responses.get(name, "go_on")
+                if response == "go_on" and answer is not None:
+                    self._responders[name].clear()
+                    values[i] = answer.values[self._file.names.index(name)]
+                else:
+                    response = "stop" if response == "go_on" else response
+                    values[i] = self._responders[name].wanted(response, fleet.state[i])
             elif fleet.controlled[i]:  # a team-mate with its own shield: taken to hold its course
                 values[i] = max(0.0, fleet.state[i, L.SPEED]), math.radians(fleet.state[i, L.HEADING]) % TWO_PI
         return Commands.absolute_rad(values)
 
-    def _wanted_row(
-        self, name: str, row: Array, answer: Commands | None, verdict: Verdict
-    ) -> tuple[float, float] | Array:
-        response = verdict.responses.get(name, "go_on")
-        if response == "go_on" and answer is not None:
-            self._responders[name].clear()
-            return answer.values[self._file.names.index(name)]
-        return self._responders[name].wanted("stop" if response == "go_on" else response, row)
-
-    def _send(self, name: str, decisions: Decisions, fleet: Fleet, actions: list[Action]) -> Sent:
+    def _send(self, name: str, decisions: Decisions, actions: list[Action]) -> Sent:
+        fleet = decisions.fleet
         i = fleet.names.index(name)
+        if decisions.reason[i] == STOPPED:
+            outside_m = outside_of(self._file.geofence.box, *fleet.state[i, [L.X, L.Y]])
+            what, text = "obstacle", f"{name} can only stop before an obstacle: stopped by its link"
+            if outside_m > 0.0:
+                what = "hard_line"
+                text = f"{name} is {outside_m:.1f} m outside, beyond the hard line: stopped by its link, handed over"
+            actions.append(Action(name, what, "stop", text))
+            return self._links[name].stop()
         speed, heading = decisions.sent.absolute(i, fleet.heading_rad[i])
         try:
             return self._links[name].send(heading, speed)
@@ -167,10 +151,12 @@ class Helm:
         """Stop boats whose state is unknown; leave alone those that somebody else steers."""
         sent = dict(steered.sent)
         for name in self._links:
-            if name in sent:
-                continue
-            if name in verdict.idle:
+            if name not in sent and name in verdict.idle:
                 sent[name] = Sent(name, self._clock.now_s(), math.nan, math.nan, "none: does not obey", False)
-            else:
+            elif name not in sent:
                 sent[name] = self._links[name].stop()
         return replace(steered, sent=sent)
+
+
+STOPPED = int(Reason.__members__.get("STOPPED", -1))
+"""The shield asks for the link's own stop."""

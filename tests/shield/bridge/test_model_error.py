@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from bridge_fakes import fleet_of
 from steerclear.shield.bridge.fleet_settings import Limits, ModelLimit
-from steerclear.shield.bridge.foresight import WIDEN_MPS, Foresight
-from steerclear.shield.bridge.link import BoatReading, Sent
+from steerclear.shield.bridge.messages import BoatReading, Sent
+from steerclear.shield.bridge.model_error import WIDEN_MPS, ModelErrorMonitor
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
@@ -27,7 +27,7 @@ def drive(turn_share=1.0, seconds=40.0, limits=None, aged=None, speed_share=1.0,
         max_turn_rate_dps=turn_share * platform.max_turn_rate_dps,
         max_speed_mps=speed_share * platform.max_speed_mps,
     ).pack()
-    foresight, row, margins = Foresight(fleet, (NAME,)), fresh_state(0.0, 0.0, 0.0, 2.0), []
+    foresight, row, margins = ModelErrorMonitor(fleet, (NAME,)), fresh_state(0.0, 0.0, 0.0, 2.0), []
     for k in range(round(seconds / DT_S)):
         if k not in left_out:  # else the autopilot goes on with what it was told last
             told = 2.5, 80.0 * math.sin(0.9 * k * DT_S)

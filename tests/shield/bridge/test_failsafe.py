@@ -3,12 +3,15 @@
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from bridge_fakes import fleet_of
-from steerclear.shield.bridge.freshness import Seen, judge, words
-from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield import Commands
+from steerclear.shield.bridge.failsafe import Failsafe, Seen, words
+from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_table
+from steerclear.shield.bridge.messages import Answer, BoatReading
 from steerclear.shield.bridge.operator import Override
-from steerclear.shield.bridge.roster import Track
+from steerclear.shield.bridge.tracker import Track, Tracker
 from steerclear.shield.platforms import fresh_state
 
 MORE = """
@@ -33,8 +36,14 @@ def verdict_of(navigation_s=0.0, contact_s=0.0, known_s=None, where=(0.0, 0.0), 
         track=lambda name: Track(fresh_state(*where, 0.0), 0.0, navigation_s, 0.0),
     )
     values = {"ready": True, "why_not": "", "heartbeat_age_s": 0.0} | (reading or {})
-    given = {"usable": {"blue_1"}, "policy_age_s": {"blue_1": 0.1}} | seen
-    return judge(fleet, roster, Seen(readings={"blue_1": BoatReading("blue_1", 0.0, **values)}, **given))
+    usable, age_s = seen.pop("usable", True), seen.pop("policy_age_s", 0.1)
+    failsafe = Failsafe(fleet, roster)
+    boats = {"blue_1": BoatReading("blue_1", 0.0, **values)}
+    good, bad = (Commands.absolute_rad(np.full((2, 2), value)) for value in (0.0, math.nan))
+    if age_s is not None:  # the last answer that could be used, then the one of now
+        failsafe.judge(Seen(100.0, boats, Answer(good, age_s)))
+    answer = Answer(good if usable else bad, 0.0 if age_s is None else age_s, seen.pop("policy_fault", ""))
+    return failsafe.judge(Seen(100.0, boats, answer, **seen))
 
 
 def test_nothing_is_due_while_all_is_well():
@@ -54,17 +63,17 @@ def test_nothing_is_due_while_all_is_well():
         ({"reading": {"heartbeat_age_s": 2.1}}, "stop", "no longer reached"),
         ({"contact_s": 1.1}, "slow", "contact red_1 old"),
         ({"contact_s": 5.1}, "stop", "contact red_1 lost"),
-        ({"policy_age_s": {"blue_1": 0.6}}, "hold_course", "no usable command"),
-        ({"policy_age_s": {"blue_1": 3.1}}, "hold_station", "3.1 s old"),
-        ({"usable": ()}, "hold_course", "no usable command"),
-        ({"usable": (), "policy_age_s": {}}, "hold_station", "blue_1: no answer of the policy yet"),
-        ({"usable": (), "policy_age_s": {}, "policy_fault": "it died"}, "hold_station", "it died"),
+        ({"policy_age_s": 0.6}, "hold_course", "no usable command"),
+        ({"policy_age_s": 3.1}, "hold_station", "3.1 s old"),
+        ({"usable": False}, "hold_course", "no usable command"),
+        ({"usable": False, "policy_age_s": None}, "hold_station", "blue_1: no answer of the policy yet"),
+        ({"usable": False, "policy_age_s": None, "policy_fault": "it died"}, "hold_station", "it died"),
         ({"game_age_s": 2.1}, "hold_station", "state of the game"),
         ({"game_expected": True}, "hold_station", "never heard"),
         ({"game_over": True, "game_age_s": 0.1}, "hold_station", "over"),
         ({"log_fault": "disk full"}, "slow", "disk full"),
-        ({"rivals": {"blue_1"}}, "stop", "somebody else"),
-        ({"where": (0.0, 99.0)}, "return", "outside the geofence"),
+        ({"reading": {"faults": {"second_commander": 1}}}, "stop", "somebody else"),
+        ({"where": (0.0, 99.0)}, "return", "blue_1 is 39.0 m outside the geofence, for 0 s"),
         ({"reading": {"heartbeat_age_s": 1.1}}, "stop", "link silent"),
     ],
 )
@@ -79,7 +88,7 @@ def test_each_limit_has_its_declared_response(situation, response, said):
     [
         {"navigation_s": 0.5},
         {"contact_s": 1.0},
-        {"policy_age_s": {"blue_1": 0.5}},
+        {"policy_age_s": 0.5},
         {"game_age_s": 2.0},
         {"game_age_s": math.inf},
         {"reading": {"heartbeat_age_s": 1.0}},
@@ -92,7 +101,7 @@ def test_within_a_limit_nothing_is_due(situation):
 
 
 def test_the_strongest_of_several_counts_and_all_are_told():
-    verdict = verdict_of(contact_s=1.1, navigation_s=0.7, usable=(), where=(0.0, 99.0))
+    verdict = verdict_of(contact_s=1.1, navigation_s=0.7, usable=False, where=(0.0, 99.0))
     assert verdict.responses == {"blue_1": "return"}
     assert len(verdict.actions) == 4
 
@@ -120,7 +129,7 @@ def test_a_boat_somebody_took_is_told_nothing_however_long_it_is_silent(silent_s
     [
         ({"game_age_s": 9.0}, "game"),
         ({"log_fault": "x"}, "log"),
-        ({"rivals": {"blue_1"}}, "commander"),
+        ({"reading": {"faults": {"second_commander": 1}}}, "commander"),
         ({"where": (0.0, 99.0)}, "geofence"),
         ({"contact_s": 9.0}, "contact"),
     ],
@@ -134,13 +143,73 @@ def test_an_override_switches_off_its_own_response_only(situation, condition):
 
 def test_no_override_lets_a_boat_go_on_without_a_command():
     made = Override("policy", "blue_1", 1.0, "test")
-    assert verdict_of(usable=(), overrides=(made,)).responses == {"blue_1": "stop"}
+    assert verdict_of(usable=False, overrides=(made,)).responses == {"blue_1": "stop"}
 
 
 def test_an_override_of_a_lost_contact_drops_it_and_of_an_old_one_does_not():
     made = Override("contact", "red_1", 1.0, "test")
     assert verdict_of(contact_s=9.0, overrides=(made,)).dropped == {"red_1"}
     assert verdict_of(contact_s=2.0, overrides=(made,)).dropped == set()
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (Answer(None, math.inf), "no answer of the policy yet"),
+        (Answer(Commands(np.zeros((2, 2)), relative=True), 0.0), "relative to headings"),
+        (Answer(Commands.absolute_rad(np.zeros((3, 2))), 0.0), "3 boats of 2"),
+        (Answer(Commands.absolute_rad(np.full((2, 2), 1e9)), 0.0), "no command for blue_1"),
+        (Answer(Commands.absolute_rad(np.zeros((2, 2))), -1.0), "no answer of the policy yet"),
+        (Answer(Commands.absolute_rad(np.zeros((2, 2))), math.nan), "no answer of the policy yet"),
+    ],
+)
+def test_answers_that_are_none_are_told(fault, said):
+    fleet = fleet_of(blue=1, red=1)
+    tracker = Tracker(fleet, ("blue_1",))
+    verdict = Failsafe(fleet, tracker).judge(Seen(100.0, {"blue_1": BoatReading("blue_1", 100.0)}, fault))
+    assert any(said in action.text for action in verdict.actions if action.condition == "policy")
+
+
+@pytest.mark.parametrize("after", ["wait", "retake"])
+def test_what_its_own_failsafe_took_is_offered_or_taken_back_only_once_that_is_over(after):
+    fleet = fleet_of(blue=1, red=1, more=f"limits: {{after_failsafe: {after}}}")
+    failsafe = Failsafe(fleet, Tracker(fleet, ("blue_1",)))
+    fresh = {"position_age_s": 0.1, "heading_age_s": 0.1, "velocity_age_s": 0.1, "why_not": "it is in HOLD"}
+
+    def judged(by, over, **changes):
+        taken = {"released": True, "released_by": by, "failsafe_over": over, **fresh, **changes}
+        verdict = failsafe.judge(Seen(100.0, {"blue_1": BoatReading("blue_1", 100.0, **taken)}, Answer()))
+        return verdict, next(action.text for action in verdict.actions if action.condition == "mode")
+
+    for by, over in (("pilot", True), ("failsafe", False)):
+        verdict, text = judged(by, over)
+        assert (verdict.retake, verdict.idle) == (set(), {"blue_1"})
+        assert "it is in HOLD" in text
+        assert "take" not in text
+    verdict, text = judged("failsafe", True)
+    assert verdict.retake == ({"blue_1"} if after == "retake" else set())
+    assert ("take it back" in text) == (after == "wait")
+    assert judged("failsafe", True, position_age_s=1.0)[0].retake == set(), "not while nobody knows where it is"
+
+
+def test_a_boat_handed_over_is_stopped_by_its_link_until_somebody_takes_it():
+    fleet = fleet_of(blue=1, red=1)
+    failsafe = Failsafe(fleet, Tracker(fleet, ("blue_1",)))
+    failsafe.handed_over.add("blue_1")
+    ready = {"ready": True, "heartbeat_age_s": 0.0}
+    verdict = failsafe.judge(Seen(100.0, {"blue_1": BoatReading("blue_1", 100.0, **ready)}, Answer()))
+    assert "blue_1" in verdict.unknown
+    assert any(a.condition == "hard_line" and "take it back" in a.text for a in verdict.actions)
+    failsafe.judge(Seen(100.1, {"blue_1": BoatReading("blue_1", 100.1, released=True)}, Answer()))
+    assert failsafe.handed_over == set()
+
+
+def test_the_table_names_only_settings_that_there_are_and_only_what_can_be_overridden():
+    rows = response_table()
+    assert len(rows) == len(CONDITIONS)
+    assert all("`" not in cell.replace("(`", "").replace("`)", "") for row in rows for cell in row)
+    assert any("0.5 s (`navigation.max_age_s`)" in row[2] for row in rows)
+    assert set(DISABLES) == {"commander", "contact", "game", "geofence", "log", "model", "policy"}
 
 
 def test_ages_in_words():

@@ -5,14 +5,13 @@ import math
 import numpy as np
 import pytest
 from bridge_fakes import fleet_of
-from steerclear.shield.bridge.assemble import assemble, seen_now
-from steerclear.shield.bridge.contact import Contact
+from steerclear.shield import Commands
+from steerclear.shield.bridge.contact_fusion import MOST_SOURCES, MOST_STORIES, ContactFusion
+from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.fleet_settings import ContactLimit
-from steerclear.shield.bridge.freshness import Seen, judge
-from steerclear.shield.bridge.link import BoatReading
+from steerclear.shield.bridge.messages import Answer, BoatReading, Contact
 from steerclear.shield.bridge.operator import Override
-from steerclear.shield.bridge.roster import Roster
-from steerclear.shield.bridge.sightings import MOST_SOURCES, MOST_STORIES, Sightings
+from steerclear.shield.bridge.tracker import Tracker
 
 LIMIT = ContactLimit()
 
@@ -22,7 +21,7 @@ def contact(source, x=10.0, fixed_s=100.0, error_m=0.2, speed=0.0, boat="red_1")
 
 
 def seen(*contacts, now_s=100.0):
-    sightings = Sightings(2.0, LIMIT)
+    sightings = ContactFusion(2.0, LIMIT.max_age_s, LIMIT.lost_after_s)
     for entry in contacts:
         assert sightings.take(entry, now_s) == ""
     return sightings
@@ -34,7 +33,7 @@ def test_one_source_is_as_it_says():
 
 
 def test_nobody_told_of_it():
-    assert Sightings(2.0, LIMIT).view(0.0) is None
+    assert ContactFusion(2.0, LIMIT.max_age_s, LIMIT.lost_after_s).view(0.0) is None
 
 
 @pytest.mark.parametrize("apart_m", [10.0, 30.0, 1000.0])
@@ -109,7 +108,7 @@ def test_each_source_is_checked_against_itself_alone():
 
 
 def test_sources_without_end_do_not_fill_memory():
-    sightings = Sightings(2.0, LIMIT)
+    sightings = ContactFusion(2.0, LIMIT.max_age_s, LIMIT.lost_after_s)
     for k in range(500):
         sightings.take(contact(f"s{k}", fixed_s=100.0 + 0.01 * k), 110.0)
     assert len(sightings._latest) <= MOST_SOURCES
@@ -121,26 +120,27 @@ def reading(now_s=100.0):
 
 
 def roster_with(*contacts):
-    roster = Roster(fleet_of(blue=1, red=1), ["blue_1"])
+    roster = Tracker(fleet_of(blue=1, red=1), ["blue_1"])
     roster.update(100.0, {"blue_1": reading()}, contacts)
     return roster
 
 
 def test_the_shield_is_given_a_ghost_wherever_a_contradicted_boat_may_be():
     roster = roster_with(contact("hub"), contact("evil", 40.0))
-    fleet = assemble(roster, {"blue_1"})
+    fleet = roster.assemble({"blue_1"})
     assert fleet.names == ("blue_1", "red_1", "red_1~2")
     assert fleet.state[1:, 0].tolist() == [10.0, 40.0]
     assert fleet.team.tolist() == [0, 1, 1]
     assert fleet.controlled.tolist() == [True, False, False]
-    assert assemble(roster, {"blue_1"}, without={"red_1"}).names == ("blue_1",)
-    assert len(seen_now(roster)) == 2, "the policy is shown boats, not ghosts"
-    assert np.isfinite(seen_now(roster)).all()
+    assert roster.assemble({"blue_1"}, without={"red_1"}).names == ("blue_1",)
+    assert len(roster.seen_now()) == 2, "the policy is shown boats, not ghosts"
+    assert np.isfinite(roster.seen_now()).all()
 
 
 def verdict_of(roster, **changes):
-    values = {"readings": {"blue_1": reading()}, "usable": {"blue_1"}, "policy_age_s": {"blue_1": 0.0}}
-    return judge(roster.fleet, roster, Seen(**values, alarms=roster.alarms(), **changes))
+    answer = Answer(Commands.absolute_rad(np.zeros((2, 2))), 0.0)
+    seen = Seen(100.0, {"blue_1": reading()}, answer, alarms=roster.alarms(), **changes)
+    return Failsafe(roster.fleet, roster).judge(seen)
 
 
 def actions_of(verdict, subject):
@@ -165,15 +165,14 @@ def test_the_operator_may_switch_the_response_off_and_ghosts_stay():
     verdict = verdict_of(roster, overrides=(Override("contact", "red_1", 200.0, "key"),))
     assert [response for response, _ in actions_of(verdict, "red_1")] == ["none"]
     assert "blue_1" not in verdict.responses
-    assert "red_1~2" in assemble(roster, {"blue_1"}).names
+    assert "red_1~2" in roster.assemble({"blue_1"}).names
 
 
 def test_of_an_own_boat_its_own_link_tells_and_contradicting_witnesses_are_none():
     roster = roster_with(contact("hub", boat="blue_1"), contact("evil", 40.0, boat="blue_1"), contact("hub"))
-    assert assemble(roster, {"blue_1"}).names == ("blue_1", "red_1")
+    assert roster.assemble({"blue_1"}).names == ("blue_1", "red_1")
     ((response, text),) = actions_of(verdict_of(roster), "blue_1")
     assert response == "none"
     assert "evil" in text
-    assert roster._witness("blue_1") is None
     roster.update(103.0, {}, [contact("hub", 10.0, 103.0, boat="blue_1"), contact("evil", 40.0, 103.0, boat="blue_1")])
     assert roster.known_age_s("blue_1") == pytest.approx(3.0), "nobody's word is taken for it"

@@ -5,23 +5,14 @@ import math
 import numpy as np
 import pytest
 from bridge_fakes import FakeGame, World, fleet_of, game_of, straight
-from steerclear.shield import Fleet, Surroundings
+from steerclear.shield import Surroundings
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.water import Water
-from steerclear.shield.platforms import layout as L
+from steerclear.shield.bridge.static_obstacles import StaticObstacles
 
 CIRCLE = (10.0, 20.0, 4.35)
 ROCK = (40.0, 10.0, 2.0)
 PIER = ((50.0, 0.0), (52.0, 0.0), (51.0, 5.0))
 GROUNDS = Surroundings((0.0, 0.0, 80.0, 40.0), circles=[ROCK], polygons=[PIER], stops=[CIRCLE])
-
-
-def fleet_at(*places, controlled=True):
-    state = np.zeros((len(places), L.N_STATE))
-    state[:, [L.X, L.Y]] = places
-    n = len(places)
-    names = tuple(f"boat_{i}" for i in range(n))
-    return Fleet(state, np.zeros(n, dtype=np.int64), ("heron",) * n, np.full(n, controlled), names)
 
 
 @pytest.fixture
@@ -30,7 +21,7 @@ def file():
 
 
 def test_the_geofence_takes_the_place_of_the_games_edge_and_obstacles_are_always_there(file):
-    around = Water(file, GROUNDS).around(fleet_at((0.0, 0.0)))
+    around = StaticObstacles(file, GROUNDS).around()
     assert around.field == file.geofence.box
     assert around.circles == (ROCK,)
     assert around.polygons == (PIER,)
@@ -52,25 +43,8 @@ def test_the_geofence_takes_the_place_of_the_games_edge_and_obstacles_are_always
     ids=["home", "just fresh", "silent", "no age", "taken", "the other taken", "over", "no referee"],
 )
 def test_the_own_flags_circle_is_there_while_a_referee_keeps_the_game(file, game, age_s, is_there):
-    stops = Water(file, GROUNDS).around(fleet_at((0.0, 0.0)), game, age_s).stops
+    stops = StaticObstacles(file, GROUNDS).around(game, age_s).stops
     assert stops == ((CIRCLE,) if is_there else ())
-
-
-def test_the_water_grows_only_where_a_boat_of_ours_is_outside(file):
-    water = Water(file, GROUNDS)
-    assert water.around(fleet_at((0.0, 0.0), (50.0, 20.0)), game_of(), 0.0).field == file.geofence.box
-    out = water.around(fleet_at((0.0, 0.0), (50.0, 64.0)), game_of(), 0.0)
-    assert out.field == (-20.0, -20.0, 100.0, 80.0)
-    assert (out.circles, out.polygons, out.stops) == ((ROCK,), (PIER,), (CIRCLE,))
-    assert water.around(fleet_at((0.0, 0.0), (-21.0, 64.0))).field == (-40.0, -20.0, 100.0, 80.0)
-    assert water.around(fleet_at((0.0, 0.0), (-21.0, 64.0), controlled=False)).field == file.geofence.box
-
-
-def test_the_shield_packs_the_same_water_once(file):
-    water = Water(file, GROUNDS)
-    boats = fleet_at((0.0, 0.0))
-    assert water.around(boats, game_of(), 0.0) is water.around(boats, game_of(), 0.1)
-    assert len({water.around(fleet_at((0.0, 64.0 + 0.5 * k))) for k in range(5)}) == 1
 
 
 def test_a_boat_told_to_cross_its_own_flag_stays_out_of_the_circle_whether_the_flag_is_home_or_not():
@@ -125,6 +99,6 @@ boats: [{name: a, team: blue, platform: heron, link: {kind: mavlink, address: "u
 limits: {game: {max_age_s: 0.5, then: stop}}
 """
     )
-    water, boats = Water(file, GROUNDS), fleet_at((0.0, 0.0))
-    assert water.around(boats, game_of(), 0.5).stops == (CIRCLE,)
-    assert water.around(boats, game_of(), 0.6).stops == ()
+    water = StaticObstacles(file, GROUNDS)
+    assert water.around(game_of(), 0.5).stops == (CIRCLE,)
+    assert water.around(game_of(), 0.6).stops == ()

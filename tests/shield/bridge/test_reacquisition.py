@@ -32,7 +32,7 @@ def told(world):
 
 def finish(world):
     """Wait for what is under way beside the loop, and let the loop see it."""
-    for thread in list(world.loop._retaking._threads.values()):
+    for thread in list(world.loop._reacquisition._threads.values()):
         thread.join(20.0)
     world.run(0.2)
 

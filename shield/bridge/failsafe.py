@@ -1,0 +1,385 @@
+"""Holds every turn against what is declared in `failsafe_table`, and turns what is due into nominal commands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..decision import Decisions
+from ..jit import Array
+from ..platforms import Platform
+from ..platforms import layout as L
+from .failsafe_table import CONDITIONS, setting
+from .fleet_file import FleetFile
+from .frame import TWO_PI
+from .messages import FAILSAFE, NEVER_S, Action, Alarm, Answer, BoatReading
+from .operator import Override
+from .tracker import Track, Tracker
+
+STRENGTH = {"none": 0, "go_on": 0, "hold_course": 1, "slow": 2, "hold_station": 3, "return": 4, "stop": 5}
+"""Of several responses due at once the strongest is done."""
+
+RIVAL_S = 2.0
+"""A second commander counts as there for this long after its last command was noticed, s."""
+WHOLE_S = 99.0
+"""Ages beyond this are shown in whole seconds."""
+SPEED_SHARE, SPEED_MORE_MPS, MOST_TURNS_RAD = 1.5, 0.5, 100.0
+"""Speeds beyond this share of the platform's top plus this much, and such headings, are nobody's who knows the boat."""
+
+STATION_M, STATION_SHARE = 3.0, 0.5
+"""A boat holding station steers back when farther from it than the first, m, at that share of top speed."""
+INSIDE_M = 3.0
+"""Boats return to this far inside the geofence, m."""
+REST_MPS = 0.2
+"""A boat slower than this lies still, m/s."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What one turn is held against, beside what the tracker knows.
+
+    Attributes:
+        now_s: time of the turn, s.
+        readings: of own boats.
+        answer: of the policy.
+        game_age_s: age of the state of the game, s; inf: none yet.
+        game_expected: whether there is to be a game at all.
+        game_over: whether the game has ended.
+        log_fault: why ticks can no longer be recorded; empty: they are.
+        overrides: in force.
+        alarms: what is wrong with those who tell where boats are.
+        outside_model_s: how long each own boat has been far outside its model, s.
+        decided: the last decisions; None: there were none.
+    """
+
+    now_s: float
+    readings: Mapping[str, BoatReading]
+    answer: Answer
+    game_age_s: float = NEVER_S
+    game_expected: bool = False
+    game_over: bool = False
+    log_fault: str = ""
+    overrides: tuple[Override, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
+    outside_model_s: Mapping[str, float] = field(default_factory=dict)
+    decided: Decisions | None = None
+
+
+@dataclass
+class Verdict:
+    """What is due now.
+
+    Attributes:
+        actions: everything that took effect.
+        responses: strongest response due for each own boat; boats that have none are not in it.
+        unknown: own boats told to stop by their links, past the shield: their state is not known, or they were handed
+            over beyond the hard line.
+        idle: own boats that do not obey us now (another mode, disarmed): nothing is sent to them.
+        dropped: contacts the operator had left out.
+        retake: boats to be taken back now that the fail-safe that took them is over.
+    """
+
+    actions: list[Action] = field(default_factory=list)
+    responses: dict[str, str] = field(default_factory=dict)
+    unknown: set[str] = field(default_factory=set)
+    idle: set[str] = field(default_factory=set)
+    dropped: set[str] = field(default_factory=set)
+    retake: set[str] = field(default_factory=set)
+
+
+class Failsafe:
+    """Holds each turn against the table; remembers since when things are wrong, and who was handed over.
+
+    Args:
+        fleet: the file with the limits.
+        tracker: ages of navigation and contacts; its boats are those of this process.
+
+    Attributes:
+        handed_over: boats stopped beyond the hard line, until somebody takes them.
+    """
+
+    def __init__(self, fleet: FleetFile, tracker: Tracker) -> None:
+        self.handed_over: set[str] = set()
+        self._fleet, self._tracker, self._boats = fleet, tracker, tracker.commanded
+        self._seen, self._verdict = Seen(-math.inf, {}, Answer()), Verdict()
+        self._good_s: dict[str, float] = {}
+        self._rivals_s: dict[str, float] = {}
+        self._outside_s: dict[str, float] = {}
+
+    def judge(self, seen: Seen) -> Verdict:
+        """Hold everything against its limit."""
+        self._seen, self._verdict = seen, Verdict()
+        usable, fault = self._usable_commands(seen.answer)
+        for boat in self._boats:
+            self._judge_own(boat, seen.readings[boat])
+            self._judge_policy(boat, boat in usable, fault)
+        for boat in self._fleet.names:
+            if boat not in self._boats:
+                self._judge_contact(boat)
+        for alarm in seen.alarms:
+            self._judge_alarm(alarm)
+        if seen.game_over:
+            self._due("game.over", "game", "the game is over")
+        elif (seen.game_expected or math.isfinite(seen.game_age_s)) and seen.game_age_s > self._after("game.old"):
+            self._due("game.old", "game", f"state of the game: {words(seen.game_age_s)}")
+        if seen.log_fault:
+            self._due("log", "log", f"black box: {seen.log_fault}")
+        return self._verdict
+
+    def _after(self, name: str) -> float:
+        """The time of a row of the table, s."""
+        return float(setting(CONDITIONS[name].within.strip("`"), self._fleet.limits, self._fleet.end))
+
+    def _due(
+        self, name: str, subject: str, text: str, boats: Collection[str] | None = None, response: str | None = None
+    ) -> None:
+        """Note a row that took effect, unless it is overridden.
+
+        Args:
+            name: of the row.
+            subject: boat or contact it is about.
+            text: for a person.
+            boats: whom its response concerns; None: all of this process.
+            response: instead of the table's.
+        """
+        condition, row = name.partition(".")[0], CONDITIONS[name]
+        if response is None:
+            if any(entry.covers(condition, subject) for entry in self._seen.overrides):
+                return
+            _, key, _ = f"{row.response}``".split("`", 2)
+            is_key = row.response.startswith("`")
+            response = setting(key, self._fleet.limits, self._fleet.end) if is_key else row.response
+            response = response if response in STRENGTH else "stop"  # all others are a link's own stop
+        self._verdict.actions.append(Action(subject, condition, response, text))
+        for boat in self._boats if boats is None else boats:
+            before = self._verdict.responses.get(boat, "go_on")
+            if STRENGTH[response] > STRENGTH[before]:
+                self._verdict.responses[boat] = response
+
+    def _judge_own(self, boat: str, reading: BoatReading) -> None:
+        tracker, limits = self._tracker, self._fleet.limits
+        if reading.released:  # it stays his who took it, heard or not
+            self.handed_over.discard(boat)
+            self._leave(boat, reading)
+            return
+        age, known, silent = tracker.navigation_age_s(boat), tracker.known_age_s(boat), reading.silent_s
+        why = f" ({tracker.faults[boat]})" if boat in tracker.faults else ""
+        if max(known, silent) > self._after("navigation.lost"):
+            self._verdict.unknown.add(boat)
+            what = "position unknown" if known > limits.navigation.lost_after_s else "no longer reached"
+            self._due("navigation.lost", boat, f"{boat}: {what}, {words(age)}{why}; told to stop", (boat,))
+        elif age > self._after("navigation.old"):
+            feed = ", known from the feed" if known < age else ""
+            self._due("navigation.old", boat, f"{boat}: own navigation {words(age)}{why}{feed}", (boat,))
+        if silent > self._after("link"):
+            self._due("link", boat, f"{boat}: link silent, {words(silent)}", (boat,))
+        elif not reading.ready:
+            self._leave(boat, reading)
+        if reading.faults.get("second_commander"):
+            self._rivals_s[boat] = self._seen.now_s
+        if self._seen.now_s - self._rivals_s.get(boat, -math.inf) <= RIVAL_S:
+            self._due("commander", boat, f"{boat}: somebody else commands it too", (boat,))
+        off_s = self._seen.outside_model_s.get(boat, 0.0)
+        if off_s >= self._after("model.off"):
+            text = f"{boat} is more than {limits.model.outside_m:g} m from where its platform says, for {off_s:.0f} s"
+            given_up = off_s >= self._after("model.given_up")
+            text += ": handed over, take it by hand, and fit its platform anew" if given_up else ""
+            self._due("model.given_up" if given_up else "model.off", boat, text, (boat,))
+        self._judge_place(boat)
+
+    def _leave(self, boat: str, reading: BoatReading) -> None:
+        """Nothing is sent to a boat that somebody has; one that its own fail-safe took is offered once that is over."""
+        self._verdict.idle.add(boat)
+        text = f"{boat} does not obey: {reading.why_not or reading.mode}"
+        if reading.released_by == FAILSAFE and reading.failsafe_over:
+            retakes = self._fleet.limits.after_failsafe == "retake"
+            text += "; it is taken back (after_failsafe)" if retakes else "; its fail-safe is over: take it back"
+            if retakes and reading.age_s <= self._fleet.limits.navigation.max_age_s:
+                self._verdict.retake.add(boat)
+        self._due("mode.pilot", boat, text, (), response="none")
+
+    def _judge_place(self, boat: str) -> None:
+        """Outside the operating area: how far, since when, and why it does not come back."""
+        track, now_s = self._tracker.track(boat), self._seen.now_s
+        outside_m = 0.0 if track is None else outside_of(self._fleet.geofence.box, track.row[L.X], track.row[L.Y])
+        if outside_m <= 0.0:
+            self._outside_s.pop(boat, None)
+        else:
+            since_s, why = now_s - self._outside_s.setdefault(boat, now_s), ""
+            decided = self._seen.decided
+            if decided is not None and boat in decided.fleet.names:
+                last = decided[decided.fleet.names.index(boat)]
+                why = f": it keeps clear of {', '.join(last.binding)}" if last.intervened and last.binding else ""
+            self._due(
+                "geofence", boat, f"{boat} is {outside_m:.1f} m outside the geofence, for {since_s:.0f} s{why}", (boat,)
+            )
+        if boat in self.handed_over:
+            self._verdict.unknown.add(boat)
+            text = f"{boat} went beyond the hard line: stopped by its link, handed over; bring it in by hand, then take"
+            self._due("hard_line", boat, f"{text} it back", (boat,))
+
+    def _usable_commands(self, answer: Answer) -> tuple[set[str], str]:
+        """Boats whose command by the policy can be used, and what is wrong with it, in words."""
+        commands, names = answer.commands, self._fleet.names
+        if commands is None or not answer.age_s >= 0.0:
+            return set(), answer.fault
+        if commands.relative:
+            return set(), answer.fault or "its commands are relative to headings that have changed since"
+        if len(commands) != len(names):
+            return set(), answer.fault or f"it answers for {len(commands)} boats of {len(names)}"
+        usable = set()
+        for boat in self._boats:
+            speed, heading = (float(value) for value in commands.values[names.index(boat)])
+            fastest = SPEED_SHARE * self._fleet.platform_of[boat].max_speed_mps + SPEED_MORE_MPS
+            if abs(heading) <= MOST_TURNS_RAD and abs(speed) <= fastest:  # written so that NaN is refused
+                usable.add(boat)
+                self._good_s[boat] = self._seen.now_s - answer.age_s
+        unusable = sorted(set(self._boats) - usable)
+        return usable, answer.fault or (f"no command for {', '.join(unusable)}" if unusable else "")
+
+    def _judge_policy(self, boat: str, is_usable: bool, fault: str) -> None:
+        age = self._seen.now_s - self._good_s.get(boat, -math.inf)
+        if is_usable and age <= self._after("policy.old"):
+            return
+        last = f"no usable command of the policy, last {words(age)}"
+        text = (
+            f"{boat}: {last if math.isfinite(age) else 'no answer of the policy yet'}{f' ({fault})' if fault else ''}"
+        )
+        overridden = any(entry.covers("policy", boat) for entry in self._seen.overrides)
+        name = "policy.given_up" if age > self._after("policy.given_up") else "policy.old"
+        self._due(name, boat, text, (boat,), response="stop" if overridden else None)
+
+    def _judge_contact(self, boat: str) -> None:
+        age = self._tracker.contact_age_s(boat)
+        lost = age > self._after("contact.lost")
+        if age <= self._after("contact.old"):
+            return
+        if lost and any(entry.covers("contact", boat) for entry in self._seen.overrides):
+            self._verdict.dropped.add(boat)
+        why = f" ({self._tracker.faults[boat]})" if boat in self._tracker.faults else ""
+        text = f"contact {boat} {'lost' if lost else 'old'}: {words(age)}{why}"
+        self._due("contact.lost" if lost else "contact.old", boat, text)
+
+    def _judge_alarm(self, alarm: Alarm) -> None:
+        """Sources that contradict each other: all stories are kept clear of, or boats stop where there are too many.
+
+        Of an own boat its own link tells: there it is only said.
+        """
+        subject = alarm.boat or "feed"
+        overridden = any(entry.covers("contact", alarm.boat) for entry in self._seen.overrides)
+        if alarm.boat in self._boats or overridden:
+            self._due("contact.doubt", subject, f"{subject}: {alarm.text}", (), response="none")
+            return
+        what = ", so nobody knows where it is" if alarm.lost else ""
+        response = self._fleet.limits.contact.lost_then if alarm.lost else None
+        self._due("contact.doubt", subject, f"contact {subject} in doubt{what}: {alarm.text}", response=response)
+
+
+class Responder:
+    """Turns responses of one boat into nominal commands; remembers where each began.
+
+    Args:
+        platform: the boat's.
+        box: the water it may not leave: xmin, ymin, xmax, ymax, m.
+    """
+
+    def __init__(self, platform: Platform, box: tuple[float, float, float, float]) -> None:
+        self._top_mps, self._box = platform.max_speed_mps, box
+        self._response = ""
+        self._onset: Array | None = None
+
+    def clear(self) -> None:
+        """No response is due any more."""
+        self._onset = None
+
+    def wanted(self, response: str, row: Array) -> tuple[float, float]:
+        """Speed, m/s, and absolute heading, rad, that a response asks for.
+
+        Args:
+            response: one of `STRENGTH`, but "go_on".
+            row: (N_STATE,) the boat now.
+        """
+        if self._onset is None or self._response != response:
+            self._response, self._onset = response, row.copy()
+        onset = self._onset
+        heading, speed = math.radians(onset[L.HEADING]) % TWO_PI, max(0.0, float(onset[L.SPEED]))
+        if response in ("hold_course", "slow"):
+            return (speed if response == "hold_course" else 0.5 * speed), heading
+        if response == "hold_station":
+            return self._steer(row, float(onset[L.X]), float(onset[L.Y]), STATION_M, STATION_SHARE)
+        if response == "return":
+            x_m, y_m = (
+                min(max(float(value), low + inset), high - inset)
+                for value, low, high in zip(row[[L.X, L.Y]], self._box[:2], self._box[2:], strict=True)
+                for inset in [min(INSIDE_M, 0.5 * (high - low))]
+            )
+            return self._steer(row, x_m, y_m, 0.5, 1.0)
+        return _rest(row)
+
+    def _steer(self, row: Array, x_m: float, y_m: float, near_m: float, share: float) -> tuple[float, float]:
+        dx, dy = x_m - float(row[L.X]), y_m - float(row[L.Y])
+        if math.hypot(dx, dy) <= near_m:
+            return _rest(row)
+        return share * self._top_mps, math.atan2(dx, dy) % TWO_PI
+
+
+def _rest(row: Array) -> tuple[float, float]:
+    """No speed, on the heading the boat has by now.
+
+    Turned away from an edge or a boat it lets it be. Sent back to the heading it had it would have to be turned away
+    again, for which it takes thrust, and never come to rest.
+    """
+    return 0.0, math.radians(float(row[L.HEADING])) % TWO_PI
+
+
+def outside_of(box: tuple[float, float, float, float], x_m: float, y_m: float) -> float:
+    """How far outside a box a point is, m; negative: how far inside; NaN stays NaN."""
+    dx, dy = max(box[0] - x_m, x_m - box[2]), max(box[1] - y_m, y_m - box[3])
+    return math.hypot(dx, dy) if min(dx, dy) > 0.0 else max(dx, dy)
+
+
+def at_rest(readings: Mapping[str, BoatReading]) -> bool:
+    """Whether every own boat that obeys lies still."""
+    return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in readings.values())
+
+
+def nearing(fleet: FleetFile, tracker: Tracker, readings: Mapping[str, BoatReading]) -> list[str]:
+    """Boats that come within the separation radius of one of ours within ``end.clear_s``, a line each.
+
+    A boat in HOLD is defended by nobody. Both are run straight on, their errors added; one not heard of for too long is
+    not told. A boat of ours that does not obey, because a pilot steers it, may come near the others as any boat may.
+    """
+    tracks = {name: tracker.track(name) for name in fleet.names}
+    obeys = {name for name in tracker.commanded if name not in readings or readings[name].ready}
+    texts = []
+    for name in tracker.commanded:
+        for other in fleet.names:
+            if other == name or other in obeys:
+                continue
+            for track in (tracks[other], *tracker.ghosts(other)):
+                found = _approach(fleet, tracks[name], track)
+                if found is not None:
+                    texts.append(f"{other} comes within {found[0]:.1f} m of {name} in {found[1]:.0f} s")
+    return texts
+
+
+def _approach(fleet: FleetFile, own: Track | None, other: Track | None) -> tuple[float, float] | None:
+    """Least distance, m, and when, s, where two tracks come too near within the time."""
+    if own is None or other is None or other.age_s > fleet.limits.contact.lost_after_s:
+        return None
+    apart, closing = other.position_m() - own.position_m(), other.velocity_mps - own.velocity_mps
+    if float(np.hypot(*closing)) < REST_MPS:
+        return None
+    time_s = min(max(-float(apart @ closing) / float(closing @ closing), 0.0), fleet.end.clear_s)
+    near_m = float(np.hypot(*(apart + time_s * closing)))
+    return (near_m, time_s) if near_m <= fleet.shield_config.separation_m + own.error_m + other.error_m else None
+
+
+def words(age_s: float) -> str:
+    """An age as a person says it."""
+    if not math.isfinite(age_s):
+        return "never heard"
+    return f"{age_s:.1f} s old" if age_s < WHOLE_S else f"{age_s:.0f} s old"

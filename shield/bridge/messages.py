@@ -1,0 +1,425 @@
+"""What passes between the parts of a run on boats: readings, contacts, commands, ticks, and who gives and takes them.
+
+All times and ages are of one monotonic clock; positions m in the field's frame, headings rad clockwise from its y axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from ..commands import Commands
+from ..decision import Decisions
+from ..fleet import Fleet
+from ..jit import Array
+from ..surroundings import Surroundings
+
+NEVER_S = math.inf
+"""Age of what was never received."""
+
+TELEMETRY = "telemetry"
+"""Source of contacts that a boat's own link told; nobody else may call himself so."""
+
+PILOT, FAILSAFE = "pilot", "failsafe"
+"""Who may have taken a boat: a person, or the autopilot's own fail-safe."""
+
+
+@dataclass(frozen=True)
+class BoatReading:
+    """What one boat's own telemetry says, taken at one moment; each field with its own age. NaN: never received.
+
+    Attributes:
+        boat: its name.
+        read_s: time of this reading, s.
+        position_m: x, y.
+        position_age_s: since the position was true as far as the link can tell, s.
+        heading_rad: in [0, 2 pi).
+        heading_age_s: s.
+        speed_mps: along the heading, over ground; negative astern, m/s.
+        course_rad: of the velocity over ground; NaN below 0.1 m/s.
+        velocity_age_s: s.
+        turn_rate_rads: clockwise, rad/s.
+        turn_rate_age_s: s.
+        mode: name of the autopilot's mode.
+        ready: whether commands of heading and speed would be obeyed now (armed, in the right mode).
+        why_not: why not, in words; empty when ready.
+        released: whether somebody took the boat and nobody of ours took it back yet; in whatever mode it is now.
+        released_by: who took it: `PILOT`, `FAILSAFE` (the autopilot said so itself), or empty.
+        failsafe_over: whether the autopilot said that what made it fail safe is over.
+        heartbeat_age_s: s.
+        texts: what the autopilot said since the last reading.
+        faults: what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind.
+    """
+
+    boat: str
+    read_s: float
+    position_m: tuple[float, float] = (math.nan, math.nan)
+    position_age_s: float = NEVER_S
+    heading_rad: float = math.nan
+    heading_age_s: float = NEVER_S
+    speed_mps: float = math.nan
+    course_rad: float = math.nan
+    velocity_age_s: float = NEVER_S
+    turn_rate_rads: float = math.nan
+    turn_rate_age_s: float = NEVER_S
+    mode: str = ""
+    ready: bool = False
+    why_not: str = "nothing heard yet"
+    released: bool = False
+    released_by: str = ""
+    failsafe_over: bool = False
+    heartbeat_age_s: float = NEVER_S
+    texts: tuple[str, ...] = ()
+    faults: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def age_s(self) -> float:
+        """Age of the oldest of position, heading and velocity, s."""
+        return max(self.position_age_s, self.heading_age_s, self.velocity_age_s)
+
+    @property
+    def silent_s(self) -> float:
+        """Time since anything came from the boat, s: heartbeats alone are too rare to tell."""
+        ages = (self.position_age_s, self.heading_age_s, self.velocity_age_s, self.turn_rate_age_s)
+        return min(self.heartbeat_age_s, *ages)
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What left for the boat.
+
+    Attributes:
+        boat: its name.
+        sent_s: time, s.
+        heading_rad: as encoded.
+        speed_mps: as encoded and limited by the autopilot's own limit, m/s.
+        route: name of the message used, or why nothing was sent.
+        delivered: whether bytes left this machine.
+        limit_mps: speeds beyond it, either way, are cut by the link to what the autopilot would do; inf: none are.
+    """
+
+    boat: str
+    sent_s: float
+    heading_rad: float
+    speed_mps: float
+    route: str
+    delivered: bool
+    limit_mps: float = math.inf
+
+
+def never() -> bool:
+    """What is not called off."""
+    return False
+
+
+class Link(Protocol):
+    """One boat, whatever its link speaks. A context manager: leaving it leaves the boat stopped or holding, verified.
+
+    Attributes:
+        boat: its name.
+    """
+
+    boat: str
+
+    def connect(self, timeout_s: float) -> None:
+        """Open, hear the boat, get the streams needed.
+
+        Raises:
+            LinkError: no boat answers in time, or the address cannot be used.
+        """
+
+    def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
+        """Bring the boat to where it obeys: mode and arming, each step checked.
+
+        Also one that somebody took from us, which is left alone until then, whatever mode it comes back to. When that
+        fails it is left alone as before.
+
+        Args:
+            timeout_s: how long to try, s.
+            is_off: true once it is not to be done any more; it then ends at once.
+
+        Raises:
+            LinkRefused: the autopilot says no; its own words are in the text.
+            LinkError: no answer in time, or called off.
+        """
+
+    def read(self) -> BoatReading:
+        """The latest of everything; never waits."""
+
+    def send(self, heading_rad: float, speed_mps: float) -> Sent:
+        """Send a command as it is; never waits, raises only on values that are not finite.
+
+        Raises:
+            LinkError: heading or speed is not finite; nothing is sent.
+        """
+
+    def stop(self) -> Sent:
+        """Tell the boat to stop, by the surest way the link has; never waits, never raises."""
+
+    def close(self) -> str:
+        """Stop or hold the boat, verify by its telemetry, give the link back; may be called again.
+
+        Returns:
+            What the boat was left doing, in words.
+        """
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The latest fix of one boat seen from outside: an opponent, or a team-mate without a link of ours.
+
+    Attributes:
+        boat: its name.
+        position_m: x, y.
+        heading_rad: rad.
+        speed_mps: along the heading, m/s.
+        fixed_s: time the fix was true on the receiver's clock, s: receipt less the age the sender declared.
+        error_m: bound of the position's error, m.
+        source: who said so.
+    """
+
+    boat: str
+    position_m: tuple[float, float]
+    heading_rad: float
+    speed_mps: float
+    fixed_s: float
+    error_m: float
+    source: str
+
+
+class ContactSource(Protocol):
+    """Gives the latest contacts; `read` never waits and never raises."""
+
+    def read(self) -> Sequence[Contact]:
+        """The latest contact of each boat by each of its sources, whoever is right; who was heard first comes first."""
+
+    def close(self) -> None:
+        """Give its sockets back."""
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Something wrong with those who tell where boats are.
+
+    Attributes:
+        text: one line a person understands.
+        boat: whose place is in doubt; empty: it is about a source as a whole.
+        lost: whether nobody can know that place, so that it cannot be kept clear of.
+    """
+
+    text: str
+    boat: str = ""
+    lost: bool = False
+
+
+@runtime_checkable
+class Alarming(Protocol):
+    """A source that can say that it is not to be trusted as it was."""
+
+    def alarms(self) -> Sequence[Alarm]:
+        """What is wrong now; never waits."""
+
+
+def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
+    """A boat's own telemetry as a contact; None while something of it was never received."""
+    values = (*reading.position_m, reading.heading_rad, reading.speed_mps, reading.age_s)
+    if not np.isfinite(values).all():
+        return None
+    fixed_s = reading.read_s - reading.age_s
+    return Contact(
+        reading.boat, reading.position_m, reading.heading_rad, reading.speed_mps, fixed_s, error_m, TELEMETRY
+    )
+
+
+@dataclass(frozen=True)
+class BoatStatus:
+    """What the game says of one boat; names as in `steerclear.env`."""
+
+    tagged: bool
+    has_flag: bool
+    oob: bool
+    on_side: bool
+    cooldown_s: float
+    driven: bool
+
+
+@dataclass(frozen=True)
+class FlagStatus:
+    """One team's flag: where it is, m in the field, and whether an opponent carries it."""
+
+    x_m: float
+    y_m: float
+    taken: bool
+
+
+@dataclass(frozen=True)
+class GameState:
+    """How the game stands, as its referee sees it; pairs are blue, red.
+
+    Attributes:
+        time_s: since the game began, s.
+        boats: status of each boat by its name.
+        flags: the two flags.
+        captures, grabs, tags: counts of each team.
+        over: whether the game has ended.
+        note: what the referee has to say, such as whom it waits for.
+    """
+
+    time_s: float
+    boats: Mapping[str, BoatStatus]
+    flags: tuple[FlagStatus, FlagStatus]
+    captures: tuple[int, int] = (0, 0)
+    grabs: tuple[int, int] = (0, 0)
+    tags: tuple[int, int] = (0, 0)
+    over: bool = False
+    note: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as the feed and the black box have them."""
+        pairs = {name: list(getattr(self, name)) for name in ("captures", "grabs", "tags")}
+        return {
+            "time_s": self.time_s,
+            "boats": {name: dict(vars(status)) for name, status in self.boats.items()},
+            "flags": [dict(vars(flag)) for flag in self.flags],
+            **pairs,
+            "over": self.over,
+            "note": self.note,
+        }
+
+
+class GameSource(Protocol):
+    """Gives the latest state of the game; never waits."""
+
+    def game(self) -> GameState | None:
+        """None: none yet."""
+
+    def game_age_s(self) -> float:
+        """Its age, s; inf: none yet."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The game as the loop sees it at one tick: what a policy is shown.
+
+    Attributes:
+        number: of the tick.
+        taken_s: time of the tick, s.
+        seen: (n, 4) of all boats of the file in its order: x m, y m, heading deg clockwise from the y axis, speed m/s,
+            run on to ``taken_s``; NaN: never seen.
+        game: state of the game as the referee last sent it; empty: none yet.
+        game_age_s: its age, s; inf: none yet.
+    """
+
+    number: int
+    taken_s: float
+    seen: Array
+    game: Mapping[str, Any] = field(default_factory=dict)
+    game_age_s: float = NEVER_S
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The latest answer of a policy.
+
+    Attributes:
+        commands: absolute commands of all boats of the file in its order, NaN where it has none; None: none yet.
+        age_s: time since the tick whose snapshot it answers, s; inf: none yet.
+        fault: what is wrong with the policy now, for a person; empty: nothing.
+    """
+
+    commands: Commands | None = None
+    age_s: float = NEVER_S
+    fault: str = ""
+
+
+class WantedSource(Protocol):
+    """A policy somewhere else; no call ever waits or raises."""
+
+    def offer(self, snapshot: Snapshot) -> None:
+        """Show it the latest snapshot; older ones it has not looked at are dropped."""
+
+    def latest(self) -> Answer:
+        """Its latest answer."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """Something declared that took effect, for one boat or contact.
+
+    Attributes:
+        subject: name of the boat, contact, policy or link it is about.
+        condition: what happened, such as "telemetry", "contact", "policy", "link", "override", "stop_all".
+        response: what is done, such as "hold_course", "slow", "hold_station", "stop"; "none": it is only said.
+        text: one line a person understands.
+    """
+
+    subject: str
+    condition: str
+    response: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Tick:
+    """One turn of the loop: everything it took in, decided and sent; what the black box and the dashboard get.
+
+    Attributes:
+        number: 0, 1, ... since the start.
+        due_s, began_s, sent_s: when the turn was due, began and had sent its last command, s.
+        readings: of own boats, by name.
+        contacts: of others, as received.
+        fleet: what the shield was given; None when no fleet could be built (then all boats are told to stop).
+        wanted: what the shield was given; rows in the fleet's order.
+        surroundings: what the shield was given.
+        decisions: the shield's answer, or None.
+        shield_reset: whether `Shield.reset` was called before this decision.
+        sent: what left, by boat.
+        policy_age_s: age of the policy's answer, s; inf: none yet.
+        actions: what was declared and took effect.
+        game: state of the game as received, for the record.
+    """
+
+    number: int
+    due_s: float
+    began_s: float
+    sent_s: float
+    readings: Mapping[str, BoatReading]
+    contacts: tuple[Contact, ...]
+    fleet: Fleet | None
+    wanted: Commands | None
+    surroundings: Surroundings | None
+    decisions: Decisions | None
+    shield_reset: bool
+    sent: Mapping[str, Sent]
+    policy_age_s: float
+    actions: tuple[Action, ...] = ()
+    game: Mapping[str, Any] = field(default_factory=dict)
+
+
+class TickSink(Protocol):
+    """Gets every tick: the black box, the dashboard."""
+
+    def take(self, tick: Tick) -> None:
+        """Take one tick; never waits.
+
+        Raises:
+            BridgeError: ticks can no longer be kept (the disk is full, the writer died): the loop falls back as
+                declared.
+        """
+
+    def close(self) -> None:
+        """Finish what was begun."""
