@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from steerclear.env.record import Record
 from steerclear.shield.bridge.blackbox import ChainCheck, LogHeader, LogLine, LogReader
-from steerclear.shield.bridge.blackbox.origin import describe_machine, source_digest, table_digests, versions
+from steerclear.shield.bridge.blackbox.header import describe_machine, source_digest, table_digests, versions
 
 from ..measure.breaches import PairDistances
 from ..measure.judging import NOT_JUDGED, judge_game

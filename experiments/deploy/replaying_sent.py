@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from steerclear.shield.bridge.blackbox import LogHeader
-from steerclear.shield.bridge.mavlink.routes import CREEP_MPS, VelocityRoute
+from steerclear.shield.bridge.mavlink.commands import CREEP_MPS, VelocityRoute
 from steerclear.shield.bridge.messages import Sent, Tick
 
 ROUNDED_MPS, ROUNDED_RAD = 1e-5, 1e-5

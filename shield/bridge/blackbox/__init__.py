@@ -14,15 +14,11 @@ How to use it::
     mend(path, target)                                       # what is left of such a log, for viewers
 """
 
-from .chain_check import ChainCheck
-from .disk import Disk
-from .fleet_header import header_of_fleet
-from .header import LoggedBoat, LogHeader, platforms_of
-from .mcap_writer import McapWriter, log_path
-from .reader import LogLine, LogReader
-from .records import mend
-from .space import check_disk
-from .tlog import TlogWriter
+from .disk import Disk, TlogWriter, check_disk
+from .hash_chain import ChainCheck
+from .header import LoggedBoat, LogHeader, header_of_fleet, platforms_of
+from .reader import LogLine, LogReader, mend
+from .recorder import McapWriter, log_path
 
 __all__ = [
     "ChainCheck",

@@ -1,12 +1,37 @@
-"""A file that grows, written without buffers of anybody else's, and what its failures mean to a person."""
+"""A file that grows, written by a thread of its own so that a slow disk delays nobody; packets' log; is there room."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import logging
 import os
+import queue
+import shutil
+import struct
+import tempfile
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 from ...exceptions import BridgeError
+from ..preflight.result import CheckResult
+
+LOG = logging.getLogger(__name__)
+
+LATE_S, TALK_EVERY_S = 1.0, 30.0
+"""A disk that is so much behind is told, s, and again after the other."""
+BYTES_PER_BOAT_S = 6_000.0
+"""Generous size of the log per boat and second at 10 Hz: MCAP and tlog together."""
+SLOWEST_SYNC_S = 0.5
+"""A disk that takes longer than this to keep a second of log cannot hold it at most 1 s behind."""
+_CHUNK = 64 * 1024
+
+Item = TypeVar("Item")
+Taken = TypeVar("Taken", contravariant=True)
+
 
 _MEANINGS = {
     errno.ENOSPC: ("the disk is full", "free space on it or set log_dir to another disk"),
@@ -94,3 +119,246 @@ class Disk:
         if self._file is not None:
             os.close(self._file)
             self._file = None
+
+
+class Store(Protocol[Taken]):
+    """What the thread does with things; only ever called from that thread."""
+
+    def keep(self, item: Taken) -> None:
+        """Take one thing."""
+
+    def flush(self) -> None:
+        """Bring what was taken to the disk."""
+
+    def finish(self) -> None:
+        """Complete and close the file."""
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+
+
+class AsyncWriter(Generic[Item]):
+    """Hands things to a thread that writes them.
+
+    Args:
+        name: of the log, for messages.
+        store: writes them.
+        capacity: things that may wait; more are dropped and counted.
+        flush_s: longest time between flushes, s.
+        give_up_s: when the disk has taken nothing for so long, s, `put` says so.
+
+    Attributes:
+        dropped: things that found no place.
+        fault: why nothing is written any more; empty while all is well.
+    """
+
+    def __init__(
+        self, name: str, store: Store[Item], *, capacity: int = 300, flush_s: float = 0.5, give_up_s: float = 10.0
+    ) -> None:
+        self.name, self.dropped, self.fault = name, 0, ""
+        self._store, self._flush_s, self._give_up_s = store, flush_s, give_up_s
+        self._queue: queue.Queue[tuple[float, Item] | None] = queue.Queue(capacity)
+        self._oldest_s: float | None = None
+        self._told_s = -TALK_EVERY_S
+        self._closing = threading.Event()
+        self._progress_s = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name=f"log {name}", daemon=True)
+        self._thread.start()
+
+    def put(self, item: Item) -> None:
+        """Hand one thing over; never waits.
+
+        Raises:
+            BridgeError: nothing is written any more.
+        """
+        if self.fault or self._closing.is_set():
+            raise BridgeError(self.fault or f"the log {self.name} is closed; open another one")
+        try:
+            self._queue.put_nowait((time.monotonic(), item))
+        except queue.Full:
+            self._drop()
+        stuck_s = time.monotonic() - self._progress_s
+        if stuck_s > self._give_up_s and self._queue.qsize() > 1:
+            raise BridgeError(
+                f"the log {self.name}: the disk has taken nothing for {stuck_s:.0f} s; check it or set log_dir to "
+                "another disk"
+            )
+
+    def close(self, timeout_s: float = 10.0) -> None:
+        """Write what waits, complete the file; waits at most that long. What went wrong is in ``fault``."""
+        self._closing.set()
+        with contextlib.suppress(queue.Full):  # wakes the thread; a full queue keeps it awake anyway
+            self._queue.put_nowait(None)
+        self._thread.join(timeout_s)
+        if self._thread.is_alive() and not self.fault:
+            self.fault = f"the log {self.name} could not be completed within {timeout_s:g} s; its end may be missing"
+            LOG.error("%s", self.fault)
+
+    @property
+    def waiting(self) -> int:
+        """Things not yet taken by the thread."""
+        return self._queue.qsize()
+
+    @property
+    def behind_s(self) -> float:
+        """Age of the oldest thing that is not on the disk, s, as far as the thread has taken it; 0 when all is."""
+        oldest_s = self._oldest_s
+        return 0.0 if oldest_s is None else time.monotonic() - oldest_s
+
+    def _drop(self) -> None:
+        if self.dropped == 0:
+            LOG.warning("the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting)
+        self.dropped += 1
+
+    def _run(self) -> None:
+        try:
+            self._work()
+            self._store.finish()
+        except OSError as error:
+            self._fail(f"the log {self.name} cannot be written: {explain(error)}. What was written before can be read")
+        except BridgeError as error:
+            self._fail(f"{error}. What was written before can be read")
+        except Exception as error:  # whatever it is, the loop must learn that nothing is written any more
+            LOG.debug("writing %s", self.name, exc_info=True)
+            self._fail(f"the log {self.name} cannot be written ({type(error).__name__}: {error}); report this")
+
+    def _work(self) -> None:
+        due_s = time.monotonic() + self._flush_s
+        while not (self._closing.is_set() and self._queue.empty()):
+            taken = self._next(due_s - time.monotonic())
+            if taken is not None:
+                self._oldest_s = taken[0] if self._oldest_s is None else self._oldest_s
+                self._store.keep(taken[1])
+            self._progress_s = time.monotonic()
+            if self._progress_s >= due_s:
+                self._flush()
+                due_s = self._progress_s + self._flush_s
+
+    def _flush(self) -> None:
+        if self._oldest_s is not None:
+            self._store.flush()
+        self._progress_s, behind_s = time.monotonic(), self.behind_s
+        self._oldest_s = None
+        if behind_s > LATE_S and self._progress_s - self._told_s > TALK_EVERY_S:
+            self._told_s = self._progress_s
+            LOG.warning("the log %s was %.1f s behind: the disk is slow", self.name, behind_s)
+
+    def _next(self, wait_s: float) -> tuple[float, Item] | None:
+        try:
+            return self._queue.get(timeout=max(0.0, wait_s)) if wait_s > 0.0 else self._queue.get_nowait()
+        except queue.Empty:
+            return None
+
+    def _fail(self, fault: str) -> None:
+        self.fault = fault
+        LOG.error("%s", fault)
+        try:
+            self._store.abandon()
+        except OSError:
+            LOG.debug("closing %s", self.name, exc_info=True)
+        while self._next(0.0) is not None:
+            pass
+
+
+class _TlogFile:
+    """The file; used by the writer's thread only."""
+
+    def __init__(self, disk: Disk) -> None:
+        self._disk = disk
+
+    def keep(self, item: tuple[str, bytes, int]) -> None:
+        direction, frame, unix_us = item
+        link = 1 if direction == "out" else 0  # the two lowest bits of the time tell links apart
+        self._disk.write(struct.pack(">Q", (max(0, unix_us) & ~3) | link) + frame)
+
+    def flush(self) -> None:
+        self._disk.flush()
+        self._disk.sync()
+
+    def finish(self) -> None:
+        self.flush()
+        self._disk.close()
+
+    def abandon(self) -> None:
+        self._disk.close()
+
+
+class TlogWriter:
+    """Writes packets of one endpoint as `mavlogdump.py` and ground stations read them; hand `on_bytes` to it.
+
+    Args:
+        path: of the new file, ``.tlog``.
+        flush_s: longest time between flushes, s.
+        capacity: packets that may wait for the disk; more are dropped and counted.
+        open_disk: makes the file.
+
+    Raises:
+        BridgeError: the file cannot be made.
+    """
+
+    def __init__(
+        self, path: Path, *, flush_s: float = 0.5, capacity: int = 20_000, open_disk: Callable[[Path], Disk] = Disk
+    ) -> None:
+        self.path = path
+        self._spool: AsyncWriter[tuple[str, bytes, int]] = AsyncWriter(
+            path.name, self._file, capacity=capacity, flush_s=flush_s
+        )
+
+    def on_bytes(self, direction: str, raw: bytes, unix_us: int) -> None:
+        """Take a whole frame as it came or went; never waits, never raises.
+
+        Args:
+            direction: "in" or "out".
+            raw: the frame.
+            unix_us: time, microseconds since 1970.
+        """
+        try:
+            self._spool.put((direction, bytes(raw), unix_us))
+        except BridgeError:
+            return  # said once in the log by the spool; the black box is the one that makes the loop fall back
+
+    @property
+    def fault(self) -> str:
+        """Why nothing is written any more; empty while all is well."""
+        return self._spool.fault
+
+    @property
+    def dropped(self) -> int:
+        """Packets dropped because the disk was too slow."""
+        return self._spool.dropped
+
+    def close(self) -> None:
+        """Complete the file."""
+        self._spool.close()
+
+
+def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = "disk") -> CheckResult:
+    """Check that logs can be written, fast enough and for long enough.
+
+    Args:
+        folder: where logs go; made when missing.
+        boats: in the fleet.
+        minutes: how long must fit.
+        name: of the check.
+    """
+    needed = boats * minutes * 60.0 * BYTES_PER_BOAT_S
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:  # the time that the disk takes to keep a second's worth of log
+            started = time.monotonic()
+            file.write(os.urandom(_CHUNK))
+            file.flush()
+            os.fsync(file.fileno())
+            sync_s = time.monotonic() - started
+        free = float(shutil.disk_usage(folder).free)
+    except OSError as error:
+        return CheckResult(name, False, f"{folder}: {explain(error)}")
+    figures = {"free_mib": free / 2**20, "needed_mib": needed / 2**20, "sync_s": sync_s}
+    if free < needed:
+        text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min; free space"
+        return CheckResult(name, False, text, figures)
+    if sync_s > SLOWEST_SYNC_S:
+        text = f"{folder}: the disk takes {sync_s:.1f} s to keep 64 KiB; set log_dir to a faster one"
+        return CheckResult(name, False, text, figures)
+    text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min"
+    return CheckResult(name, True, text, figures)

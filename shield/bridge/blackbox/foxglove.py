@@ -1,106 +1,35 @@
-"""Messages of the published Foxglove schemas (https://docs.foxglove.dev, JSON encoding): places, drawings, log lines.
+"""What a log viewer draws of a tick, in messages of the published Foxglove schemas (JSON encoding).
 
 Only the parts of `foxglove.SceneUpdate` that are used are described; readers take the others as empty.
 """
 
 from __future__ import annotations
 
+import json
+import math
+from importlib.resources import files
 from typing import Any
 
-from .schemas import FLAG, NUMBER, TEXT, WHOLE, choice, many, named, record
+import numpy as np
+
+from ...decision import Decisions, Reason
+from ...fleet import LARGEST, Fleet
+from ...platforms import layout as L
+from ...surroundings import Surroundings
+from ..messages import Tick
+from .header import LogHeader
 
 FRAME = "field"
 """Name of the frame: x and y of the field, z up."""
-
 DEBUG, INFO, WARNING, ERROR = 1, 2, 3, 4
 """Levels of `foxglove.Log`."""
-
-_TIME = record("time", sec=WHOLE, nsec=WHOLE)
-_POINT = record("m", x=NUMBER, y=NUMBER, z=NUMBER)
-_TURN = record("quaternion", x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
-_POSE = record("place and direction", position=_POINT, orientation=_TURN)
-_COLOR = record("0 to 1", r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
 _LINE_LOOP = 1
 
-LOG = named(
-    "foxglove.Log",
-    record(
-        "A log message",
-        timestamp=_TIME,
-        level=choice(UNKNOWN=0, DEBUG=1, INFO=2, WARNING=3, ERROR=4, FATAL=5),
-        message=TEXT,
-        name=TEXT,
-        file=TEXT,
-        line=WHOLE,
-    ),
-)
-
-LOCATION_FIX = named(
-    "foxglove.LocationFix",
-    record(
-        "Where a boat is on earth",
-        timestamp=_TIME,
-        frame_id=TEXT,
-        latitude=NUMBER,
-        longitude=NUMBER,
-        altitude=NUMBER,
-        position_covariance=many(NUMBER),
-        position_covariance_type=choice(UNKNOWN=0, APPROXIMATED=1, DIAGONAL_KNOWN=2, KNOWN=3),
-    ),
-)
-
-_ARROW = record(
-    "arrow along +x of its pose",
-    pose=_POSE,
-    shaft_length=NUMBER,
-    shaft_diameter=NUMBER,
-    head_length=NUMBER,
-    head_diameter=NUMBER,
-    color=_COLOR,
-)
-_CYLINDER = record("disc", pose=_POSE, size=_POINT, bottom_scale=NUMBER, top_scale=NUMBER, color=_COLOR)
-_LINE = record(
-    "line",
-    type=choice(LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
-    pose=_POSE,
-    thickness=NUMBER,
-    scale_invariant=FLAG,
-    points=many(_POINT),
-    color=_COLOR,
-    colors=many(_COLOR),
-    indices=many(WHOLE),
-)
-_TEXT = record(
-    "label",
-    pose=_POSE,
-    billboard=FLAG,
-    font_size=NUMBER,
-    scale_invariant=FLAG,
-    color=_COLOR,
-    text=TEXT,
-)
-_ENTITY = record(
-    "what is drawn together",
-    timestamp=_TIME,
-    frame_id=TEXT,
-    id=TEXT,
-    lifetime=_TIME,
-    frame_locked=FLAG,
-    metadata=many(record("pair", key=TEXT, value=TEXT)),
-    arrows=many(_ARROW),
-    cylinders=many(_CYLINDER),
-    lines=many(_LINE),
-    texts=many(_TEXT),
-)
-_DELETION = record("what is removed", timestamp=_TIME, type=choice(MATCHING_ID=0, ALL=1), id=TEXT)
-
-SCENE_UPDATE = named(
-    "foxglove.SceneUpdate",
-    record("What is drawn in the 3D panel", deletions=many(_DELETION), entities=many(_ENTITY)),
-)
+SCHEMAS: dict[str, dict[str, Any]] = json.loads(files(__package__).joinpath("foxglove_schemas.json").read_text("utf-8"))
+"""https://docs.foxglove.dev, by name."""
+LOG, LOCATION_FIX, SCENE_UPDATE = (SCHEMAS[name] for name in ("LOG", "LOCATION_FIX", "SCENE_UPDATE"))
 
 Message = dict[str, Any]
-Color = tuple[float, float, float, float]
 
 
 def time_of(time_ns: int) -> Message:
@@ -205,3 +134,100 @@ def label(x_m: float, y_m: float, text: str, paint: Message) -> Message:
         "color": paint,
         "text": text,
     }
+
+
+_TEAMS = {0: color(0.1, 0.35, 0.9), 1: color(0.85, 0.15, 0.1)}
+_OTHER = color(0.4, 0.4, 0.4)
+_WANTED = color(0.6, 0.6, 0.6, 0.9)
+_SENT = color(0.1, 0.7, 0.2)
+_CHANGED = color(1.0, 0.55, 0.0)
+_FIXED = color(0.5, 0.5, 0.5)
+_ALPHA = 0.15
+_SCALE_S = 2.0
+"""Command arrows reach as far as the boat would get in so many seconds."""
+_LIFETIME_S = 1
+
+
+def scene_of(tick: Tick, time_ns: int, separation_m: float) -> Message | None:
+    """All boats of a tick; None when it has no fleet."""
+    if tick.fleet is None:
+        return None
+    boats = [i for i in range(len(tick.fleet)) if _placed(tick.fleet, i)]
+    return scene_update([_boat(tick.fleet, tick.decisions, i, time_ns, separation_m) for i in boats])
+
+
+def _boat(fleet: Fleet, decisions: Decisions | None, i: int, time_ns: int, separation_m: float) -> Message:
+    x_m, y_m, heading_deg = fleet.state[i, L.X], fleet.state[i, L.Y], fleet.state[i, L.HEADING]
+    x_m, y_m, heading_rad = float(x_m), float(y_m), math.radians(float(heading_deg))
+    paint = _TEAMS.get(int(fleet.team[i]), _OTHER)
+    arrows = [arrow(_pose(x_m, y_m, heading_rad, 0.0), 1.5, 0.4, paint)]
+    discs, text = [], fleet.names[i]
+    if decisions is not None and fleet.controlled[i]:
+        arrows += _commands(decisions, i, x_m, y_m)
+        discs = [disc(pose(x_m, y_m), separation_m, {**paint, "a": _ALPHA})]
+        text = f"{text} {Reason(int(decisions.reason[i])).name} {decisions.certificate_m[i]:.1f} m"
+    texts = [label(x_m, y_m, text, paint)]
+    return entity(time_ns, fleet.names[i], _LIFETIME_S, arrows=arrows, cylinders=discs, texts=texts)
+
+
+def _commands(decisions: Decisions, i: int, x_m: float, y_m: float) -> list[Message]:
+    """Arrows of the wanted and the sent command, as far as they can be drawn."""
+    own_rad = float(decisions.fleet.heading_rad[i])
+    changed = bool(decisions.intervened[i])
+    arrows = []
+    for commands, paint, width_m in (
+        (decisions.wanted, _WANTED, 0.25),
+        (decisions.sent, _CHANGED if changed else _SENT, 0.15),
+    ):
+        speed_mps, heading_rad = commands.absolute(i, own_rad)
+        if math.isfinite(speed_mps) and math.isfinite(heading_rad) and 0.05 < abs(speed_mps) < 100.0:
+            turn_rad = heading_rad if speed_mps > 0.0 else heading_rad + math.pi
+            arrows.append(arrow(_pose(x_m, y_m, turn_rad, 0.3), _SCALE_S * abs(speed_mps), width_m, paint))
+    return arrows
+
+
+def field_of(header: LogHeader, surroundings: Surroundings | None, time_ns: int) -> Message:
+    """The field, obstacles and circles to keep out of."""
+    fixed = header.surroundings if surroundings is None else surroundings
+    lines = [outline(list(polygon), _FIXED) for polygon in fixed.polygons]
+    if header.field_size_m is not None:
+        lines.append(outline(_corners(0.0, 0.0, *header.field_size_m), _OTHER))
+    if fixed.field is not None:
+        lines.append(outline(_corners(*fixed.field), _CHANGED))
+    discs = [
+        disc(pose(x_m, y_m), max(radius_m, 0.01), {**_FIXED, "a": 0.3})
+        for x_m, y_m, radius_m in (*fixed.circles, *fixed.keep_out, *fixed.stops)
+    ]
+    return scene_update([entity(time_ns, "field", lines=lines, cylinders=discs)])
+
+
+def fixes_of(tick: Tick, header: LogHeader, time_ns: int) -> dict[str, Message]:
+    """Latitude and longitude of each boat, by name; none when the field is nowhere on earth."""
+    if header.frame is None or tick.fleet is None:
+        return {}
+    fleet, found = tick.fleet, {}
+    error = fleet.position_error_m
+    for i, name in enumerate(fleet.names):
+        if not _placed(fleet, i):
+            continue
+        latitude_deg, longitude_deg = header.frame.to_geodetic_deg(
+            float(fleet.state[i, L.X]), float(fleet.state[i, L.Y])
+        )
+        error_m = header.config.position_error_m if error is None else float(error[i])
+        found[name] = location_fix(time_ns, latitude_deg, longitude_deg, error_m)
+    return found
+
+
+def _placed(fleet: Fleet, i: int) -> bool:
+    """Whether a boat can be drawn; what a broken source says may be anything."""
+    return bool((np.abs(fleet.state[i, : L.SPEED + 1]) <= LARGEST).all())
+
+
+def _pose(x_m: float, y_m: float, heading_rad: float, z_m: float) -> Message:
+    """A place with a direction: arrows point along x, headings count clockwise from y."""
+    half = 0.5 * (0.5 * math.pi - heading_rad)
+    return pose(x_m, y_m, z_m, (math.sin(half), math.cos(half)))
+
+
+def _corners(xmin_m: float, ymin_m: float, xmax_m: float, ymax_m: float) -> list[tuple[float, float]]:
+    return [(xmin_m, ymin_m), (xmax_m, ymin_m), (xmax_m, ymax_m), (xmin_m, ymax_m)]

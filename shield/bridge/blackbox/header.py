@@ -2,26 +2,83 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import platform as machine
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from ...config import ShieldConfig
-from ...exceptions import ConfigError, LogError, SteerclearError
-from ...platforms import Gains, Platform, get_platform
+from ...exceptions import LogError, SteerclearError
+from ...platforms import Platform, get_platform
 from ...surroundings import OPEN_WATER, Surroundings
+from ...tables.files import find_table
+from ...tables.settings import OtherMay
+from ..fleet_file import FleetFile
 from ..frame import FieldFrame
-from .chain import ChainHead
-from .numbers import plain, restored
-from .origin import describe_machine, source_digest, table_digests, versions
+from .format import plain, platform_from, restored
+from .hash_chain import ChainHead
 
 LOG_VERSION = 2
+"""Logs of version 1 (0.6 and before) are read by the program that wrote them."""
 LATEST_S = 1e12
 """No clock of a loop tells a later time, s."""
-READ_VERSIONS = (1, 2)
-"""Logs of version 1 have no chain, and texts where numbers are not finite."""
+PACKAGES = ("steerclear", "numpy", "numba", "llvmlite", "qpsolvers", "daqp", "osqp", "quadprog", "pymavlink", "mcap")
+"""Distributions whose versions a log notes."""
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of Python and of `PACKAGES` as far as they are installed."""
+    found = {"python": machine.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the shield's sources, the same wherever they are installed."""
+    folder = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def table_digests(platforms: Iterable[str]) -> dict[str, str]:
+    """Digests of the value table files there are for pairs of platforms, which the shield may look opponents up in.
+
+    Args:
+        platforms: names.
+    """
+    found, names = {}, sorted(platforms)
+    for own in names:
+        for other in names:
+            path = find_table(own, other, OtherMay.WORST_CASE)
+            if path is not None:
+                found[f"{own} with {other}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+@cache
+def describe_machine() -> str:
+    """Architecture, system, C library and processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = names[0] if names else machine.processor()
+    return f"{machine.machine()} {machine.system()} {' '.join(machine.libc_ver())} {processor}".strip()
 
 
 @dataclass(frozen=True)
@@ -65,7 +122,7 @@ class LogHeader:
         tables: digests of the value tables for pairs of those platforms; None: those there are now.
         machine: processor architecture, system and C library, which sines and cosines come from.
         version: of the log's format.
-        chain: where the file's chain begins; None in logs of version 1.
+        chain: where the file's chain begins.
     """
 
     config: ShieldConfig
@@ -85,7 +142,7 @@ class LogHeader:
     tables: Mapping[str, str] | None = None
     machine: str = field(default_factory=describe_machine)
     version: int = LOG_VERSION
-    chain: ChainHead | None = field(default_factory=ChainHead.new)
+    chain: ChainHead = field(default_factory=ChainHead.new)
 
     def __post_init__(self) -> None:
         if self.tables is None:
@@ -117,7 +174,7 @@ class LogHeader:
             "notes": dict(self.notes),
             "versions": dict(self.versions),
             "tables": dict(self.tables or {}),
-            "chain": None if self.chain is None else asdict(self.chain),
+            "chain": asdict(self.chain),
         }
         return shown | {name: json.dumps(plain(value), allow_nan=False) for name, value in hidden.items()}
 
@@ -129,10 +186,10 @@ class LogHeader:
             LogError: the message is of another version, or a part is missing or makes no sense.
         """
         found = message.get("version")
-        if found not in READ_VERSIONS or isinstance(found, bool):
+        if found != LOG_VERSION or isinstance(found, bool):
             raise LogError(
-                f"the log is of version {found}, this program reads versions {', '.join(map(str, READ_VERSIONS))}; use "
-                "the one that wrote it"
+                f"the log is of version {found}, this program reads version {LOG_VERSION}; use the one that wrote it, "
+                f"steerclear {_writer(message)}"
             )
         try:
             return cls(**_parts(message))
@@ -175,7 +232,7 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
     size = json.loads(message["field_size_m"])
     frame = json.loads(message["frame"])
     return {
-        "config": ShieldConfig.of(**_settings(restored(json.loads(message["shield"])))),
+        "config": ShieldConfig.of(**restored(json.loads(message["shield"]))),
         "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
         "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
         "boats": tuple(_boat(row) for row in json.loads(message["boats"])),
@@ -192,50 +249,8 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
         "sources": str(message["sources"]),
         "machine": str(message["machine"]),
         "version": message["version"],
-        "chain": ChainHead.from_text(str(message["chain"])) if message["version"] > 1 else None,
+        "chain": ChainHead.from_text(str(message["chain"])),
     }
-
-
-def _settings(told: dict[str, Any]) -> dict[str, Any]:
-    """Settings of the shield of a log, as this version calls them.
-
-    In those that do not know `mate_cap_m` team-mates' margins had the one cap; in those that do not know `adversary_s`
-    opponents did their worst for ever, or held their course.
-
-    Raises:
-        ConfigError: the log's shield granted opponents a part of their turn, or a time, that no setting stands for.
-    """
-    settings = {"mate_cap_m": told.get("margin_cap_m", ShieldConfig.margin_cap_m), **told}
-    share, hunt_s = settings.pop("opponent_share", 1.0), settings.pop("hunt_s", None)
-    if share not in (0.0, 1.0) or hunt_s is not None:
-        raise ConfigError(f"opponent_share {share} and hunt_s {hunt_s} are no settings of this version any more")
-    settings.pop("hysteresis_m", None)  # a margin that no encounter showed; such logs are decided otherwise anyhow
-    if "adversary_s" not in settings:
-        settings["profile"] = "rammers" if share == 1.0 else "hold-course"
-    return settings
-
-
-def platform_to_text(kind: Platform) -> str:
-    """A platform's parameters as JSON."""
-    return json.dumps(plain(asdict(kind)), allow_nan=False)
-
-
-def platform_from(row: Mapping[str, Any]) -> Platform:
-    """The platform with such parameters.
-
-    Raises:
-        LogError: they are not a platform's.
-        PlatformError: a value makes no sense.
-    """
-    values = restored(dict(row))
-    try:
-        values["speed_pid"], values["heading_pid"] = Gains(**values["speed_pid"]), Gains(**values["heading_pid"])
-        values["thrust_map"] = tuple((float(thrust), float(speed)) for thrust, speed in values["thrust_map"])
-        return Platform(**values)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, SteerclearError):
-            raise
-        raise LogError(f"the log holds a platform that does not fit this version ({error})") from None
 
 
 def platforms_of(kinds: Iterable[str | Platform]) -> dict[str, Platform]:
@@ -245,3 +260,47 @@ def platforms_of(kinds: Iterable[str | Platform]) -> dict[str, Platform]:
         PlatformError: one is unknown.
     """
     return {kind.name: kind for kind in map(get_platform, kinds)}
+
+
+def header_of_fleet(
+    fleet: FleetFile,
+    text: str,
+    *,
+    policy: str,
+    commanded: Collection[str],
+    clock_s: float,
+    notes: Mapping[str, str] | None = None,
+) -> LogHeader:
+    """What a log of a fleet must begin with.
+
+    Args:
+        fleet: the file.
+        text: its text, word for word.
+        policy: name of the policy.
+        commanded: names of the boats this process commands.
+        clock_s: time on the loop's clock now, s.
+        notes: anything else worth keeping.
+    """
+    boats = tuple(
+        LoggedBoat(
+            name=boat.name,
+            agent=boat.agent or "",
+            team=fleet.team_of[boat.name],
+            platform=fleet.platform_of[boat.name].name,
+            ours=boat.name in commanded,
+        )
+        for boat in fleet.boats
+    )
+    return LogHeader(
+        config=fleet.shield_config,
+        surroundings=fleet.surroundings,
+        platforms={kind.name: kind for kind in fleet.platform_of.values()},
+        boats=boats,
+        frame=fleet.frame,
+        field_size_m=fleet.field.size_m,
+        fleet_text=text,
+        preset=fleet.preset,
+        policy=policy,
+        notes={} if notes is None else notes,
+        clock_s=clock_s,
+    )

@@ -5,26 +5,39 @@ from __future__ import annotations
 import errno
 import json
 import logging
-from collections.abc import Iterator, Mapping
+import re
+import struct
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
 
-from mcap.records import Channel, Footer, Message
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.writer import Writer
+from zstandard import ZstdError
 
 from ...compat import Self
 from ...exceptions import LogError
 from ..messages import Tick
-from .chain_check import ChainCheck
-from .decode import tick_from_json
+from .disk import Disk
+from .format import tick_from_json
+from .hash_chain import ChainCheck
 from .header import LogHeader
-from .mcap_file import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
-from .origin import source_digest
-from .parts import follows, later_parts, number_of
-from .records import MENDED_TOPIC, read_records
+from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, MENDED_TOPIC, TICK_TOPIC
+from .records import MENDED
 
 LOG = logging.getLogger(__name__)
+
+LARGEST_RECORD = 64 << 20
+"""Longer records than this are damage, bytes."""
+_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
+_PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
+PARTS = "is in parts, as 0.8.0 wrote runs of more than 20 minutes; replay it with steerclear 0.8.0"
+
+Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -45,10 +58,10 @@ class LogLine:
 
 
 class LogReader:
-    """Reads a log once, from its beginning, and on through the later files of a long one. A context manager.
+    """Reads a log once, from its beginning. A context manager.
 
     Args:
-        path: of the log, ``.mcap``, or of a later part, to begin there.
+        path: of the log, ``.mcap``.
         key: 32 bytes, to check the codes of a log whose chain carries them; None: they are not looked at.
 
     Raises:
@@ -56,24 +69,26 @@ class LogReader:
 
     Attributes:
         header: what the shield was built with.
-        files: those read so far.
+        files: those read: the one.
         complete: whether the log was closed, if only by `mend`; known once `entries` is used up.
         damage: what could not be read, in words; likewise.
         chain: what the log's chain says; likewise.
     """
 
     def __init__(self, path: Path, key: bytes | None = None) -> None:
-        self.path, self.complete = path, False
+        self.path, self.files, self.complete = path, [path], False
         self.damage: list[str] = []
         self.chain = ChainCheck(key)
-        self.files = [path]
-        self._topics: dict[int, str] = {}
         try:
-            self._file: IO[bytes] = _open(path)
+            if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe would be waited for
+                raise OSError(errno.EINVAL, "it is no plain file")
+            self._file: IO[bytes] = path.open("rb")
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise LogError(f"cannot open {path} ({why}); give a log that deploy wrote (.mcap)") from None
         try:
+            if _PART.fullmatch(path.name) or path.with_name(f"{path.stem}.part2{path.suffix}").exists():
+                raise LogError(f"{path} {PARTS}")
             self._messages = self._read()
             self.header = self._find_header()
         except BaseException:
@@ -88,12 +103,15 @@ class LogReader:
         """
         for topic, message in self._messages:
             if topic == TICK_TOPIC:
-                content = _object(message)
-                if "odd" in content and self.header.chain is None:
-                    self.chain.deny()  # only logs with a chain have it
-                yield tick_from_json(content, self.header.platforms)
+                yield tick_from_json(_object(message), self.header.platforms)
             elif topic == LOG_TOPIC:
-                yield _line(message)
+                row = _object(message)
+                try:
+                    line = LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
+                except (KeyError, TypeError, ValueError, OverflowError):
+                    text = "the log holds a line that is none; it is damaged or of another version"
+                    raise LogError(text) from None
+                yield line
 
     def ticks(self) -> Iterator[Tick]:
         """Ticks, in order.
@@ -123,96 +141,34 @@ class LogReader:
         raise LogError(f"{self.path} holds no header of a steerclear log{why}; give a log that deploy wrote (.mcap)")
 
     def _read(self) -> Iterator[tuple[str, Message]]:
-        """Messages with their topics, file after file; ends where the log can no longer be read."""
-        yield from self._read_file()
-        yield from self._read_later()
-        self.chain.finish()
-
-    def _read_later(self) -> Iterator[tuple[str, Message]]:
-        are_whole = True
-        for number, path in later_parts(self.path):
-            if not self.complete:
-                are_whole = False
-                self._tell(f"{self.files[-1].name} was cut off")
-            self.complete = False
-            try:
-                later = _open(path)
-            except OSError as error:
-                self._tell(f"part {number}, {path.name}, cannot be read ({error.strerror}); what follows is left out")
-                return
-            self._file.close()
-            self._file, self._topics = later, {}
-            messages = self._read_file()
-            if not any(topic == HEADER_TOPIC and self._belongs(message) for topic, message in messages):
-                self._tell(f"{path.name} is of another log, or cut off before its header; it is left out")
-                self.complete = False
-                return
-            self.files.append(path)
-            yield from messages
-        self.complete &= are_whole
-
-    def _belongs(self, message: Message) -> bool:
-        return follows(self.header, LogHeader.from_message(_object(message)))
-
-    def _read_file(self) -> Iterator[tuple[str, Message]]:
+        """Records with their topics, added to the chain, whose links are checked; to where the log can be read."""
+        topics: dict[int, str] = {}
         has_begun = False
         for item in read_records(self._file, self._tell):
             self.complete = isinstance(item, Footer)
             if isinstance(item, Channel):
-                self._topics[item.id] = item.topic
-            elif isinstance(item, Message):
-                topic = self._topics.get(item.channel_id, "")
-                if topic == HEADER_TOPIC and not has_begun:
-                    has_begun = True
-                    self._begin_chain(item)
-                if self._is_record(topic, item):
-                    yield topic, item
+                topics[item.id] = item.topic
+            if not isinstance(item, Message):
+                continue
+            topic = topics.get(item.channel_id, "")
+            if topic == HEADER_TOPIC and not has_begun:
+                has_begun = True
+                self.chain.begin(LogHeader.from_message(_object(item)).chain)
+            if topic == LINK_TOPIC:
+                try:
+                    self.chain.link(_object(item))
+                except LogError:
+                    self.chain.link({})
+            elif topic == MENDED_TOPIC:
+                self.chain.mend()
+            else:
+                self.chain.add(topic, (item.log_time, item.publish_time, item.sequence), item.data)
+                yield topic, item
         self.chain.close(self.complete)
-
-    def _begin_chain(self, message: Message) -> None:
-        """Follow the chain of the file whose header was met."""
-        is_first = len(self.files) == 1 and number_of(self.path)[1] == 1
-        header = LogHeader.from_message(_object(message))
-        self.chain.begin(header.chain, is_first)
-        if header.chain is None and header.sources == source_digest():
-            self.chain.deny()
-
-    def _is_record(self, topic: str, message: Message) -> bool:
-        """Whether a message is one of the log's records; all are added to the chain, links are checked."""
-        if topic == LINK_TOPIC:
-            try:
-                self.chain.link(_object(message))
-            except LogError:
-                self.chain.link({})
-        elif topic == MENDED_TOPIC:
-            self.chain.mend()
-        else:
-            self.chain.add(topic, (message.log_time, message.publish_time, message.sequence), message.data)
-            return True
-        return False
 
     def _tell(self, text: str) -> None:
         LOG.info("%s: %s", self.path, text)
         self.damage.append(text)
-
-
-def _open(path: Path) -> IO[bytes]:
-    """The file; a pipe would be waited for, a device read for ever.
-
-    Raises:
-        OSError: it cannot be read, or is no plain file.
-    """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.EINVAL, "it is no plain file")
-    return path.open("rb")
-
-
-def _line(message: Message) -> LogLine:
-    row = _object(message)
-    try:
-        return LogLine(message.log_time, int(row["level"]), str(row["name"]), str(row["message"]))
-    except (KeyError, TypeError, ValueError, OverflowError):
-        raise LogError("the log holds a line that is none; it is damaged or of another version") from None
 
 
 def _object(message: Message) -> Mapping[str, Any]:
@@ -223,3 +179,79 @@ def _object(message: Message) -> Mapping[str, Any]:
     if not isinstance(found, dict):
         raise LogError("the log holds a message that is not an object; it is damaged or of another version")
     return found
+
+
+def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
+    """Schemas, channels, messages and, when the file was closed properly, its footer; chunks taken apart.
+
+    Args:
+        file: at its beginning.
+        tell: gets a text about each part that cannot be read; nothing is raised for them.
+    """
+    try:
+        for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
+            if isinstance(item, Chunk):
+                try:
+                    parts: list[Any] = list(breakup_chunk(item, validate_crc=True))
+                except _DAMAGE as error:
+                    tell(f"{item.uncompressed_size} bytes are damaged and left out ({type(error).__name__})")
+                    continue
+                yield from parts
+            elif isinstance(item, (Schema, Channel, Message, Footer)):
+                yield item
+        if file.read(1):
+            tell("after its end more bytes follow, which were not read")
+    except EndOfFile:
+        return  # cut off: the footer that was not there tells
+    except _DAMAGE as error:
+        tell(f"from some point on it makes no sense ({type(error).__name__})")
+
+
+def mend(source: Path, target: Path) -> tuple[int, list[str]]:
+    """Write what can be read of a log as a whole file with an index, which viewers open that refuse a cut-off one.
+
+    Args:
+        source: the log.
+        target: new file.
+
+    Returns:
+        Messages written, and what could not be read.
+
+    Raises:
+        LogError: the log cannot be opened or holds nothing, or the file cannot be written.
+        BridgeError: the file cannot be made.
+    """
+    damage: list[str] = []
+    try:
+        with source.open("rb") as file:
+            return _copy(read_records(file, damage.append), target, damage), damage
+    except OSError as error:
+        raise LogError(f"cannot mend {source} ({error.strerror}); check both paths and the room on the disk") from None
+
+
+def _copy(records: Iterator[Any], target: Path, damage: list[str]) -> int:
+    disk = Disk(target)
+    writer = Writer(disk)  # type: ignore[arg-type]
+    writer.start(library="steerclear")
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    count, last_ns, is_whole = 0, 0, False
+    for item in records:
+        if isinstance(item, Schema) and item.id not in schemas:
+            schemas[item.id] = writer.register_schema(item.name, item.encoding, item.data)
+        elif isinstance(item, Channel) and item.id not in channels and item.schema_id in schemas:
+            channels[item.id] = writer.register_channel(item.topic, item.message_encoding, schemas[item.schema_id])
+        elif isinstance(item, Message) and item.channel_id in channels:
+            count, last_ns = count + 1, item.log_time
+            writer.add_message(channels[item.channel_id], item.log_time, item.data, item.publish_time, item.sequence)
+            disk.flush()
+        is_whole = isinstance(item, Footer)
+    if not is_whole:  # say in the file that it was cut off: it is closed, and yet not whole
+        schema = writer.register_schema(MENDED["title"], "jsonschema", json.dumps(MENDED).encode())
+        channel = writer.register_channel(MENDED_TOPIC, "json", schema)
+        writer.add_message(channel, last_ns, json.dumps({"damage": damage}).encode(), last_ns, 1)
+        count += 1
+    writer.finish()
+    disk.flush()
+    disk.close()
+    return count

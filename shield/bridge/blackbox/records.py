@@ -1,111 +1,230 @@
-"""Records of an MCAP file as far as they can be read, whole or cut off, sound or damaged."""
+"""The records of a log as typed structs, and the JSON Schemas that the log carries for them."""
 
 from __future__ import annotations
 
-import json
-import struct
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import IO, Any
+import math
+from typing import Any, get_args, get_origin, get_type_hints
 
-from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Chunk, Footer, Message, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from mcap.writer import Writer
-from zstandard import ZstdError
+import msgspec
+from msgspec import UNSET, UnsetType
 
-from ...exceptions import LogError
-from .disk import Disk
-from .schemas import MENDED
+Number = float | UnsetType
+Numbers = list[float]
+Schema = dict[str, Any]
 
-MENDED_TOPIC = "/mended"
-LARGEST_RECORD = 64 << 20
-"""Longer records than this are damage, bytes."""
-
-_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
-
-Tell = Callable[[str], None]
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
-    """Schemas, channels, messages and, when the file was closed properly, its footer; chunks taken apart.
+class Record(msgspec.Struct, kw_only=True):
+    """An object of the log; its docstring describes it in the schema."""
 
-    Args:
-        file: at its beginning.
-        tell: gets a text about each part that cannot be read; nothing is raised for them.
+
+class CircleRecord(Record):
+    """A circle, m."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+
+
+class CornersRecord(Record):
+    """Corners of a polygon, m."""
+
+    x_m: Numbers
+    y_m: Numbers
+
+
+class SurroundingsRecord(Record):
+    """Static constraints given with this decision; field: xmin, ymin, xmax, ymax, m."""
+
+    field: Numbers
+    circles: list[CircleRecord]
+    keep_out: list[CircleRecord]
+    polygons: list[CornersRecord]
+    stops: list[CircleRecord] = []
+
+
+class BoatRecord(Record):
+    """One boat as the shield saw it, what was wanted of it and what was decided.
+
+    state: x m, y m, heading deg, speed m/s, thrust %, rudder %, speed error m/s and integral, heading error deg and
+    integral, turn rate deg/s. wanted, sent: speed m/s; heading rad from the y axis, or deg from the boat's own where
+    wanted_relative.
     """
-    try:
-        for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
-            if isinstance(item, Chunk):
-                yield from _parts(item, tell)
-            elif isinstance(item, (Schema, Channel, Message, Footer)):
-                yield item
-        if file.read(1):
-            tell("after its end more bytes follow, which were not read")
-    except EndOfFile:
-        return  # cut off: the footer that was not there tells
-    except _DAMAGE as error:
-        tell(f"from some point on it makes no sense ({type(error).__name__})")
+
+    name: str
+    platform: str
+    team: int
+    controlled: bool
+    state: Numbers
+    age_s: Number = UNSET
+    position_error_m: Number = UNSET
+    wanted: Numbers | UnsetType = UNSET
+    sent: Numbers | UnsetType = UNSET
+    intervened: bool | UnsetType = UNSET
+    reason: int | UnsetType = UNSET
+    why: str | UnsetType = UNSET
+    certificate_m: Number = UNSET
+    slack_m: Number = UNSET
+    bound: int | UnsetType = UNSET
+    cut_short: bool | UnsetType = UNSET
 
 
-def _parts(chunk: Chunk, tell: Tell) -> list[Any]:
-    try:
-        return list(breakup_chunk(chunk, validate_crc=True))
-    except _DAMAGE as error:
-        tell(f"{chunk.uncompressed_size} bytes are damaged and left out ({type(error).__name__})")
-        return []
+class FaultRecord(Record):
+    """Refused since the last reading."""
+
+    kind: str
+    count: int
 
 
-def mend(source: Path, target: Path) -> tuple[int, list[str]]:
-    """Write what can be read of a log as a whole file with an index, which viewers open that refuse a cut-off one.
+class ReadingRecord(Record):
+    """What a boat's own telemetry said; see `messages.BoatReading`."""
 
-    Args:
-        source: the log.
-        target: new file.
-
-    Returns:
-        Messages written, and what could not be read.
-
-    Raises:
-        LogError: the log cannot be opened or holds nothing, or the file cannot be written.
-        BridgeError: the file cannot be made.
-    """
-    damage: list[str] = []
-    try:
-        with source.open("rb") as file:
-            return _copy(read_records(file, damage.append), target, damage), damage
-    except OSError as error:
-        raise LogError(f"cannot mend {source} ({error.strerror}); check both paths and the room on the disk") from None
-
-
-def _copy(records: Iterator[Any], target: Path, damage: list[str]) -> int:
-    disk = Disk(target)
-    writer = Writer(disk)  # type: ignore[arg-type]
-    writer.start(library="steerclear")
-    schemas: dict[int, int] = {}
-    channels: dict[int, int] = {}
-    count, last_ns, is_whole = 0, 0, False
-    for item in records:
-        if isinstance(item, Schema) and item.id not in schemas:
-            schemas[item.id] = writer.register_schema(item.name, item.encoding, item.data)
-        elif isinstance(item, Channel) and item.id not in channels and item.schema_id in schemas:
-            channels[item.id] = writer.register_channel(item.topic, item.message_encoding, schemas[item.schema_id])
-        elif isinstance(item, Message) and item.channel_id in channels:
-            count, last_ns = count + 1, item.log_time
-            writer.add_message(channels[item.channel_id], item.log_time, item.data, item.publish_time, item.sequence)
-            disk.flush()
-        is_whole = isinstance(item, Footer)
-    if not is_whole:
-        count += 1
-        _mark(writer, last_ns, damage)
-    writer.finish()
-    disk.flush()
-    disk.close()
-    return count
+    boat: str
+    read_s: float
+    position_m: Numbers
+    position_age_s: float
+    heading_rad: float
+    heading_age_s: float
+    speed_mps: float
+    course_rad: float
+    velocity_age_s: float
+    turn_rate_rads: float
+    turn_rate_age_s: float
+    mode: str
+    ready: bool
+    why_not: str
+    heartbeat_age_s: float
+    texts: list[str]
+    faults: list[FaultRecord]
+    released: bool = False
+    released_by: str = ""
+    failsafe_over: bool = False
 
 
-def _mark(writer: Writer, time_ns: int, damage: list[str]) -> None:
-    """Say in the file that it was cut off: it is closed, and yet not whole."""
-    schema = writer.register_schema(MENDED["title"], "jsonschema", json.dumps(MENDED).encode())
-    channel = writer.register_channel(MENDED_TOPIC, "json", schema)
-    writer.add_message(channel, time_ns, json.dumps({"damage": damage}).encode(), time_ns, 1)
+class ContactRecord(Record):
+    """A boat seen from outside."""
+
+    boat: str
+    position_m: Numbers
+    heading_rad: float
+    speed_mps: float
+    fixed_s: float
+    error_m: float
+    source: str
+
+
+class SentRecord(Record):
+    """What left for a boat."""
+
+    boat: str
+    sent_s: float
+    heading_rad: float
+    speed_mps: float
+    route: str
+    delivered: bool
+    limit_mps: float = math.inf
+
+
+class ActionRecord(Record):
+    """Declared and in effect."""
+
+    subject: str
+    condition: str
+    response: str
+    text: str
+
+
+class OddRecord(Record):
+    """A number that is not finite: its place, and nan, inf, -inf or nan:BITS."""
+
+    at: str
+    value: str
+
+
+class TickRecord(Record):
+    """One turn of the loop. A number that is not finite is left out, 0 in a list, and listed in odd."""
+
+    number: int
+    due_s: float
+    began_s: float
+    sent_s: float
+    policy_age_s: float
+    shield_reset: bool
+    has_fleet: bool
+    has_wanted: bool
+    has_decisions: bool
+    wanted_relative: bool
+    sent_relative: bool
+    solve_time_s: float
+    boats: list[BoatRecord]
+    surroundings: list[SurroundingsRecord]
+    readings: list[ReadingRecord]
+    contacts: list[ContactRecord]
+    sent: list[SentRecord]
+    actions: list[ActionRecord]
+    game: str
+    odd: list[OddRecord] = []
+
+
+class LinkRecord(Record):
+    """A link of the log's chain: the digest of the records since the last link, and of that."""
+
+    count: int
+    digest: str
+    end: str
+    code: str
+
+
+class MendedRecord(Record):
+    """The file was written from one that was cut off."""
+
+    damage: list[str]
+
+
+class HeaderRecord(Record):
+    """What the shield was built with; the first message. Texts that begin with a bracket are JSON."""
+
+    version: int
+    fleet_yaml: str
+    preset: str
+    policy: str
+    clock_s: float
+    unix_ns: str
+    sources: str
+    machine: str
+    shield: str
+    surroundings: str
+    platforms: str
+    boats: str
+    frame: str
+    field_size_m: str
+    notes: str
+    versions: str
+    tables: str
+    chain: str
+
+
+def schema_of(kind: type[Record], title: str = "") -> Schema:
+    """JSON Schema of a record, in the forms that log viewers understand: plain values, lists, objects."""
+    plain = {float: "number", int: "integer", str: "string", bool: "boolean"}
+
+    def of(hint: Any) -> Schema:
+        if get_origin(hint) is list:
+            return {"type": "array", "items": of(get_args(hint)[0])}
+        if isinstance(hint, type) and issubclass(hint, Record):
+            return schema_of(hint)
+        if hint in plain:
+            return {"type": plain[hint]}
+        return of(next(entry for entry in get_args(hint) if entry is not UnsetType))
+
+    properties = {name: of(hint) for name, hint in get_type_hints(kind).items()}
+    description = " ".join((kind.__doc__ or "").split())
+    head = {"$schema": DIALECT, "title": title} if title else {}
+    return {**head, "type": "object", "description": description, "properties": properties}
+
+
+HEADER, TICK, LINK, MENDED = (
+    schema_of(kind, f"steerclear.{kind.__name__.removesuffix('Record')}")
+    for kind in (HeaderRecord, TickRecord, LinkRecord, MendedRecord)
+)

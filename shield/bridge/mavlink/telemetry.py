@@ -1,32 +1,187 @@
-"""`Telemetry`: what one boat's messages say, each field with the time it was true; impossible values are refused."""
+"""`Telemetry`: what one boat's messages say, each field with the time it was true; impossible values are refused.
+
+Whether a place can be the boat's, after all it said before, is judged by whoever tracks it, see `contact_fusion.Gate`.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections import Counter
-from typing import Any
+from collections import Counter, deque
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..frame import TWO_PI, FieldFrame
 from .boat_clock import BoatClock
-from .fix import FixWatch
-from .position_guard import PositionGuard
 
-FASTEST_MPS = 30.0
-FARTHEST_M = 50_000.0
-"""From the field's corner."""
-FASTEST_TURN_RADS = 10.0
-NO_HEADING = 65_535
+FASTEST_MPS, FARTHEST_M, FASTEST_TURN_RADS = 30.0, 50_000.0, 10.0
+"""Beyond these, the second from the field's corner, nothing is believed."""
+NO_HEADING = 36_000
 SETTLING_S = 1.0
 """ATTITUDE is not believed so soon after boot."""
-FROZEN_TURN_RAD = math.radians(3.0)
-"""A heading that stays the same to the last digit while the boat's own turn rate takes it this far is frozen."""
-STILL_S = 1.5
-"""All of position, velocity and heading the same to the last digit for so long, while the boat is told to move."""
 COURSE_MPS = 0.1
-_HEADING_LAG_S = 0.2
-_FIX_BACK = "its fix is back; its position is believed again"
-_UNIX_2020_S = 1_577_836_800
+_HEADING_LAG_S, _UNIX_2020_S = 0.2, 1_577_836_800
+
+ENOUGH_FIX = int(mavlink.GPS_FIX_TYPE_3D_FIX)
+FIX_SILENT_S = 3.0
+"""A receiver that was heard and then said nothing for so long has lost its fix as far as anybody can tell."""
+GAP_S = 1.0
+"""A gap in the positions themselves is the link's: what is silent with them is counted from their return."""
+WORST_HDOP, WORST_ACCURACY_M = 5.0, 5.0
+"""Fixes as poor as this are of the right harbour, not of the right place."""
+_HDOP_UNKNOWN = 65_535
+_RECEIVERS = {"GPS_RAW_INT": 1, "GPS2_RAW": 2}
+_ABSOLUTE = int(mavlink.EKF_POS_HORIZ_ABS)
+_NO_PLACE = int(mavlink.EKF_CONST_POS_MODE) | int(mavlink.EKF_UNINITIALIZED)
+_GLITCH = 1 << 15
+"""EKF_GPS_GLITCHING, which not every dialect knows."""
+
+POSITION = int(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
+ATTITUDE = int(mavlink.MAVLINK_MSG_ID_ATTITUDE)
+WINDOW_S, WINDOW_MESSAGES = 1.0, 10
+"""Rates are counted over the longer of a second and the time so many messages should take."""
+ENOUGH = 0.8
+"""Share of the rate asked for that must arrive."""
+_ASK_AGAIN_S, _EXTRA_TRIES, _KEPT = 2.0, 3, 256
+_GONE_S = 3.0
+"""An extra that came and then did not for so long is asked for again, however often it was."""
+
+
+class _Word(NamedTuple):
+    """What one receiver said last: kind of fault and words, both empty when its fix is good."""
+
+    fix_type: int
+    kind: str
+    words: str
+    heard_s: float
+
+
+class FixWatch:
+    """Whether an autopilot's position rests on satellites now, by its own word.
+
+    An autopilot that loses its fix goes on telling positions, with fresh time stamps: dead reckoning, which runs away
+    from the boat by metres within seconds. Nothing in the position itself shows it.
+    """
+
+    def __init__(self) -> None:
+        self._receivers: dict[int, _Word] = {}
+        self._estimate = ""
+        self._position_s = self._resumed_s = -math.inf
+
+    @property
+    def fix_type(self) -> int:
+        """GPS_FIX_TYPE of the best receiver, as last heard; -1: none was."""
+        return max((word.fix_type for word in self._receivers.values()), default=-1)
+
+    def hear(self, message: Any, now_s: float) -> None:
+        """Take a message in; of positions no more than that they come."""
+        name = message.get_type()
+        if name == "GLOBAL_POSITION_INT":
+            self._resumed_s = now_s if now_s - self._position_s > GAP_S else self._resumed_s
+            self._position_s = now_s
+        elif name in _RECEIVERS:
+            kind, words = _fault_of(message)
+            self._receivers[_RECEIVERS[name]] = _Word(int(message.fix_type), kind, words, now_s)
+        elif name == "EKF_STATUS_REPORT":
+            flags = int(message.flags)
+            rejects = "the autopilot's filter rejects its GPS" if flags & _GLITCH else ""
+            no_place = flags & _NO_PLACE or not flags & _ABSOLUTE
+            self._estimate = "the autopilot's filter has no absolute position" if no_place else rejects
+
+    def fault(self, now_s: float) -> tuple[str, str]:
+        """Why a position told now is none: kind and words, both empty when it may be believed.
+
+        One receiver with a good fix is enough. Of an autopilot that never spoke of its fix nothing is known: preflight
+        refuses that.
+        """
+        found = []
+        for number, word in sorted(self._receivers.items()):
+            receiver, kind, words = "GPS" if number == 1 else f"GPS {number}", word.kind, word.words
+            if now_s - max(word.heard_s, self._resumed_s) > FIX_SILENT_S:
+                silent = f"nothing heard of the {receiver} fix for {now_s - word.heard_s:.0f} s"
+                found.append(("fix_silent", silent))
+            else:
+                found.append((kind, f"{receiver} {words}"))
+        if found and all(kind for kind, _ in found):
+            return found[0][0], ", ".join(words for _, words in found)
+        return ("no_estimate", self._estimate) if self._estimate else ("", "")
+
+
+def _fault_of(message: Any) -> tuple[str, str]:
+    if message.fix_type < ENOUGH_FIX:
+        return "no_fix", f"has no fix (fix type {message.fix_type})"
+    if message.eph != _HDOP_UNKNOWN and message.eph * 0.01 > WORST_HDOP:
+        return "poor_fix", f"fix is poor (HDOP {message.eph * 0.01:.1f})"
+    accuracy_m = getattr(message, "h_acc", 0) * 1e-3  # 0: not told
+    if math.isfinite(accuracy_m) and accuracy_m > WORST_ACCURACY_M:
+        return "poor_fix", f"fix is poor (good to {accuracy_m:.0f} m)"
+    return "", ""
+
+
+class Streams:
+    """Asks the autopilot for messages at a rate, and believes only what arrives.
+
+    Args:
+        rate_hz: of position and attitude; at most 40, which is what autopilots give.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self.needed: Mapping[int, float] = {POSITION: rate_hz, ATTITUDE: rate_hz}
+        self._extra: Mapping[int, float] = {
+            int(mavlink.MAVLINK_MSG_ID_HEARTBEAT): min(4.0, rate_hz),
+            int(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT): 2.0,
+            int(mavlink.MAVLINK_MSG_ID_GPS2_RAW): 2.0,
+            int(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT): 2.0,
+            int(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME): 1.0,
+        }
+        self._wanted_hz = {**self.needed, **self._extra}
+        self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in self._wanted_hz}
+        self._asked_s: dict[int, float] = {}
+        self._tries: dict[int, int] = dict.fromkeys(self._extra, 0)
+
+    def hear(self, message_id: int, received_s: float) -> None:
+        """A message arrived."""
+        if message_id in self._arrivals:
+            self._arrivals[message_id].append(received_s)
+
+    def rate_hz(self, message_id: int, now_s: float) -> float:
+        """How often a message came lately, Hz."""
+        window_s = max(WINDOW_S, WINDOW_MESSAGES / self._wanted_hz[message_id])
+        return sum(1 for at in self._arrivals[message_id] if 0.0 <= now_s - at < window_s) / window_s
+
+    def rates_hz(self, now_s: float) -> dict[str, float]:
+        """The same of all messages asked for, by name."""
+        return {mavlink.mavlink_map[key].msgname: self.rate_hz(key, now_s) for key in self._arrivals}
+
+    def missing(self, now_s: float) -> str:
+        """What of the needed does not arrive at the rate asked for, in words; empty when all does."""
+        rates = {key: self.rate_hz(key, now_s) for key in self.needed}
+        return ", ".join(
+            f"{mavlink.mavlink_map[key].msgname} at {rates[key]:.1f} of {hz:g} Hz"
+            for key, hz in self.needed.items()
+            if rates[key] < ENOUGH * hz
+        )
+
+    def requests(self, now_s: float) -> list[tuple[int, float]]:
+        """Messages to ask for now and their intervals, us: those that do not arrive as they should."""
+        due = []
+        for key, hz in self._wanted_hz.items():
+            arrivals, asked_s = self._arrivals[key], self._asked_s.get(key)
+            is_gone = bool(arrivals) and now_s - arrivals[-1] > _GONE_S
+            if key in self._extra and self._tries[key] >= _EXTRA_TRIES and not is_gone:
+                continue
+            if asked_s is None or (now_s - asked_s >= _ASK_AGAIN_S and self.rate_hz(key, now_s) < ENOUGH * hz):
+                due.append((key, 1e6 / hz))
+                self._asked_s[key] = now_s
+                self._tries[key] = self._tries.get(key, 0) + 1
+        return due
+
+    def restart(self) -> None:
+        """The autopilot restarted: it has forgotten what was asked."""
+        self._asked_s.clear()
+        self._tries = dict.fromkeys(self._extra, 0)
 
 
 class Telemetry:
@@ -39,52 +194,23 @@ class Telemetry:
         clock: of the boat.
         faults: what was refused, by kind; the owner empties it.
         wall_ahead_s: this machine's wall clock less the boat's GPS time, s; NaN when not heard.
+        fix: whether its positions may be believed.
     """
 
     def __init__(self, frame: FieldFrame) -> None:
-        self.clock = BoatClock()
-        self.faults: Counter[str] = Counter()
-        self.wall_ahead_s = math.nan
-        self._frame = frame
-        self._starts = 0
-        self._heard_s = -math.inf
+        self.clock, self.faults, self.wall_ahead_s = BoatClock(), Counter[str](), math.nan
+        self._frame, self._starts, self._heard_s = frame, 0, -math.inf
         self.forget()
 
     def forget(self) -> None:
         """Begin anew, as after a restart of the autopilot."""
-        self.position_m = (math.nan, math.nan)
-        self.position_s = -math.inf
-        self.velocity_mps = (math.nan, math.nan)
-        self.velocity_s = -math.inf
-        self.turn_rate_rads = math.nan
-        self.turn_rate_s = -math.inf
+        self.position_m, self.position_s = (math.nan, math.nan), -math.inf
+        self.velocity_mps, self.velocity_s = (math.nan, math.nan), -math.inf
+        self.turn_rate_rads, self.turn_rate_s = math.nan, -math.inf
         self._attitude_rad, self._attitude_s = math.nan, -math.inf
         self._compass_rad, self._compass_s = math.nan, -math.inf
         self._latest_boot: dict[str, tuple[float, int]] = {}
-        self._guard = PositionGuard()
-        self._turned_rad, self._turned_s = 0.0, 0.0
-        self._same: tuple[Any, ...] = ()
-        self._same_since_s = math.inf
-        self._told_since_s = math.inf
-        self._still = False
-        self._fix = FixWatch()
-        self._fix_lost = False
-
-    @property
-    def fix_type(self) -> int:
-        """GPS_FIX_TYPE of the best receiver; -1: not heard."""
-        return self._fix.fix_type
-
-    def fix_fault(self, now_s: float) -> str:
-        """Why positions are not believed for want of a fix, in words; empty when they may be."""
-        return self._fix.fault(now_s)[1]
-
-    def told_speed(self, speed_mps: float, now_s: float) -> None:
-        """The boat is told to go that fast and obeys: one that then stays still to the last digit is frozen."""
-        if abs(speed_mps) < 0.3:
-            self._told_since_s = math.inf
-        else:
-            self._told_since_s = min(self._told_since_s, now_s)
+        self.fix, self._fix_lost = FixWatch(), False
 
     @property
     def heading(self) -> tuple[float, float]:
@@ -112,114 +238,67 @@ class Telemetry:
             A text for the operator, mostly empty.
         """
         name = message.get_type()
-        self._fix.hear(message, received_s)
-        if name == "GLOBAL_POSITION_INT":
-            return self._timed(message, received_s, self._hear_position)
-        if name == "ATTITUDE":
-            return self._timed(message, received_s, self._hear_attitude)
+        self.fix.hear(message, received_s)
+        if name in ("GLOBAL_POSITION_INT", "ATTITUDE"):
+            return self._hear_timed(message, name, received_s)
         if name == "SYSTEM_TIME" and message.time_unix_usec * 1e-6 > _UNIX_2020_S:
             self.wall_ahead_s = time.time() - message.time_unix_usec * 1e-6
         return ""
 
-    def _timed(self, message: Any, received_s: float, take: Any) -> str:
-        boot_s = message.time_boot_ms * 1e-3
+    def _hear_timed(self, message: Any, name: str, received_s: float) -> str:
+        boot_s, number = message.time_boot_ms * 1e-3, message.get_seq()
         self._heard_s = received_s
         true_s = self.clock.hear(boot_s, received_s)
         if true_s is None:
             self.faults["clock"] += 1
             return ""
-        text = ""
         if self.clock.starts != self._starts:
-            text = "" if self._starts == 0 else "the autopilot restarted, or its clock was set"
+            first, self._starts = self._starts == 0, self.clock.starts
             self.forget()
-            self._starts = self.clock.starts
-        return text or (str(take(message, true_s)) if self._is_new(message, boot_s) else "")
-
-    def _is_new(self, message: Any, boot_s: float) -> bool:
-        """Newer than the latest of its kind; the same again under a new number is no fault, only nothing new."""
-        name, number = message.get_type(), message.get_seq()
+            if not first:
+                return "the autopilot restarted, or its clock was set"
         latest_s, latest_number = self._latest_boot.get(name, (-math.inf, -1))
-        if boot_s > latest_s:
-            self._latest_boot[name] = (boot_s, number)
-            return True
-        if boot_s < latest_s:
-            self.faults["out_of_order"] += 1
-        elif number == latest_number:
-            self.faults["duplicate"] += 1
-        return False
+        if boot_s <= latest_s:  # the same again under a new number is no fault, only nothing new
+            kind = "out_of_order" if boot_s < latest_s else "duplicate" if number == latest_number else ""
+            self.faults.update([kind] if kind else [])
+            return ""
+        self._latest_boot[name] = (boot_s, number)
+        if name == "ATTITUDE":
+            self._hear_attitude(message, true_s)
+            return ""
+        return self._hear_position(message, true_s)
 
     def _hear_position(self, message: Any, true_s: float) -> str:
         velocity = (message.vx * 0.01, message.vy * 0.01)
+        position, fault = (math.nan, math.nan), ""
         if math.hypot(*velocity) > FASTEST_MPS:
-            self.faults["impossible_speed"] += 1
+            fault = "impossible_speed"
+        elif message.lat == 0 and message.lon == 0:
+            fault = "no_position"
+        else:
+            if abs(message.lat) <= 890_000_000 and abs(message.lon) <= 1_800_000_000:
+                position = self._frame.to_field_m(message.lat * 1e-7, message.lon * 1e-7)
+            fault = "" if math.hypot(*position) <= FARTHEST_M else "impossible_position"  # NaN is refused
+        if fault:
+            self.faults[fault] += 1
             return ""
-        if message.lat == 0 and message.lon == 0:
-            self.faults["no_position"] += 1
-            return ""
-        position = self._place(message)
-        if position is None:
-            self.faults["impossible_position"] += 1
-            return ""
-        kind, words = self._fix.fault(self._heard_s)
-        if kind:
+        kind, words = self.fix.fault(self._heard_s)
+        was_lost, self._fix_lost = self._fix_lost, bool(kind)
+        if kind:  # position and velocity are dead reckoning from now on: they grow old, and it is said once
             self.faults[kind] += 1
-            return self._lose_fix(words)
-        back, self._fix_lost = self._fix_lost, False
-        return self._take_position(message, position, velocity, true_s) or (_FIX_BACK if back else "")
-
-    def _lose_fix(self, words: str) -> str:
-        """Position and velocity are dead reckoning from now on: they grow old, and it is said once."""
-        first, self._fix_lost = not self._fix_lost, True
-        return f"{words}; what it tells of its place is dead reckoning and not believed" if first else ""
-
-    def _take_position(
-        self, message: Any, position: tuple[float, float], velocity: tuple[float, float], true_s: float
-    ) -> str:
-        east_north = self._frame.turn_to_field(velocity[1], velocity[0])
-        refused = self._guard.refuse(position, east_north, true_s)
-        self._note_same((message.lat, message.lon, message.vx, message.vy, message.hdg, self._attitude_rad), true_s)
-        if refused == "frozen" or self._is_still(true_s):
-            self.faults["frozen"] += 1
-            return ""
+            return "" if was_lost else f"{words}; what it tells of its place is dead reckoning and not believed"
         self.velocity_mps, self.velocity_s = velocity, true_s
-        if message.hdg < 36_000:
-            self._compass_rad, self._compass_s = math.radians(message.hdg * 0.01), true_s
-        if refused == "jump":
-            self.faults["jump"] += 1
-            return f"position jumped {self._guard.jumped_m:.0f} m; not believed until it holds for 2 s"
         self.position_m, self.position_s = position, true_s
-        return "position jumped and holds; believed again" if refused == "moved" else ""
+        if message.hdg < NO_HEADING:
+            self._compass_rad, self._compass_s = math.radians(message.hdg * 0.01), true_s
+        return "its fix is back; its position is believed again" if was_lost else ""
 
-    def _place(self, message: Any) -> tuple[float, float] | None:
-        if abs(message.lat) > 890_000_000 or abs(message.lon) > 1_800_000_000:
-            return None
-        position = self._frame.to_field_m(message.lat * 1e-7, message.lon * 1e-7)
-        return position if math.hypot(*position) <= FARTHEST_M else None  # written so that NaN is refused
-
-    def _hear_attitude(self, message: Any, true_s: float) -> str:
+    def _hear_attitude(self, message: Any, true_s: float) -> None:
         yaw, rate = message.yaw, message.yawspeed
         if not (abs(yaw) <= TWO_PI and abs(rate) <= FASTEST_TURN_RADS):  # written so that NaN is refused
             self.faults["impossible_attitude"] += 1
-            return ""
-        if message.time_boot_ms < SETTLING_S * 1000.0:
+        elif message.time_boot_ms < SETTLING_S * 1000.0:
             self.faults["settling"] += 1
-            return ""
-        same = yaw % TWO_PI == self._attitude_rad
-        self._turned_rad = self._turned_rad + abs(rate) * (true_s - self._turned_s) if same else 0.0
-        self._turned_s = true_s
-        if self._turned_rad > FROZEN_TURN_RAD:
-            self.faults["frozen"] += 1
-            return ""
-        self.turn_rate_rads, self.turn_rate_s = rate, true_s
-        if not (same and self._is_still(true_s)):
+        else:
+            self.turn_rate_rads, self.turn_rate_s = rate, true_s
             self._attitude_rad, self._attitude_s = yaw % TWO_PI, true_s
-        return ""
-
-    def _note_same(self, values: tuple[Any, ...], true_s: float) -> None:
-        if values != self._same:
-            self._same, self._same_since_s, self._still = values, true_s, False
-
-    def _is_still(self, true_s: float) -> bool:
-        """Once found frozen it stays so until something changes: told to stop for that very reason, it is no better."""
-        self._still = self._still or true_s - max(self._same_since_s, self._told_since_s) > STILL_S
-        return self._still

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...platforms import Platform
 from ..clock import Clock
-from ..mavlink.fix import ENOUGH_FIX
-from ..mavlink.health import LinkHealth
+from ..mavlink.telemetry import ENOUGH_FIX
+from ..mavlink.vehicle import LinkHealth
 from ..messages import BoatReading
 from .parameters import STANDARD_TIMEOUT_S, parameter_faults
 from .result import Check, CheckResult

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from ..clock import Clock
-from ..mavlink.health import LinkHealth
+from ..mavlink.vehicle import LinkHealth
 from ..messages import BoatReading
 
 WATCH_S = 5.0

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import os
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from logged_runs import Encounter, header_of
 from steerclear.experiments.cli import app
 from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter
-from steerclear.shield.bridge.blackbox.parts import part_path
 from typer.testing import CliRunner
 
 STEPS = 120
@@ -170,17 +168,6 @@ def test_a_line_taken_out_is_not_proved(tmp_path, log):
     code, said = run(write_records(tmp_path / "x.mcap", records))
     assert code == 3
     assert "2 records" in said or "1 records are missing" in said
-
-
-def test_a_part_taken_away_is_not_proved(tmp_path, ticks):
-    path = write(tmp_path / "run.mcap", ticks, part_s=5.0)
-    assert run(path)[0] == 0
-    part_path(path, 3).rename(tmp_path / "gone")
-    code, said = run(path)
-    assert code == 3
-    assert "the next part is missing" in said
-    shutil.copy(tmp_path / "gone", part_path(path, 2))
-    assert run(path)[0] == 3
 
 
 def test_a_log_that_was_killed_is_told_as_such_and_not_as_forged(tmp_path, log):

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.deploy.replaying import prove
 from steerclear.experiments.deploy.replaying_sent import SentCheck
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.routes import AttitudeRoute, VelocityRoute
+from steerclear.shield.bridge.mavlink.commands import AttitudeRoute, VelocityRoute
 from steerclear.shield.bridge.messages import Action, Sent
 
 HEADER = header_of()

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from logged_runs import Encounter, header_of, write_log
-from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, TlogWriter, mcap_file
+from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, TlogWriter, foxglove
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError
 
@@ -273,7 +273,7 @@ def test_closing_does_not_wait_for_ever(tmp_path, ticks):
     writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
     found[0].free.clear()
     writer.take(ticks[0])
-    writer._spool.close(timeout_s=0.2)
+    writer._writer.close(timeout_s=0.2)
     assert "could not be completed within 0.2 s" in writer.fault
     found[0].free.set()
     until(lambda: not any(thread.name == "log run.mcap" for thread in threading.enumerate()))
@@ -306,7 +306,7 @@ def test_a_drawing_that_breaks_does_not_stop_the_record(tmp_path, ticks, monkeyp
     def broken(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(mcap_file, "scene_of", broken)
+    monkeypatch.setattr(foxglove, "scene_of", broken)
     writer = McapWriter(tmp_path / "run.mcap", header_of())
     for number in range(5):
         writer.take(numbered(ticks, number))

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import Encounter, header_of
 from steerclear.shield import Commands, Fleet, ShieldConfig, Surroundings
-from steerclear.shield.bridge.blackbox.decode import tick_from_json
-from steerclear.shield.bridge.blackbox.encode import tick_to_json
+from steerclear.shield.bridge.blackbox.format import tick_from_json, tick_to_json
 from steerclear.shield.bridge.blackbox.header import LogHeader, platforms_of
 from steerclear.shield.bridge.messages import Action, BoatReading, Contact, Sent, Tick
 from steerclear.shield.decision import Decisions

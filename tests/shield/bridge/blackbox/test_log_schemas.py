@@ -11,9 +11,8 @@ from forged_logs import read_records
 from hypothesis import given
 from logged_runs import Encounter, header_of
 from steerclear.shield.bridge.blackbox import McapWriter, mend
-from steerclear.shield.bridge.blackbox.decode import tick_from_json
-from steerclear.shield.bridge.blackbox.encode import tick_to_json
-from steerclear.shield.bridge.blackbox.schemas import TICK
+from steerclear.shield.bridge.blackbox.format import tick_from_json, tick_to_json
+from steerclear.shield.bridge.blackbox.records import TICK
 from steerclear.shield.exceptions import LogError
 from test_log_round_trip import HERON, quick, same, ticks
 

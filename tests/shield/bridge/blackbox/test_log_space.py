@@ -3,7 +3,7 @@
 from collections import namedtuple
 
 import pytest
-from steerclear.shield.bridge.blackbox import check_disk, space
+from steerclear.shield.bridge.blackbox import check_disk, disk
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -17,14 +17,15 @@ def test_room_is_enough(tmp_path):
 
 
 def test_too_little_room(tmp_path, monkeypatch):
-    monkeypatch.setattr(space.shutil, "disk_usage", lambda _: Usage(1, 1, 5 * 2**20))
+    monkeypatch.setattr(disk.shutil, "disk_usage", lambda _: Usage(1, 1, 5 * 2**20))
     result = check_disk(tmp_path, boats=6, minutes=120.0)
     assert not result.passed
     assert "5 MiB free, 247 MiB needed for 120 min; free space" in result.text
 
 
 def test_a_slow_disk(tmp_path, monkeypatch):
-    monkeypatch.setattr(space, "_time_sync", lambda _: 2.0)
+    times = iter([0.0, 2.0])
+    monkeypatch.setattr(disk.time, "monotonic", lambda: next(times))
     result = check_disk(tmp_path, boats=1, minutes=0.1)
     assert not result.passed
     assert "2.0 s" in result.text
@@ -34,7 +35,7 @@ def test_a_folder_nobody_can_write_to(tmp_path, monkeypatch):
     def refuse(_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(space, "_time_sync", refuse)
+    monkeypatch.setattr(disk.shutil, "disk_usage", refuse)
     result = check_disk(tmp_path, boats=1)
     assert not result.passed
     assert "writing there is not allowed" in result.text

@@ -1,14 +1,51 @@
 """Somebody else at the helm is noticed and named."""
 
 import math
+import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.mavlink import own_frames
-from steerclear.shield.bridge.mavlink.codec import Codec
-from steerclear.shield.bridge.mavlink.commanders import SAY_AGAIN_S, Commanders
+from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.mavlink.autopilot import SAY_AGAIN_S, Autopilot
+from steerclear.shield.bridge.mavlink.connection import ECHO_S, Codec
 
 OURS = (255, 191)
+
+
+class Wire:
+    """An endpoint that sends nothing."""
+
+    def __init__(self, codec):
+        self.codec = codec
+
+    def send(self, system_id, message):
+        return True
+
+
+class Watch(Autopilot):
+    """Says of each message which fault it is and what is told."""
+
+    def __init__(self, codec):
+        super().__init__("blue_1", Wire(codec), 1, FieldFrame(42.0, -71.0), ManualClock(), 10.0)
+        self.expects_guided = True
+
+    def _said(self):
+        texts = self.dialogue.take_texts()
+        return next(iter(self.take_faults()), ""), texts[0] if texts else ""
+
+    def hear_foreign(self, message, now_s):
+        self.on_foreign(message, now_s)
+        return self._said()
+
+    def hear_answer(self, message, asked_s, now_s):
+        self.dialogue._asked_s[message.command] = asked_s
+        self._hear_answer(message, now_s)
+        return self._said()
+
+    @property
+    def heard_s(self):
+        return self.commanded_s
 
 
 def of(message, system=252, component=190):
@@ -17,7 +54,7 @@ def of(message, system=252, component=190):
 
 
 def watching():
-    return Commanders("blue_1", 1, OURS)
+    return Watch(Codec(*OURS, None))
 
 
 def command(number, target=1):
@@ -110,7 +147,7 @@ def test_a_crowd_of_stations_does_not_fill_memory():
 
 def own_and_watch(key=None):
     ours = Codec(*OURS, key)
-    return ours, Commanders("blue_1", 1, ours.source)
+    return ours, Watch(ours)
 
 
 def heard(frame):
@@ -143,8 +180,8 @@ def test_another_program_with_our_ids_is_found_by_frames_we_never_sent(message):
 def test_our_own_commands_played_again_later_are_somebody_elses(monkeypatch):
     ours, watch = own_and_watch()
     frame = ours.encode(STEERING[0])
-    later = own_frames.time.monotonic() + own_frames.ECHO_S + 0.01
-    monkeypatch.setattr(own_frames.time, "monotonic", lambda: later)
+    later = time.monotonic() + ECHO_S + 0.01
+    monkeypatch.setattr(time, "monotonic", lambda: later)
     assert watch.hear_foreign(heard(frame), 9.0)[0] == "second_commander"
 
 
@@ -160,5 +197,5 @@ def test_what_we_sent_does_not_fill_memory():
     ours, _ = own_and_watch()
     for _ in range(6000):
         ours.encode(STEERING[1])
-    assert len(ours.source._sent) <= 4096
+    assert len(ours._sent) <= 4096
     assert ours.source == OURS

@@ -6,7 +6,7 @@ import pytest
 from fake_boat import FakeBoat, wait_for
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.clock import MonotonicClock
-from steerclear.shield.bridge.mavlink.endpoint import Endpoint
+from steerclear.shield.bridge.mavlink.connection import Endpoint
 from steerclear.shield.bridge.mavlink.signing import Signing
 from steerclear.shield.exceptions import LinkError
 

@@ -5,9 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.fix import SILENT_S, FixWatch
-from steerclear.shield.bridge.mavlink.streams import ESTIMATE, GPS, SECOND_GPS, Streams
-from steerclear.shield.bridge.mavlink.telemetry import Telemetry
+from steerclear.shield.bridge.mavlink.telemetry import FIX_SILENT_S, FixWatch, Streams, Telemetry
 
 FRAME = FieldFrame(42.0, -71.0)
 OFFSET = 500.0
@@ -86,17 +84,17 @@ def test_a_position_told_without_a_fix_grows_old_and_is_believed_again_with_one(
     assert boat.telemetry.faults[kind] > 350
     assert 19.0 < boat.age_s < 20.1, "position and speed alike"
     assert boat.now + OFFSET - boat.telemetry.velocity_s > 19.0
-    assert words in boat.telemetry.fix_fault(boat.now + OFFSET)
+    assert words in boat.telemetry.fix.fault(boat.now + OFFSET)[1]
     assert len(boat.texts) == 1, "said once"
     assert "dead reckoning and not believed" in boat.texts[0]
     boat.run(3.0, gps(), estimate())
     assert boat.age_s < 0.06
-    assert boat.telemetry.fix_fault(boat.now + OFFSET) == ""
+    assert boat.telemetry.fix.fault(boat.now + OFFSET)[1] == ""
     assert "its fix is back; its position is believed again" in boat.texts
 
 
 def test_a_receiver_that_falls_silent_has_lost_its_fix():
-    boat = Boat().run(5.0, gps()).run(SILENT_S + 2.0)
+    boat = Boat().run(5.0, gps()).run(FIX_SILENT_S + 2.0)
     assert set(boat.telemetry.faults) == {"fix_silent"}
     assert 1.0 < boat.age_s < 2.6
     assert "nothing heard of the GPS fix" in boat.texts[0]
@@ -105,7 +103,7 @@ def test_a_receiver_that_falls_silent_has_lost_its_fix():
 
 def test_a_receiver_that_never_spoke_is_not_missed_here():
     assert Boat().run(30.0).age_s < 0.06
-    assert Boat().telemetry.fix_type == -1
+    assert Boat().telemetry.fix.fix_type == -1
 
 
 def test_a_gap_of_the_whole_link_is_no_silence_of_the_receiver():
@@ -113,12 +111,12 @@ def test_a_gap_of_the_whole_link_is_no_silence_of_the_receiver():
     boat.now += 30.0
     boat.run(1.0)
     assert boat.age_s < 0.06
-    assert boat.run(SILENT_S).telemetry.faults["fix_silent"]
+    assert boat.run(FIX_SILENT_S).telemetry.faults["fix_silent"]
 
 
 def test_one_receiver_with_a_fix_is_enough():
     boat = Boat().run(5.0, gps(1), second())
-    assert boat.telemetry.fix_type == 3
+    assert boat.telemetry.fix.fix_type == 3
     boat.telemetry.faults.clear()
     assert boat.run(5.0, gps(1), second()).age_s < 0.06
     assert not boat.telemetry.faults
@@ -136,7 +134,7 @@ def test_what_is_not_available_is_no_fault():
 def test_a_restart_forgets_what_was_said_of_the_fix():
     boat = Boat().run(5.0, gps(1))
     boat.telemetry.forget()
-    assert boat.telemetry.fix_type == -1
+    assert boat.telemetry.fix.fix_type == -1
 
 
 def test_a_heading_that_is_not_available_is_none():
@@ -159,10 +157,12 @@ def test_a_place_that_is_not_available_is_none(place):
 
 def test_the_messages_are_asked_for_and_asked_again_once_they_stop():
     streams = Streams(20.0)
-    assert {GPS, SECOND_GPS, ESTIMATE} <= {key for key, _ in streams.requests(0.0)}
+    gps_id = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT
+    others = {mavlink.MAVLINK_MSG_ID_GPS2_RAW, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT}
+    assert {gps_id, *others} <= {key for key, _ in streams.requests(0.0)}
     for k in range(1, 50):
         streams.requests(2.1 * k)
-    assert GPS not in {key for key, _ in streams.requests(120.0)}, "not given, not asked for ever"
-    streams.hear(GPS, 120.0)
-    assert GPS not in {key for key, _ in streams.requests(122.5)}
-    assert GPS in {key for key, _ in streams.requests(124.0)}
+    assert gps_id not in {key for key, _ in streams.requests(120.0)}, "not given, not asked for ever"
+    streams.hear(gps_id, 120.0)
+    assert gps_id not in {key for key, _ in streams.requests(122.5)}
+    assert gps_id in {key for key, _ in streams.requests(124.0)}

@@ -14,9 +14,9 @@ from pymavlink import mavutil
 from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.endpoint import Endpoint
-from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.mavlink.connection import Endpoint
 from steerclear.shield.bridge.mavlink.signing import Signing
+from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.exceptions import LinkRefused
 from steerclear.shield.platforms import layout as L
 

@@ -8,10 +8,10 @@ from fake_boat import FakeBoat, wait_for
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.endpoint import Endpoint
-from steerclear.shield.bridge.mavlink.link import MavlinkLink
-from steerclear.shield.bridge.mavlink.routes import ROUTES
+from steerclear.shield.bridge.mavlink.commands import ROUTES
+from steerclear.shield.bridge.mavlink.connection import Endpoint
 from steerclear.shield.bridge.mavlink.signing import Signing
+from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import NEVER_S
 from steerclear.shield.exceptions import LinkError, LinkRefused
 
@@ -380,7 +380,7 @@ def test_a_stop_keeps_the_heading_it_has():
 
 
 def test_a_boat_that_does_not_stop_is_said_so(monkeypatch):
-    monkeypatch.setattr("steerclear.shield.bridge.mavlink.preparation.STOP_S", 0.5)
+    monkeypatch.setattr("steerclear.shield.bridge.mavlink.vehicle.STOP_S", 0.5)
     with linked() as (boat, link):
         boat.obeys, boat.speed = False, 1.0
         assert wait_for(lambda: link.read().speed_mps > 0.9)
@@ -388,7 +388,7 @@ def test_a_boat_that_does_not_stop_is_said_so(monkeypatch):
 
 
 def test_a_boat_that_cannot_be_held_is_said_so(monkeypatch):
-    monkeypatch.setattr("steerclear.shield.bridge.mavlink.preparation.HOLD_S", 0.5)
+    monkeypatch.setattr("steerclear.shield.bridge.mavlink.vehicle.HOLD_S", 0.5)
     with linked() as (boat, link):
         boat.refuses_mode = "no"
         assert "HOLD not confirmed; its own time-out keeps it stopped" in link.close()
@@ -416,3 +416,39 @@ def test_texts_in_pieces_come_whole_and_harmless():
         texts = []
         assert wait_for(lambda: texts.extend(link.read().texts) or texts)
         assert texts == ["x" * 50 + " and ?[2J? the rest"]
+
+
+@pytest.mark.parametrize("first", ["word", "mode"])
+def test_a_fail_safes_mode_change_is_told_from_a_pilots_by_its_word(first):
+    with linked() as (boat, link):
+        link.read()
+        acts = [lambda: boat.say("EKF failsafe"), lambda: setattr(boat, "mode", 4)]
+        for act in acts if first == "word" else reversed(acts):
+            act()
+            boat.send_heartbeat()
+        assert wait_for(lambda: link.read().released_by == "failsafe")
+        reading = link.read()
+        assert "its own fail-safe: EKF failsafe" in reading.why_not
+        assert not reading.failsafe_over
+        boat.say("EKF failsafe cleared")
+        assert wait_for(lambda: link.read().failsafe_over)
+        link.prepare(20.0)
+        assert (link.read().ready, link.read().released_by) == (True, "")
+
+
+def test_a_pilots_mode_change_is_his_whatever_a_fail_safe_did_before():
+    with linked() as (boat, link):
+        link.read()
+        boat.mode = 0
+        assert wait_for(lambda: link.read().released_by == "pilot")
+    with linked() as (boat, link):
+        link.read()
+        boat.say("Radio Failsafe")
+        boat.mode = 4
+        assert wait_for(lambda: link.read().released_by == "failsafe")
+        assert wait_for(lambda: link.autopilot.clock.now_s() - link.autopilot._failed_s > 3.5)
+        boat.mode = 0
+        assert wait_for(lambda: link.read().released_by == "pilot"), "a hand has it now"
+        boat.say("Radio Failsafe Cleared")
+        assert wait_for(lambda: link.read().failsafe_over)
+        assert link.read().released_by == "pilot"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.mavlink.routes import (
+from steerclear.shield.bridge.mavlink.commands import (
     ROUTES,
     Abilities,
     AttitudeRoute,

@@ -6,7 +6,7 @@ import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.mavlink.codec import Codec
+from steerclear.shield.bridge.mavlink.connection import Codec
 from steerclear.shield.bridge.mavlink.signing import SignatureCheck, Signing, SigningClock, read_key
 from steerclear.shield.exceptions import ConfigError
 

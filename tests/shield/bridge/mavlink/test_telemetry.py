@@ -118,67 +118,6 @@ def test_the_same_packet_twice_is_counted_and_the_same_instant_again_is_not():
     assert boat.telemetry.faults == {"duplicate": 1}
 
 
-def test_a_frozen_boat_with_fresh_stamps_grows_old():
-    boat = Boat()
-    boat.speed = 1.5
-    boat.run(2.0)
-    boat.run(1.0, still=True)
-    assert boat.age() > 0.7
-    assert boat.now + OFFSET - boat.telemetry.velocity_s > 0.7
-    assert boat.telemetry.faults["frozen"] > 0
-    boat.run(0.5)
-    assert boat.age() < 0.1
-
-
-def test_a_frozen_heading_while_turning_grows_old():
-    boat = Boat()
-    boat.rate = 0.5
-    boat.run(2.0)
-    for _ in range(20):
-        boat.now += DT
-        boat.hear(boat.attitude())
-    assert boat.now + OFFSET - boat.telemetry.heading[1] > 0.7
-
-
-def test_a_boat_frozen_at_rest_is_found_when_told_to_move():
-    boat = Boat()
-    boat.run(2.0, still=True)
-    assert boat.age() < 0.1, "lying still is no fault"
-    boat.telemetry.told_speed(1.0, boat.now + OFFSET)
-    boat.run(3.0, still=True)
-    assert boat.age() > 1.0
-    boat.telemetry.told_speed(0.0, boat.now + OFFSET)
-    boat.run(1.0, still=True)
-    assert boat.age() > 2.0, "told to stop for that reason, it is no fresher"
-    boat.speed = 0.5
-    boat.run(0.5)
-    assert boat.age() < 0.1
-
-
-def test_a_boat_that_moves_when_told_is_never_frozen():
-    boat = Boat()
-    boat.run(2.0, still=True)
-    boat.telemetry.told_speed(1.0, boat.now + OFFSET)
-    boat.run(0.5, still=True)
-    boat.speed = 0.3
-    boat.run(5.0)
-    assert boat.age() < 0.1
-    assert not boat.telemetry.faults
-
-
-def test_a_jump_of_30_m_is_refused_with_a_text():
-    boat = Boat()
-    boat.speed = 1.0
-    boat.run(2.0)
-    place = boat.telemetry.position_m
-    boat.now += DT
-    boat.x += 30.0
-    text = boat.hear(boat.position())
-    assert "jumped 30 m" in text
-    assert boat.telemetry.position_m == place
-    assert boat.telemetry.faults == {"jump": 1}
-
-
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [

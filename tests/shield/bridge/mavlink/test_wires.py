@@ -7,9 +7,7 @@ import socket
 import time
 
 import pytest
-from steerclear.shield.bridge.mavlink.addresses import Address, parse_address
-from steerclear.shield.bridge.mavlink.serial_port import SerialWire
-from steerclear.shield.bridge.mavlink.sockets import TcpWire, UdpWire
+from steerclear.shield.bridge.mavlink.transport import Address, SerialWire, TcpWire, UdpWire, parse_address
 from steerclear.shield.exceptions import LinkError
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.mavlink.health import LinkHealth
-from steerclear.shield.bridge.mavlink.preparation import OTHERS
+from steerclear.shield.bridge.mavlink.commands import OTHERS
+from steerclear.shield.bridge.mavlink.vehicle import LinkHealth
 from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.preflight.link_checks import (
     check_autopilot,

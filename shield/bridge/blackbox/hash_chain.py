@@ -1,0 +1,235 @@
+"""The chain of a log: each link digests the records since the last one, and the last link; and following it on reading.
+
+A record that was altered, removed, added or moved shows, and so does an end that was cut off and closed again. This is
+evidence against damage and careless changes, no proof of who wrote the log: whoever can write a whole log can write its
+chain. With a key each link carries a code that only who has the key can make.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import os
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from ...exceptions import LogError
+
+ENDS = "log"
+"""How the closing link says that its file is whole."""
+MOST, MOST_BREAKS = 1 << 62, 20
+"""No log has so many records; breaks kept in words, further ones are counted."""
+_KEY_USE = b"steerclear black box"
+_DIGITS = 2 * hashlib.sha256().digest_size
+
+
+@dataclass(frozen=True)
+class ChainHead:
+    """Where the chain of a file begins; part of its header.
+
+    Attributes:
+        head: digest the first link builds on, drawn at random, hexadecimal.
+        count: records before it: 0.
+        keyed: whether links carry codes.
+    """
+
+    head: str
+    count: int = 0
+    keyed: bool = False
+
+    @classmethod
+    def new(cls) -> Self:
+        """The beginning of a new log."""
+        return cls(os.urandom(_DIGITS // 2).hex())
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """The head in a header.
+
+        Raises:
+            LogError: it is none.
+        """
+        try:
+            found = cls(**json.loads(text))
+            sound = len(bytes.fromhex(found.head)) == _DIGITS // 2 and 0 <= int(found.count) < MOST
+        except (TypeError, ValueError, RecursionError):
+            sound = False
+        if not sound:
+            raise LogError("the log's header holds no head of its chain; it is damaged")
+        return found
+
+
+@dataclass(frozen=True)
+class Link:
+    """One link.
+
+    Attributes:
+        count: records up to here, links left out.
+        digest: hexadecimal.
+        end: "" within a file, `ENDS` for the one that closes it.
+        code: with a key, hexadecimal; else "".
+    """
+
+    count: int
+    digest: str
+    end: str = ""
+    code: str = ""
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> Self:
+        """The link in a message.
+
+        Raises:
+            LogError: it is none.
+        """
+        try:
+            found = cls(int(content["count"]), *(str(content[name]) for name in ("digest", "end", "code")))
+            bytes.fromhex(found.digest)
+            if not 0 <= found.count < MOST:
+                raise ValueError("no number of records")
+        except (KeyError, TypeError, ValueError, OverflowError):
+            raise LogError("a link of the log's chain is damaged") from None
+        return found
+
+
+class Chain:
+    """Digests records as they are written or read.
+
+    Args:
+        head: where it begins.
+        key: 32 bytes; None: links carry no codes.
+
+    Attributes:
+        count: records so far.
+        loose: records since the last link.
+    """
+
+    def __init__(self, head: ChainHead, key: bytes | None = None) -> None:
+        self.count, self.loose = head.count, 0
+        self._key = None if key is None else hmac.digest(key, _KEY_USE, "sha256")
+        self._digests = hashlib.sha256(bytes.fromhex(head.head))
+
+    def add(self, topic: str, times: tuple[int, int, int], data: bytes) -> None:
+        """Digest a record.
+
+        Args:
+            topic: its topic.
+            times: when it was logged and published, ns, and its number within its topic.
+            data: its content.
+        """
+        name = topic.encode()
+        self._digests.update(struct.pack(">QQIIQ", *times, len(name), len(data)) + name)
+        self._digests.update(data)
+        self.count, self.loose = self.count + 1, self.loose + 1
+
+    def next_link(self, end: str = "") -> Link:
+        """What the next link would be; nothing changes."""
+        digests = self._digests.copy()
+        digests.update(struct.pack(">Q", self.count) + end.encode())
+        digest = digests.digest()
+        code = "" if self._key is None else hmac.digest(self._key, digest, "sha256").hex()
+        return Link(self.count, digest.hex(), end, code)
+
+    def go_on(self, link: Link) -> None:
+        """Build on a link from now on."""
+        self.count, self.loose = link.count, 0
+        self._digests = hashlib.sha256(bytes.fromhex(link.digest))
+
+
+class ChainCheck:
+    """What a log's chain says; fed with its messages in their order.
+
+    Args:
+        key: of links that carry codes, 32 bytes; None: codes are not looked at.
+
+    Attributes:
+        chained: whether there is a chain at all.
+        keyed: whether its links carry codes.
+        codes_checked: how many codes were found right.
+        breaks: what does not fit, in words, `MOST_BREAKS` at most.
+        broken: how many things do not fit.
+        is_mended: the file says that `reader.mend` wrote it from one that was cut off.
+        end: what the last link said of the end of its file; "" while it did not.
+    """
+
+    def __init__(self, key: bytes | None = None) -> None:
+        self.chained = self.keyed = self.is_mended = False
+        self.codes_checked = self.broken = 0
+        self.breaks: list[str] = []
+        self.end = ""
+        self._key = key
+        self._chain: Chain | None = None
+        self._early = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is a chain and nothing contradicts it."""
+        return self.chained and self.broken == 0
+
+    def begin(self, head: ChainHead) -> None:
+        """The header of the file was met, with this head in it."""
+        if self._key is not None and not head.keyed:
+            self.tell("it carries no codes, though a key was given: it was written without the key")
+        if self._early:
+            self.tell(f"{self._early} records stand before the header")
+        if head.count:
+            self.tell(f"the {head.count} records before its first are missing")
+        self.chained, self.keyed, self._chain = True, head.keyed, Chain(head, self._key)
+
+    def add(self, topic: str, times: tuple[int, int, int], data: bytes) -> None:
+        """A record was met; see `Chain.add`."""
+        if self._chain is None:
+            self._early += 1
+            return
+        if (self.end or self.is_mended) and self._chain.loose == 0:
+            self.tell("records follow after the end of the file")
+        self._chain.add(topic, times, data)
+
+    def link(self, content: Mapping[str, Any]) -> None:
+        """A link was met."""
+        chain = self._chain
+        if chain is None:
+            self._early += 1
+            return
+        try:
+            found = Link.of(content)
+        except LogError as error:
+            self.tell(str(error))
+            return
+        if self.end or self.is_mended:
+            self.tell("records follow after the end of the file")
+        ours, missing = chain.next_link(found.end), found.count - chain.count
+        if missing:
+            what = f"{missing} records are missing" if missing > 0 else f"{-missing} records are too many"
+            self.tell(f"{what} before record {found.count}")
+        elif found.digest != ours.digest:
+            self.tell(f"of records {chain.count - chain.loose + 1} to {chain.count} some are not as they were written")
+        elif self._key is not None and self.keyed:
+            if hmac.compare_digest(found.code, ours.code):
+                self.codes_checked += 1
+            else:
+                self.tell(f"the code of the link after record {found.count} is not of this key")
+        chain.go_on(found)
+        self.end = found.end
+
+    def mend(self) -> None:
+        """The mark of a mended file was met."""
+        self.is_mended = True
+
+    def close(self, is_closed: bool) -> None:
+        """The file's records are at their end.
+
+        Args:
+            is_closed: whether the file was completed; if not, its writer was killed, or its end was cut off.
+        """
+        if self._chain is not None and is_closed and not self.end and not self.is_mended:
+            self.tell("its end was cut off and the file closed again")
+
+    def tell(self, text: str) -> None:
+        """Something does not fit."""
+        self.broken += 1
+        if len(self.breaks) < MOST_BREAKS:
+            self.breaks.append(text)

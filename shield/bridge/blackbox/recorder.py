@@ -1,0 +1,291 @@
+"""`McapWriter`: the black box, a sink of ticks that keeps every one of them on disk, in one MCAP file."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from ...exceptions import BridgeError
+from ..messages import Action, Tick
+from . import foxglove as fg
+from .disk import AsyncWriter, Disk, explain
+from .format import plain, tick_to_json
+from .hash_chain import ENDS, Chain, Link
+from .header import LogHeader
+from .records import HEADER, LINK, TICK, Schema
+
+LOG = logging.getLogger(__name__)
+
+TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC, MENDED_TOPIC = "/tick", "/header", "/log", "/link", "/mended"
+SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
+SCENE_EVERY_S, FIX_EVERY_S, FIELD_EVERY_S = 0.2, 1.0, 10.0
+CHUNK_BYTES = 1 << 20
+"""A chunk is closed at every flush; this only bounds one."""
+
+
+class McapFile:
+    """Writes a log; used by one thread.
+
+    Args:
+        disk: the file.
+        header: first message; on the disk when this returns.
+        key: of the codes in the chain's links; None: without.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+
+    def __init__(self, disk: Disk, header: LogHeader, key: bytes | None = None) -> None:
+        self._disk, self._header = disk, header
+        self._chain = Chain(header.chain, key)
+        self._writer = Writer(disk, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._writer.start(profile="", library="steerclear")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
+        self._last_ns = header.unix_ns
+        self._due_s = {SCENE_TOPIC: -1e18, FIX_TOPIC: -1e18, FIELD_TOPIC: -1e18}
+        self._undrawn = False
+        self._told = 0
+        self.dropped: Callable[[], int] = lambda: 0
+        self._active: dict[tuple[str, str, str], Action] = {}
+        self._add(HEADER_TOPIC, HEADER, header.to_message(), header.unix_ns)
+        self.flush()
+
+    def keep(self, item: Tick | tuple[int, str, str]) -> None:
+        """Write a tick, and what shows it in a viewer, or a line of the log."""
+        if not isinstance(item, Tick):
+            self.add_line(*item)
+            return
+        tick = item
+        time_ns = self._header.time_ns(tick.began_s)
+        self._add(TICK_TOPIC, TICK, tick_to_json(tick, self._header.platforms), time_ns)
+        self._add_lines(tick, time_ns)
+        try:
+            self._draw(tick, time_ns)
+        except Exception as error:  # a picture is no reason to lose the record
+            self._tell_undrawn(error)
+        self._link(self._chain.next_link())
+
+    def add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
+        """Write a line of the log, at the time of the last message when none is given."""
+        at_ns = self._last_ns if time_ns is None else time_ns
+        self._add(LOG_TOPIC, fg.LOG, fg.log_message(at_ns, level, name, text), at_ns)
+
+    def flush(self) -> None:
+        """Bring everything to the disk, up to a link."""
+        self._tell_dropped()
+        if self._chain.loose:
+            self._link(self._chain.next_link())
+        self._writer.flush()
+        self._disk.sync()
+
+    def finish(self) -> None:
+        """Write the closing link and the index, close the file."""
+        self._tell_dropped()
+        self._link(self._chain.next_link(ENDS))
+        self._writer.finish()
+        self._disk.flush()
+        self._disk.sync()
+        self._disk.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        self._disk.close()
+
+    def _tell_dropped(self) -> None:
+        dropped = self.dropped()
+        if dropped > self._told:
+            text = f"the disk is too slow: {dropped - self._told} ticks before this are missing, {dropped} in all"
+            self.add_line(fg.ERROR, "black box", text)
+            self._told = dropped
+
+    def _add_lines(self, tick: Tick, time_ns: int) -> None:
+        """Actions that begin and end, what autopilots said, what links refused."""
+        now = {(action.subject, action.condition, action.response): action for action in tick.actions}
+        for key, action in now.items():
+            if key not in self._active:
+                self.add_line(fg.WARNING, action.subject, f"{action.condition}: {action.text}", time_ns)
+        for key, action in self._active.items():
+            if key not in now:
+                self.add_line(fg.INFO, action.subject, f"{action.condition}: {action.response} is over", time_ns)
+        self._active = now
+        for reading in tick.readings.values():
+            for text in reading.texts:
+                self.add_line(fg.INFO, reading.boat, text, time_ns)
+            for kind, count in reading.faults.items():
+                self.add_line(fg.WARNING, reading.boat, f"refused: {kind} ({count})", time_ns)
+
+    def _draw(self, tick: Tick, time_ns: int) -> None:
+        if self._due(SCENE_TOPIC, tick.began_s, SCENE_EVERY_S):
+            scene = fg.scene_of(tick, time_ns, self._header.config.separation_m)
+            if scene is not None:
+                self._add(SCENE_TOPIC, fg.SCENE_UPDATE, scene, time_ns)
+        if self._due(FIELD_TOPIC, tick.began_s, FIELD_EVERY_S):
+            self._add(FIELD_TOPIC, fg.SCENE_UPDATE, fg.field_of(self._header, tick.surroundings, time_ns), time_ns)
+        if self._due(FIX_TOPIC, tick.began_s, FIX_EVERY_S):
+            for name, fix in fg.fixes_of(tick, self._header, time_ns).items():
+                self._add(FIX_TOPIC + name, fg.LOCATION_FIX, fix, time_ns)
+
+    def _tell_undrawn(self, error: Exception) -> None:
+        """Once, since it may happen at every tick."""
+        if not self._undrawn:
+            LOG.warning("drawing in the log failed", exc_info=error)
+            self.add_line(
+                fg.WARNING, "black box", f"drawing failed ({type(error).__name__}: {error}); the ticks are whole"
+            )
+        self._undrawn = True
+
+    def _due(self, topic: str, now_s: float, every_s: float) -> bool:
+        """Whether it is time for a topic again; times are kept in step so that ticks a little early count."""
+        due = now_s >= self._due_s[topic] - 0.01
+        if due:
+            self._due_s[topic] = now_s + every_s
+        return due
+
+    def _add(self, topic: str, schema: Schema, message: dict[str, Any], time_ns: int) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._open(topic, schema)
+        self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
+        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=plain).encode()
+        self._counts[topic] += 1
+        if topic != LINK_TOPIC:
+            self._chain.add(topic, (self._last_ns, self._last_ns, self._counts[topic]), data)
+        self._writer.add_message(channel, self._last_ns, data, self._last_ns, self._counts[topic])
+
+    def _link(self, link: Link) -> None:
+        self._add(LINK_TOPIC, LINK, vars(link), self._last_ns)
+        self._chain.go_on(link)
+
+    def _open(self, topic: str, schema: Schema) -> int:
+        title = schema["title"]
+        if title not in self._schemas:
+            text = json.dumps(schema, separators=(",", ":")).encode()
+            self._schemas[title] = self._writer.register_schema(title, "jsonschema", text)
+        self._counts[topic] = 0
+        self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[title])
+        return self._channels[topic]
+
+
+class McapWriter:
+    """Keeps ticks in an MCAP file, at most ``flush_s`` and the disk's own delay behind.
+
+    The header is on the disk when this returns. A log proves the shield's decisions from the first tick that was
+    decided by a fresh shield or after `Shield.reset` (``Tick.shield_reset``), so begin it with the first decision.
+
+    Args:
+        path: of the new file, ``.mcap``.
+        header: what the shield was built with.
+        flush_s: longest time between flushes to the disk, s.
+        capacity: ticks that may wait for the disk; more are dropped and counted.
+        give_up_s: when the disk has taken nothing for so long, s, `take` raises.
+        open_disk: makes a file.
+        key: 32 bytes of those who may write this log: its chain then carries codes; None: without.
+
+    Raises:
+        BridgeError: the file cannot be made, or not even the header fits on the disk.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        header: LogHeader,
+        *,
+        flush_s: float = 0.5,
+        capacity: int = 300,
+        give_up_s: float = 10.0,
+        open_disk: Callable[[Path], Disk] = Disk,
+        key: bytes | None = None,
+    ) -> None:
+        self.path = path
+        self.header = replace(header, chain=replace(header.chain, count=0, keyed=key is not None))
+        disk = open_disk(path)
+        try:
+            file = McapFile(disk, self.header, key)
+        except OSError as error:
+            disk.close()
+            raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
+        self._writer: AsyncWriter[Tick | tuple[int, str, str]] = AsyncWriter(
+            path.name, file, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s
+        )
+        file.dropped = lambda: self._writer.dropped
+
+    def take(self, tick: Tick) -> None:
+        """Keep a tick; never waits. Its arrays may be changed afterwards, its mappings may not.
+
+        Raises:
+            BridgeError: ticks can no longer be kept; the text says why and what to do.
+        """
+        self._writer.put(_snapshot(tick))
+
+    def note(self, text: str, *, name: str = "steerclear", warning: bool = False) -> None:
+        """Keep a line of text at the time of the last tick.
+
+        Raises:
+            BridgeError: as `take`.
+        """
+        self._writer.put((fg.WARNING if warning else fg.INFO, name, text))
+
+    def close(self) -> None:
+        """Write what waits and the index; what went wrong is in ``fault``."""
+        self._writer.close()
+
+    @property
+    def fault(self) -> str:
+        """Why nothing is written any more; empty while all is well."""
+        return self._writer.fault
+
+    @property
+    def dropped(self) -> int:
+        """Ticks that were dropped because the disk was too slow."""
+        return self._writer.dropped
+
+    @property
+    def behind_s(self) -> float:
+        """How far the disk is behind, s."""
+        return self._writer.behind_s
+
+    @property
+    def waiting(self) -> int:
+        """Ticks not yet written."""
+        return self._writer.waiting
+
+
+def log_path(folder: Path, ending: str, unix_s: float | None = None, name: str = "steerclear") -> Path:
+    """A path for a new log, named after the time, UTC, and this process, so that two that start together do not clash.
+
+    Args:
+        folder: the log folder.
+        ending: such as ".mcap" or ".tlog".
+        unix_s: time, s since 1970; None: now.
+        name: first part of the name.
+    """
+    moment = time.gmtime(time.time() if unix_s is None else unix_s)
+    return folder / f"{name}_{time.strftime('%Y%m%dT%H%M%SZ', moment)}_{os.getpid()}{ending}"
+
+
+def _snapshot(tick: Tick) -> Tick:
+    """The tick with its own copies of arrays that the loop may use again."""
+    if tick.fleet is None:
+        return tick
+    fleet, wanted, decisions = _copied(tick.fleet), tick.wanted, tick.decisions
+    wanted = None if wanted is None else _copied(wanted)
+    if decisions is not None and wanted is not None:
+        sent = wanted if decisions.sent is tick.wanted else _copied(decisions.sent)
+        decisions = replace(_copied(decisions), fleet=fleet, wanted=wanted, sent=sent)
+    return replace(tick, fleet=fleet, wanted=wanted, decisions=None if wanted is None else decisions)
+
+
+def _copied(entry: Any) -> Any:
+    """A frozen dataclass with copies of its arrays."""
+    return replace(entry, **{n: value.copy() for n, value in vars(entry).items() if isinstance(value, np.ndarray)})
