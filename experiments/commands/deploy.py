@@ -15,9 +15,9 @@ from steerclear import policies
 from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.exceptions import ConfigError
 
 from ..boats.demo import demo_fleet, demo_text

@@ -7,21 +7,20 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from steerclear.shield.bridge.blackbox import check_disk
-from steerclear.shield.bridge.control_loop import ControlLoop
-from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
+from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
+from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.control_loop import Parts
 from steerclear.shield.bridge.preflight.drill import Drill
 from steerclear.shield.bridge.preflight.link_checks import link_checks
 from steerclear.shield.bridge.preflight.missed import Missed
 from steerclear.shield.bridge.preflight.response import drill_checks
 from steerclear.shield.bridge.preflight.result import Check
-from steerclear.shield.bridge.tracker import Tracker
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.situation import SITUATION, check_situation
-from steerclear.shield.bridge.messages import TickSink
+from steerclear.shield.bridge.tracker import Tracker
 
 from .grounds import grounds_of
 from .preflight_file import check_drill

@@ -26,5 +26,4 @@ DEPLOY = {
     "figures.read_to_sent_p99_s": "the same, 99 of 100, s",
     "figures.read_to_sent_max_s": "the same, the worst, s",
     "figures.decide_p99_s": "the shield's decision alone, 99 of 100, s",
-    "figures.delay_*_s": "measured delay from command to effect of each boat, s; where enough was seen",
 }

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from types import TracebackType
 
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.bridge.feed import FeedReceiver
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.fleet_settings import LinkSettings
 from steerclear.shield.bridge.links import key_of, signing_of
-from steerclear.shield.bridge.messages import contact_of
-from steerclear.shield.bridge.mavlink.endpoint import Endpoint
-from steerclear.shield.bridge.mavlink.link import MavlinkLink
+from steerclear.shield.bridge.mavlink.connection import Endpoint
+from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
+from steerclear.shield.bridge.messages import Contact, contact_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
 

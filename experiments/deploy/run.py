@@ -7,18 +7,16 @@ from collections.abc import Sequence
 
 from steerclear.policies.registry import SB3_PREFIX
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts, Timing
 from steerclear.shield.bridge.feed import FeedSender
+from steerclear.shield.bridge.feed_sender import PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.links import key_of
-from steerclear.shield.bridge.control_loop import ControlLoop
+from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.moos.links import MoosNominal
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.control_loop import Parts
-from steerclear.shield.bridge.feed_sender import PositionPublisher
 from steerclear.shield.bridge.session import VehicleSession
-from steerclear.shield.bridge.messages import TickSink
-from steerclear.shield.bridge.control_loop import Timing
 
 from .boxes import open_box
 from .checks import checks_of, drilled_check
@@ -109,7 +107,6 @@ def _run(
         outcome.near = loop.near
         outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
         outcome.figures |= {f"margin_{name}_m": margin for name, margin in loop.model_error.margin_m.items()}
-        outcome.figures |= {f"delay_{name}_s": delay for name, delay in loop.delays.measured_s().items()}
 
 
 def _policy(fleet: FleetFile, orders: Orders, clock: Clock, boats: tuple[str, ...]) -> PolicyProcess | MoosNominal:

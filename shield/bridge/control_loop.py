@@ -19,7 +19,22 @@ from .clock import Clock
 from .command_pipeline import CommandPipeline, Steered
 from .failsafe import Failsafe, Seen, Verdict, at_rest, nearing
 from .fleet_file import FleetFile
-from .messages import Action, Alarm, Alarming, BoatReading, Contact, ContactSource, GameSource, GameState, Link, Snapshot, Tick, TickSink, WantedSource, contact_of
+from .messages import (
+    Action,
+    Alarm,
+    Alarming,
+    BoatReading,
+    Contact,
+    ContactSource,
+    GameSource,
+    GameState,
+    Link,
+    Snapshot,
+    Tick,
+    TickSink,
+    WantedSource,
+    contact_of,
+)
 from .model_error import ModelErrorMonitor
 from .operator import Operator
 from .static_obstacles import StaticObstacles

@@ -251,3 +251,10 @@ def response_table(limits: Limits | None = None, end: End | None = None) -> list
         return "".join(parts)
 
     return [tuple(map(filled, row[1:6])) for row in CONDITIONS.values()]
+
+
+def response_page() -> str:
+    """The table in Markdown, as docs/boats.md shows it."""
+    head = ("What happens", "How it is seen", "Within", "What is done", "How control returns")
+    rows = [head, ("---",) * len(head), *response_table()]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)

@@ -18,8 +18,8 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
 
+from ..compat import Self
 from ..exceptions import BridgeError, ConfigError, FeedError
 from .clock import Clock
 from .feed_packets import MAX_BYTES, SEAL_BYTES, Fix, Packet, Seal, game_state, is_sealed, parse_packet

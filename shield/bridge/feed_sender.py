@@ -8,8 +8,8 @@ import random
 import socket
 from collections.abc import Iterable, Sequence
 from types import TracebackType
-from typing import Self
 
+from ..compat import Self
 from ..exceptions import ConfigError, FeedError
 from .feed_packets import Fix, Packet, Seal
 from .frame import FieldFrame

@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from .clock import Clock
-from .messages import ContactSource
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
-from .messages import Link
-from .mavlink.endpoint import Endpoint, OnBytes
-from .mavlink.link import MavlinkLink
+from .mavlink.connection import Endpoint, OnBytes
 from .mavlink.signing import Signing, read_key
+from .mavlink.vehicle import MavlinkLink
+from .messages import ContactSource, Link
 from .moos.links import MoosLinks
 
 

@@ -11,12 +11,11 @@ from types import TracebackType
 from ..compat import Self
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
-from .messages import Contact, ContactSource, heard_from
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
 from .links import LINK_MAKERS, BoatLink, LinkMaker, key_of
-from .messages import contact_of
+from .messages import Contact, ContactSource, contact_of
 
 LOG = logging.getLogger(__name__)
 
@@ -102,7 +101,7 @@ class VehicleSession:
         """Boats heard of by these sources and by links that are only listened to."""
         error = self.fleet.shield_config.position_error_m
         told = [contact_of(link.read(), error) for link in self.ears.values()]
-        heard = [contact for source in self.sources() for contact in heard_from(source)]
+        heard = [contact for source in self.sources() for contact in source.read()]
         return (*heard, *(contact for contact in told if contact is not None))
 
     def close(self) -> None:

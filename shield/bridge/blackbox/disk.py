@@ -23,6 +23,9 @@ LOG = logging.getLogger(__name__)
 
 LATE_S, TALK_EVERY_S = 1.0, 30.0
 """A disk that is so much behind is told, s, and again after the other."""
+PAUSE_S = 0.5
+"""Of the time between two things handed over no more than this counts against the disk, s: whoever hands them over
+stood still for the rest (a suspended process, say), and the thread may have, too."""
 BYTES_PER_BOAT_S = 6_000.0
 """Generous size of the log per boat and second at 10 Hz: MCAP and tlog together."""
 SLOWEST_SYNC_S = 0.5
@@ -161,7 +164,8 @@ class AsyncWriter(Generic[Item]):
         self._oldest_s: float | None = None
         self._told_s = -TALK_EVERY_S
         self._closing = threading.Event()
-        self._progress_s = time.monotonic()
+        self._handed = (0.0, time.monotonic())  # time that counts, and when it was so; one tuple for both threads
+        self._progress_s = self._clock()
         self._thread = threading.Thread(target=self._run, name=f"log {name}", daemon=True)
         self._thread.start()
 
@@ -173,11 +177,13 @@ class AsyncWriter(Generic[Item]):
         """
         if self.fault or self._closing.is_set():
             raise BridgeError(self.fault or f"the log {self.name} is closed; open another one")
+        active_s = self._clock()
+        self._handed = (active_s, time.monotonic())
         try:
-            self._queue.put_nowait((time.monotonic(), item))
+            self._queue.put_nowait((active_s, item))
         except queue.Full:
             self._drop()
-        stuck_s = time.monotonic() - self._progress_s
+        stuck_s = active_s - self._progress_s
         if stuck_s > self._give_up_s and self._queue.qsize() > 1:
             raise BridgeError(
                 f"the log {self.name}: the disk has taken nothing for {stuck_s:.0f} s; check it or set log_dir to "
@@ -203,7 +209,12 @@ class AsyncWriter(Generic[Item]):
     def behind_s(self) -> float:
         """Age of the oldest thing that is not on the disk, s, as far as the thread has taken it; 0 when all is."""
         oldest_s = self._oldest_s
-        return 0.0 if oldest_s is None else time.monotonic() - oldest_s
+        return 0.0 if oldest_s is None else self._clock() - oldest_s
+
+    def _clock(self) -> float:
+        """Time in which things were handed over, s: see `PAUSE_S`."""
+        active_s, handed_s = self._handed
+        return active_s + min(time.monotonic() - handed_s, PAUSE_S)
 
     def _drop(self) -> None:
         if self.dropped == 0:
@@ -229,18 +240,18 @@ class AsyncWriter(Generic[Item]):
             if taken is not None:
                 self._oldest_s = taken[0] if self._oldest_s is None else self._oldest_s
                 self._store.keep(taken[1])
-            self._progress_s = time.monotonic()
-            if self._progress_s >= due_s:
+            self._progress_s = self._clock()
+            if time.monotonic() >= due_s:
                 self._flush()
-                due_s = self._progress_s + self._flush_s
+                due_s = time.monotonic() + self._flush_s
 
     def _flush(self) -> None:
         if self._oldest_s is not None:
             self._store.flush()
-        self._progress_s, behind_s = time.monotonic(), self.behind_s
+        self._progress_s, behind_s = self._clock(), self.behind_s
         self._oldest_s = None
-        if behind_s > LATE_S and self._progress_s - self._told_s > TALK_EVERY_S:
-            self._told_s = self._progress_s
+        if behind_s > LATE_S and time.monotonic() - self._told_s > TALK_EVERY_S:
+            self._told_s = time.monotonic()
             LOG.warning("the log %s was %.1f s behind: the disk is slow", self.name, behind_s)
 
     def _next(self, wait_s: float) -> tuple[float, Item] | None:
@@ -300,9 +311,8 @@ class TlogWriter:
         self, path: Path, *, flush_s: float = 0.5, capacity: int = 20_000, open_disk: Callable[[Path], Disk] = Disk
     ) -> None:
         self.path = path
-        self._spool: AsyncWriter[tuple[str, bytes, int]] = AsyncWriter(
-            path.name, self._file, capacity=capacity, flush_s=flush_s
-        )
+        file = _TlogFile(open_disk(path))
+        self._spool = AsyncWriter(path.name, file, capacity=capacity, flush_s=flush_s)
 
     def on_bytes(self, direction: str, raw: bytes, unix_us: int) -> None:
         """Take a whole frame as it came or went; never waits, never raises.

@@ -14,8 +14,9 @@ import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
+from ...compat import Self
 from ...exceptions import LogError
 
 ENDS = "log"

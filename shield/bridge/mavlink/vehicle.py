@@ -7,10 +7,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import FieldFrame

@@ -7,8 +7,8 @@ import math
 import threading
 from collections.abc import Collection, Mapping
 
-from ..messages import Alarm, Contact
 from ..frame import FieldFrame
+from ..messages import Alarm, Contact
 
 LONGEST_CHARACTERS = 1 << 16
 MOST_CONTACTS = 256

@@ -13,8 +13,7 @@ from ..clock import Clock
 from ..fleet_checks import MOOS, address_of
 from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
-from ..messages import Link
-from ..messages import Answer, Snapshot
+from ..messages import Answer, Link, Snapshot
 from .contacts import MoosContacts
 from .helm_gate import Gate, HelmGate
 from .pid_gate import PidGate

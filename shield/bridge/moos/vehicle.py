@@ -1,4 +1,4 @@
-"""`MoosLink`: one boat that runs MOOS-IvP, by the contract of `bridge.link`."""
+"""`MoosLink`: one boat that runs MOOS-IvP, by the contract of `messages.Link`."""
 
 from __future__ import annotations
 

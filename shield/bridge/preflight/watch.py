@@ -17,7 +17,7 @@ class Watched(Protocol):
     """A link as checks see it."""
 
     def read(self) -> BoatReading:
-        """See `bridge.link.Link`."""
+        """See `messages.Link`."""
 
     def learn(self, timeout_s: float) -> None:
         """Ask for what is not known yet."""

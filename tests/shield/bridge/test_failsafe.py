@@ -1,6 +1,7 @@
 """Every limit of the file, just kept and just broken, and what is declared for it."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from bridge_fakes import fleet_of
 from steerclear.shield import Commands
 from steerclear.shield.bridge.failsafe import Failsafe, Seen, words
-from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_table
+from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_page, response_table
 from steerclear.shield.bridge.messages import Answer, BoatReading
 from steerclear.shield.bridge.operator import Override
 from steerclear.shield.bridge.tracker import Track, Tracker
@@ -210,6 +211,11 @@ def test_the_table_names_only_settings_that_there_are_and_only_what_can_be_overr
     assert all("`" not in cell.replace("(`", "").replace("`)", "") for row in rows for cell in row)
     assert any("0.5 s (`navigation.max_age_s`)" in row[2] for row in rows)
     assert set(DISABLES) == {"commander", "contact", "game", "geofence", "log", "model", "policy"}
+
+
+def test_the_page_shows_the_table_that_the_loop_acts_by():
+    page = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    assert f"<!-- responses -->\n{response_page()}\n<!-- /responses -->" in page
 
 
 def test_ages_in_words():

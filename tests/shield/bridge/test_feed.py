@@ -12,7 +12,18 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
-from steerclear.shield.bridge.feed import BoatStatus, Budget, FeedReceiver, FeedSender, Fix, FlagStatus, GameState, Packet, game_state, parse_packet
+from steerclear.shield.bridge.feed import (
+    BoatStatus,
+    Budget,
+    FeedReceiver,
+    FeedSender,
+    Fix,
+    FlagStatus,
+    GameState,
+    Packet,
+    game_state,
+    parse_packet,
+)
 from steerclear.shield.bridge.feed_packets import MAX_BYTES
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.exceptions import BridgeError, ConfigError, FeedError

@@ -2,7 +2,16 @@
 
 import pytest
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.feed import GONE_S, MAX_SENDERS, MOST_AHEAD, REFEREE_GONE_S, FeedReceiver, FlagStatus, GameState, Packet
+from steerclear.shield.bridge.feed import (
+    GONE_S,
+    MAX_SENDERS,
+    MOST_AHEAD,
+    REFEREE_GONE_S,
+    FeedReceiver,
+    FlagStatus,
+    GameState,
+    Packet,
+)
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.signing import TICKS_PER_S, SigningClock
 

@@ -5,12 +5,12 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from steerclear.shield.bridge.contact_fusion import ContactFusion
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.moos.contacts import MoosContacts, parse_report
 from steerclear.shield.bridge.moos.nav import STILL_S, Navigation
 from steerclear.shield.bridge.moos.wire import Message
-from steerclear.shield.bridge.contact_fusion import ContactFusion
 
 FRAME = FieldFrame(42.0, -71.0)
 REPORT = "NAME=red_1,X=10.5,Y=-3,SPD=1.5,HDG=90,TYPE=HERON,MODE=DRIVE,TIME={time},LENGTH=4"
@@ -152,7 +152,7 @@ def test_a_boat_that_is_not_in_the_file_raises_an_alarm_while_it_reports():
 
 
 def test_a_contact_that_stands_still_while_its_speed_says_otherwise_is_old_whatever_its_time_says():
-    heard, sightings = contacts(), ContactFusion(2.0, ContactLimit())
+    heard, sightings = contacts(), ContactFusion(2.0, ContactLimit().max_age_s, ContactLimit().lost_after_s)
     ages = []
     for k in range(20):  # 2 Hz, fresh stamps, frozen X and Y, 1.5 m/s
         now = 0.5 * k
