@@ -20,7 +20,7 @@ from ..platforms import layout as L
 from ..shield import Shield
 from ..surroundings import Surroundings
 from .clock import Clock
-from .failsafe import Responder, Verdict, outside_of
+from .failsafe import Responder, Verdict
 from .fleet_file import FleetFile
 from .frame import TWO_PI
 from .messages import Action, Link, Sent
@@ -121,10 +121,10 @@ class CommandPipeline:
     def _send(self, name: str, decisions: Decisions, actions: list[Action]) -> Sent:
         fleet = decisions.fleet
         i = fleet.names.index(name)
-        if decisions.reason[i] == STOPPED:
-            outside_m = outside_of(self._file.geofence.box, *fleet.state[i, [L.X, L.Y]])
+        if decisions.reason[i] == Reason.STOPPED:
+            outside_m, beyond_m = float(decisions.outside_m[i]), self._file.shield_config.beyond_m
             what, text = "obstacle", f"{name} can only stop before an obstacle: stopped by its link"
-            if outside_m > 0.0:
+            if beyond_m is not None and outside_m > beyond_m:
                 what = "hard_line"
                 text = f"{name} is {outside_m:.1f} m outside, beyond the hard line: stopped by its link, handed over"
             actions.append(Action(name, what, "stop", text))
@@ -156,7 +156,3 @@ class CommandPipeline:
             elif name not in sent:
                 sent[name] = self._links[name].stop()
         return replace(steered, sent=sent)
-
-
-STOPPED = int(Reason.__members__.get("STOPPED", -1))
-"""The shield asks for the link's own stop."""

@@ -258,7 +258,7 @@ class Limits(Section):
     geofence: FenceLimit = FenceLimit()
     log: LogLimit = LogLimit()
     model: ModelLimit = ModelLimit()
-    after_failsafe: Literal["wait", "retake"] = Field("wait", description="give wait or retake")
+    after_failsafe: Annotated[Literal["wait", "retake"], Field(description="give wait or retake")] = "wait"
 
 
 class End(Section):

@@ -251,6 +251,7 @@ def tick_from_json(message: Any, platforms: Mapping[str, Platform]) -> Tick:
 
 def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
     rows, fleet, decisions = record.boats, None, None
+    around = _surroundings_of(record.surroundings[0]) if record.surroundings else None
     if record.has_fleet:
         fleet = Fleet(
             state=_table(rows, "state", L.N_STATE),
@@ -274,19 +275,19 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
             intervened=np.array([row.intervened is True for row in rows], dtype=np.bool_),
             cut_short=_column(rows, "cut_short", np.bool_),
             solve_time_s=record.solve_time_s,
+            area=None if around is None else around.field,
             **{name: np.array([]) if column is None else column for name, column in columns.items()},
         )
-    readings = {row.boat: _of(BoatReading, row) for row in record.readings}
     return Tick(
         number=record.number,
         due_s=record.due_s,
         began_s=record.began_s,
         sent_s=record.sent_s,
-        readings=readings,
+        readings={row.boat: _of(BoatReading, row) for row in record.readings},
         contacts=tuple(_of(Contact, row) for row in record.contacts),
         fleet=fleet,
         wanted=wanted,
-        surroundings=_surroundings_of(record.surroundings[0]) if record.surroundings else None,
+        surroundings=around,
         decisions=decisions,
         shield_reset=record.shield_reset,
         sent={row.boat: _of(Sent, row) for row in record.sent},

@@ -5,9 +5,12 @@ import time
 
 import numpy as np
 import pytest
-from bridge_fakes import World, fleet_of, pair, straight
+from bridge_fakes import World, fleet_of, fleet_text, pair, straight
+from steerclear.shield import Surroundings
+from steerclear.shield.bridge.fleet_file import parse_fleet
 
 NORTH = 0.0
+GEOFENCE = "geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}"
 
 
 def test_a_full_disk_is_answered_as_declared_until_it_is_not():
@@ -138,3 +141,35 @@ def test_a_wall_clock_that_steps_by_an_hour_changes_nothing(monkeypatch):
     for before, after in zip(plain.sink.ticks, stepped.sink.ticks, strict=True):
         np.testing.assert_array_equal(before.decisions.sent.values, after.decisions.sent.values)
         assert before.actions == after.actions
+
+
+LINES = "geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60, beyond_m: 5.0, then: stop}"
+
+
+def test_a_boat_beyond_its_hard_line_is_stopped_by_its_link_at_once_and_handed_over_until_it_is_taken_back():
+    fleet = parse_fleet(fleet_text(blue=1, red=0).replace(GEOFENCE, LINES))
+    world = World(fleet, [(40.0, 64.0, 0.0, 0.0)], straight(NORTH)).run(0.5)
+    link = world.links["blue_1"]
+    assert link.stops == 0, "within the hard line it is steered"
+    assert any("4.0 m outside the geofence" in a.text for a in world.last.actions)
+    link.row[1], link._past = 66.0, []
+    world.run(3.5)
+    assert link.stops > 0
+    first = next(tick for tick in world.sink.ticks if any(a.condition == "hard_line" for a in tick.actions))
+    assert "beyond the hard line: stopped by its link, handed over" in first.actions[-1].text
+    stops, sent = link.stops, len(link.sent)
+    link.row[1] = 50.0  # somebody tows it in: it lies there until it is taken back
+    world.run(3.0)
+    assert (link.stops, len(link.sent)) == (stops + 30, sent)
+    assert any("take it back" in a.text for a in world.last.actions)
+    world.operator.take_back("blue_1")
+    world.run(0.5)
+    assert len(link.sent) > sent
+
+
+def test_a_boat_that_can_only_stop_before_a_shore_is_stopped_by_its_link_and_goes_on_by_itself():
+    shore = Surroundings(polygons=[((-30.0, 20.0), (110.0, 20.0), (110.0, 30.0), (-30.0, 30.0))])
+    fleet = parse_fleet(fleet_text(blue=1, red=0).replace(GEOFENCE, LINES))
+    world = World(fleet, [(40.0, 5.0, 0.0, 2.0)], straight(NORTH), grounds=shore).run(25.0)
+    assert world.links["blue_1"].row[1] < 20.0
+    assert not world.loop.failsafe.handed_over

@@ -104,6 +104,8 @@ def ticks(draw):
         "blue_1", draw(floats), (draw(floats), draw(floats)), heading_rad=draw(floats), texts=(draw(words),),
         faults={"signature": draw(st.integers(0, 9))}, mode=draw(words),
     )  # fmt: skip
+    around = draw(st.sampled_from([None, fixed, Surroundings()]))
+    decisions = None if wanted is None else draw(st.none() | decided(fleet, wanted))
     return Tick(
         number=draw(st.integers(0, 10**9)),
         due_s=draw(floats),
@@ -113,8 +115,8 @@ def ticks(draw):
         contacts=(Contact("red_1", (draw(floats), 0.0), draw(floats), 1.0, 2.0, 0.3, draw(words)),),
         fleet=fleet,
         wanted=wanted,
-        surroundings=draw(st.sampled_from([None, fixed, Surroundings()])),
-        decisions=None if wanted is None else draw(st.none() | decided(fleet, wanted)),
+        surroundings=around,
+        decisions=None if decisions is None else dataclasses.replace(decisions, area=around and around.field),
         shield_reset=draw(st.booleans()),
         sent={"blue_1": Sent("blue_1", 1.0, draw(floats), draw(floats), "attitude", draw(st.booleans()))},
         policy_age_s=draw(floats),
