@@ -35,7 +35,7 @@ def read_obstacles(fleet: FleetSettings, folder: Path) -> tuple[Obstacle, ...]:
             found.append(obstacle)
             continue
         lines = _geojson_lines(folder / obstacle.geojson, f"obstacles.{number}.geojson")
-        found += [Obstacle(name=obstacle.name, polygon_deg=line) for line in lines]
+        found += [obstacle.model_copy(update={"geojson": None, "polygon_deg": line}) for line in lines]
     return tuple(found)
 
 
