@@ -15,7 +15,7 @@ DEPLOY = {
     "figures.decided": "of those, with a decision",
     "figures.changed_share": "share of own boats' commands that the shield changed, 0 to 1",
     "figures.best_effort_commands": "own boats' commands for which no manoeuvre kept the margin",
-    "figures.ticks_with_actions": "turns with a declared response, an override or STOP ALL",
+    "figures.ticks_with_actions": "turns in which a declared response, an override or STOP ALL did something",
     "figures.closest_m": "closest approach of an own boat to any other, as believed, m",
     "figures.least_certificate_m": "smallest certificate of an own boat, m",
     "figures.missed_turns": "turns left out because the loop was late",

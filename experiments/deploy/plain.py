@@ -25,7 +25,8 @@ MOST_LINES = 10_000
 class PlainLines:
     """A sink that says how it went since the last line, every few seconds, from a thread of its own.
 
-    What is declared of a boat is said once, and again when its response changes or it comes back.
+    What is declared of a boat is said once, and again when its response changes or it comes back; of one outside the
+    geofence every time, since how far matters.
 
     Args:
         say: takes a line.
@@ -62,7 +63,7 @@ class PlainLines:
             self._say(self._line(self._tick, since))
             new = {(action.subject, action.condition, action.response): action.text for action in self._tick.actions}
             for key, text in new.items():
-                if key not in self._told:
+                if key not in self._told or key[1] == "geofence":
                     self._say(f"  {text}")
             self._told = set(new)
 

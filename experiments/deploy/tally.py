@@ -29,7 +29,7 @@ class Tally:
     def take(self, tick: Tick) -> None:
         """Count one tick."""
         self._ticks += 1
-        self._responses += bool(tick.actions)
+        self._responses += any(action.response != "none" for action in tick.actions)
         decisions = tick.decisions
         if decisions is None or tick.fleet is None:
             return

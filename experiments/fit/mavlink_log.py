@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .runs import FitError, Run
-from .streams import Streams, Tell
+from .streams import Streams, Tell, untold
 
 EARTH_M = 6378137.0
 TLOG_NAMES = {
@@ -41,7 +41,7 @@ TOP_SPEED = ("WP_SPEED", "CRUISE_SPEED")
 FIX_3D = 3
 
 
-def read_tlog(path: Path, system_id: int | None, tell: Tell) -> list[Run]:
+def read_tlog(path: Path, system_id: int | None, tell: Tell = untold) -> list[Run]:
     """Read one boat of a telemetry log.
 
     Raises:
@@ -149,7 +149,7 @@ def place_m(origin: tuple[float, float], latitude_deg: float, longitude_deg: flo
     return math.radians(longitude_deg - origin[1]) * EARTH_M * math.cos(math.radians(origin[0])), north
 
 
-def read_bin(path: Path, tell: Tell) -> list[Run]:
+def read_bin(path: Path, tell: Tell = untold) -> list[Run]:
     """Read an ArduPilot log; of several GPS receivers the one that most often has a fix.
 
     Raises:

@@ -13,7 +13,7 @@ from steerclear.shield.bridge.blackbox import LogReader
 
 from .mavlink_log import read_bin, read_tlog
 from .runs import FitError, Run
-from .streams import Streams, Tell
+from .streams import Streams, Tell, untold
 
 LONGEST_RUN_S = 30.0
 """Longer runs are cut into pieces, so that some can be held out."""
@@ -49,7 +49,7 @@ def read_logs(
     paths: Sequence[Path],
     boat: str | None = None,
     system_id: int | None = None,
-    tell: Tell = lambda words: None,
+    tell: Tell = untold,
 ) -> list[Run]:
     """Read runs of all logs, long ones in pieces.
 
@@ -81,7 +81,7 @@ def read_logs(
     return pieces
 
 
-def read_csv(path: Path, tell: Tell) -> list[Run]:
+def read_csv(path: Path, tell: Tell = untold) -> list[Run]:
     """Read a CSV of steps, a row a time, columns known by their names.
 
     Raises:
@@ -117,7 +117,7 @@ def read_csv(path: Path, tell: Tell) -> list[Run]:
     return streams.runs({what: words for what, (words, _) in COLUMNS.items()}, sampled=True)
 
 
-def read_alog(path: Path, tell: Tell) -> list[Run]:
+def read_alog(path: Path, tell: Tell = untold) -> list[Run]:
     """Read MOOS-IvP's ``.alog``: a line a posting, ``time variable source value``.
 
     Raises:
@@ -138,7 +138,7 @@ def read_alog(path: Path, tell: Tell) -> list[Run]:
     return streams.runs({what: name for name, what in VARIABLES.items()}, HELM_HOLDS_S)
 
 
-def read_box(path: Path, boat: str | None, tell: Tell) -> list[Run]:
+def read_box(path: Path, boat: str | None, tell: Tell = untold) -> list[Run]:
     """Read one boat of a black box of ours; readings count from when they were true.
 
     Raises:

@@ -15,6 +15,11 @@ from .runs import SHORTEST_S, STEP_S, FitError, Run
 Tell = Callable[[str], None]
 """Is told in a sentence what of a log is left out, and why."""
 
+
+def untold(words: str) -> None:
+    """Nobody is told."""
+
+
 SPENT_S = 1.0
 """A command not repeated for this long is no longer in force, s; a run ends where nothing was seen for so long."""
 SET_BACK_S = 0.2

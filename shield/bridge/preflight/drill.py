@@ -26,7 +26,11 @@ EACH_S = AHEAD_S + TURN_S + STOP_S
 TURN_RAD = math.radians(60.0)
 TOP_SHARE = 0.6
 FASTEST_MPS = 1.5
-NEAR_M = 5.0
+COURSE_STEP_DEG = 15.0
+ENOUGH_M, EDGE_M = 20.0, 10.0
+"""Room beyond which others, and the geofence's edge, disturb no drill, m."""
+TURN_COST_M = 0.5
+"""A first turn that differs by a radian from a right angle counts as so much less room, m."""
 SAME_MPS, SAME_RAD = 0.05, math.radians(1.0)
 """Commands that differ by less are the same."""
 
@@ -79,7 +83,7 @@ class Drill:
         boat, into_s = self.turn_of(snapshot.taken_s)
         if boat:
             i = self._fleet.names.index(boat)
-            values[i] = self._wanted(boat, snapshot.seen[i], into_s)
+            values[i] = self._wanted(boat, snapshot.seen[i], np.delete(snapshot.seen, i, axis=0), into_s)
         self._commands = Commands.absolute_rad(values)
 
     def latest(self) -> Answer:
@@ -117,25 +121,48 @@ class Drill:
         turned = abs((decided[1] - heading + math.pi) % (2.0 * math.pi) - math.pi)
         return not (abs(decided[0] - speed) <= SAME_MPS and turned <= SAME_RAD)
 
-    def _wanted(self, boat: str, row: Array, into_s: float) -> tuple[float, float]:
+    def _wanted(self, boat: str, row: Array, others: Array, into_s: float) -> tuple[float, float]:
         """Speed m/s and heading rad; speed 0 for a boat nobody sees."""
         if not np.isfinite(row).all():
             return 0.0, 0.0
         if boat not in self._courses:
-            self._courses[boat] = self._courses_of(row)
+            self._courses[boat] = self._courses_of(boat, row, others)
         first, second = self._courses[boat]
-        speed = min(FASTEST_MPS, TOP_SHARE * self._fleet.platform_of[boat].max_speed_mps)
+        speed = self._speed_mps(boat)
         if into_s < AHEAD_S:
             return speed, first
         return (speed if into_s < AHEAD_S + TURN_S else 0.0), second
 
-    def _courses_of(self, row: Array) -> tuple[float, float]:
-        """Towards the middle of the geofence, then a turn to the side that stays nearer to it."""
+    def _speed_mps(self, boat: str) -> float:
+        return min(FASTEST_MPS, TOP_SHARE * self._fleet.platform_of[boat].max_speed_mps)
+
+    def _courses_of(self, boat: str, row: Array, others: Array) -> tuple[float, float]:
+        """Course and the course after the turn that lead farthest from other boats and from the geofence's edge.
+
+        Where several leave room enough, the one that begins with a right angle: a turn tells of the steering.
+        """
+        places = others[np.isfinite(others[:, :2]).all(axis=1), :2]
+        speed, best, most = self._speed_mps(boat), (0.0, 0.0), -math.inf
+        for first in np.radians(np.arange(0.0, 360.0, COURSE_STEP_DEG)):
+            for second in (first + TURN_RAD, first - TURN_RAD):
+                path = self._path(row, speed, first, second)
+                apart = np.hypot(*(path[:, None, :] - places[None, :, :]).transpose(2, 0, 1)).min(initial=ENOUGH_M)
+                turn = abs(math.remainder(first - math.radians(row[2]), 2.0 * math.pi))
+                room = (
+                    min(ENOUGH_M, float(apart)) + min(EDGE_M, self._inside_m(path)) - TURN_COST_M * abs(turn - TURN_RAD)
+                )
+                if room > most:
+                    best, most = (float(first % (2.0 * math.pi)), float(second % (2.0 * math.pi))), room
+        return best
+
+    def _path(self, row: Array, speed: float, first: float, second: float) -> Array:
+        """Places on the way, (k, 2) m, as straight legs."""
+        leg, at = np.arange(1.0, AHEAD_S + 1.0), row[:2]
+        one = at + speed * leg[:, None] * np.array([math.sin(first), math.cos(first)])
+        more = np.arange(1.0, TURN_S + STOP_S + 1.0)[:, None]
+        return np.vstack([at, one, one[-1] + speed * more * np.array([math.sin(second), math.cos(second)])])
+
+    def _inside_m(self, path: Array) -> float:
         xmin, ymin, xmax, ymax = self._fleet.geofence.box
-        east, north = 0.5 * (xmin + xmax) - row[0], 0.5 * (ymin + ymax) - row[1]
-        far = math.hypot(east, north) > NEAR_M
-        first = math.atan2(east, north) if far else math.radians(row[2])
-        east, north = east - FASTEST_MPS * AHEAD_S * math.sin(first), north - FASTEST_MPS * AHEAD_S * math.cos(first)
-        sides = (first + TURN_RAD, first - TURN_RAD)
-        second = max(sides, key=lambda side: east * math.sin(side) + north * math.cos(side))
-        return first % (2.0 * math.pi), second % (2.0 * math.pi)
+        x, y = path.T
+        return float(np.min([x - xmin, xmax - x, y - ymin, ymax - y]))

@@ -94,6 +94,10 @@ def check_rates(boat: str, readings: list[BoatReading], health: LinkHealth) -> C
     name = f"rates:{boat}"
     if health.missing:
         return CheckResult(name, False, f"{health.missing}; lower rate_hz or take a faster link", figures)
+    if readings and readings[-1].position_age_s > OLDEST_S >= readings[-1].heading_age_s:
+        why = health.fix_fault or f"GPS fix type {health.fix_type}"
+        text = f"the autopilot has no position yet ({why}); wait for GPS and its estimate, then run again"
+        return CheckResult(name, False, text, figures)
     if not figures["oldest_s"] <= OLDEST_S:
         text = (
             f"telemetry was {figures['oldest_s']:.2f} s old, more than {OLDEST_S:g} s; wait for GPS, or check the radio"

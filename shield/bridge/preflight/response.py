@@ -27,6 +27,8 @@ HEADING_DEG = 12.0
 SPEED_MPS = 0.35
 LONGEST_DELAY_STEPS = 8
 LONGEST_DELAY_S = 0.6
+SLOWER = 0.6
+"""A boat that turns at so much less than its model's rate is slow, not late, though the two look alike at first."""
 SAME_S = 0.005
 """Delays that are told apart by less are told as the same, s."""
 TURNED_DEG = 15.0
@@ -185,7 +187,8 @@ def _fault(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Pla
         return "it goes astern when told to go ahead; check the motors' direction"
     if away:
         return "it turns away from the heading it is told; check the steering's direction"
-    if not fit.heading_deg <= HEADING_DEG:
+    slow = delay_s > LONGEST_DELAY_S and fit.measured_dps < SLOWER * fit.foretold_dps
+    if slow or not fit.heading_deg <= HEADING_DEG:
         faster = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
         return (
             f"it turns {faster} than {platform.name} ({fit.measured_dps:.0f} against {fit.foretold_dps:.0f} deg/s, "

@@ -144,6 +144,13 @@ def test_a_run_is_counted(ticks):
     assert Tally().figures()["ticks"] == 0.0
 
 
+def test_turns_with_a_response_are_those_in_which_something_was_done(ticks):
+    tally = Tally()
+    for response in ("none", "none", "slow", "stop"):
+        tally.take(dataclasses.replace(ticks[0], actions=(Action("blue_1", "model", response, "off its model"),)))
+    assert tally.figures()["ticks_with_actions"] == 2.0
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_signals_end_a_run_in_order_and_a_second_one_at_once(name):
     operator, before = Operator(), signal.getsignal(getattr(signal, name))

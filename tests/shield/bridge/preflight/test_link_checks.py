@@ -273,3 +273,12 @@ def test_commanders(changes, words):
 def test_signing_is_said():
     assert check_commanders("blue_1", GOOD, 0.0).text.endswith("not signed")
     assert check_commanders("blue_1", replace(GOOD, signs=True, faults={"unsigned": 3, "replayed": 1}), 0.0).passed
+
+
+def test_an_autopilot_that_has_no_position_yet_is_not_told_as_old_telemetry():
+    booting = [replace(reading, position_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
+    result = check_rates("blue_1", booting, replace(GOOD, fix_type=1, fix_fault="GPS has no fix"))
+    assert not result.passed
+    assert "the autopilot has no position yet (GPS has no fix)" in result.text
+    late = [replace(reading, position_age_s=7.6, heading_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
+    assert "telemetry was 7.60 s old" in check_rates("blue_1", late, GOOD).text
