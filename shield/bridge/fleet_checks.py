@@ -6,7 +6,6 @@ import ipaddress
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 from ..config import ShieldConfig
@@ -107,8 +106,7 @@ def _hard_line(fleet: FleetSettings, settings: dict[str, Any]) -> None:
             raise FleetFileError(
                 f"shield.{key} is {settings[key]!r} and geofence.{name} {said!r}; leave shield.{key} out"
             )
-        if key in {field.name for field in fields(ShieldConfig)}:
-            settings.setdefault(key, said)
+        settings.setdefault(key, said)
 
 
 def address_of(text: str, key: str) -> tuple[str, int]:

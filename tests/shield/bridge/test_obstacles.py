@@ -117,3 +117,14 @@ def test_the_hard_line_of_a_boat_is_ten_metres_out_unless_said():
         parse_fleet(fleet_text().replace("geofence: {", "geofence: {beyond_m: -1, "))
     with pytest.raises(FleetFileError, match="stop or flee"):
         parse_fleet(fleet_text().replace("geofence: {", "geofence: {then: go, "))
+
+
+def test_the_hard_line_is_the_shields_unless_the_file_contradicts_itself():
+    config = parse_fleet(fleet_text()).shield_config
+    assert (config.beyond_m, config.beyond_then) == (10.0, "stop")
+    wider = parse_fleet(fleet_text(more="shield: {beyond_m: 25.0}")).shield_config
+    assert wider.beyond_m == 25.0
+    with pytest.raises(
+        FleetFileError, match=r"shield.beyond_m is 25.0 and geofence.beyond_m 3.0; leave shield.beyond_m"
+    ):
+        parse_fleet(fleet_text(more="shield: {beyond_m: 25.0}").replace("geofence: {", "geofence: {beyond_m: 3.0, "))
