@@ -20,6 +20,8 @@ EARLY_S = 0.5
 BACK_S = 2.0
 """Stamps that go back by more than this are of a source that started anew."""
 FASTEST_MPS, FARTHEST_M = 30.0, 50_000.0
+RUN_M = 0.25
+"""A position the same to the last digit while NAV_SPEED says the boat ran this far is frozen, whatever its stamp."""
 STILL_S = 1.5
 """All four values the same to the last digit for so long, while the boat is told to move: the source is frozen."""
 TOLD_MPS = 0.3
@@ -56,6 +58,7 @@ class Navigation:
         self.turn_rate_rads = math.nan
         self.source = ""
         self._values: dict[str, _Value] = {}
+        self._place_s, self._run_m = -math.inf, 0.0
         self._same_since_s, self._told_since_s, self._still = math.inf, math.inf, False
 
     def told(self, speed_mps: float, now_s: float) -> None:
@@ -121,7 +124,17 @@ class Navigation:
             x, y = self._values.get("NAV_X"), self._values.get("NAV_Y")
             if x is not None and y is not None and abs(x.true_s - y.true_s) <= MATCHED_S:
                 east, north = x.value - self._corner_m[0], y.value - self._corner_m[1]
-                self.position_m, self.position_s = self._frame.turn_to_field(east, north), min(x.true_s, y.true_s)
+                self._take_place(self._frame.turn_to_field(east, north), min(x.true_s, y.true_s))
+
+    def _take_place(self, position_m: tuple[float, float], true_s: float) -> None:
+        """Take a position, unless it stays while the boat is under way."""
+        since_s, self._place_s = true_s - self._place_s, true_s
+        ran_m = abs(self.speed_mps) * min(since_s, 1.0) if math.isfinite(self.speed_mps) else 0.0
+        self._run_m = self._run_m + ran_m if position_m == self.position_m else 0.0
+        if self._run_m > RUN_M:
+            self.faults["frozen"] += 1
+        else:
+            self.position_m, self.position_s = position_m, true_s
 
     def _note_same(self, message: Message, before: _Value | None, true_s: float) -> None:
         if message.key in VARIABLES and (before is None or before.value != message.value):

@@ -33,7 +33,7 @@ def free_ports(count):
         return [server.getsockname()[1] for server in servers]
 
 
-def fleet_of(blue=1, red=0, platform="heron", gate="helm", more=""):
+def fleet_text(blue=1, red=0, platform="heron", gate="helm", more=""):
     lines = [HEAD.rstrip()]
     game = blue == red
     for i, port in enumerate(free_ports(blue)):
@@ -43,7 +43,11 @@ def fleet_of(blue=1, red=0, platform="heron", gate="helm", more=""):
     for i in range(red):
         side = f"agent: agent_{blue + i}" if game else "team: red"
         lines.append(f"  - {{name: red_{i + 1}, {side}, platform: {platform}}}")
-    return parse_fleet("\n".join([*lines, more]))
+    return "\n".join([*lines, more])
+
+
+def fleet_of(*args, **settings):
+    return parse_fleet(fleet_text(*args, **settings))
 
 
 @contextlib.contextmanager

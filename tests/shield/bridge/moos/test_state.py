@@ -89,6 +89,19 @@ def test_a_source_that_says_the_same_while_the_boat_is_told_to_move_grows_old():
     assert navigation.position_s == pytest.approx(4.3)
 
 
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
+def test_a_position_that_stays_while_the_boat_is_under_way_grows_old_within_a_second(speed):
+    navigation = Navigation(FRAME)
+    for k in range(10):
+        fed(navigation, 0.1 * k, x=0.1 * k * speed, speed=speed)
+    for k in range(10, 31):  # fresh stamps, the same place
+        fed(navigation, 0.1 * k, x=0.9 * speed, speed=speed)
+    assert navigation.position_s <= 0.9 + 0.25 / speed + 0.11
+    assert navigation.faults["frozen"] > 10
+    fed(navigation, 3.2, x=2.9, speed=speed)
+    assert navigation.position_s == pytest.approx(3.2)
+
+
 def contacts(corner_m=(0.0, 0.0)):
     return MoosContacts(FRAME, corner_m, ("red_1", "blue_1"), 0.3)
 
