@@ -109,10 +109,6 @@ class MoosContacts:
                 for name in sorted(self._unlisted_s)
             )
 
-    def rivals(self) -> tuple[Contact, ...]:
-        """None: MOOS does not tell who speaks under another's name."""
-        return ()
-
     def close(self) -> None:
         """Nothing is held."""
 

@@ -180,7 +180,8 @@ class StandInDb:
         if message.kind == DATA and not client.name:
             self._welcome(client, message)
             return
-        client = next((other for other in self._clients.values() if other.name == message.source), client)
+        if message.source:  # requests count for who is named in them, heartbeats for who sent them
+            client = next((other for other in self._clients.values() if other.name == message.source), client)
         if message.kind == TIMING:
             self._send(client, replace(message, value=self.now_s(), value2=0.0))
         elif message.kind == NOTIFY:

@@ -20,13 +20,12 @@ sys.path.insert(0, os.path.dirname(__file__))
 
 from moos_boats import fleet_text, sim_of, until
 from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.loop import Loop
 from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
 from steerclear.shield.bridge.moos.stand_in_db import StandInDb
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.parts import Parts
 from steerclear.shield.platforms import layout as L
 
 SPEED_MPS, HEADING_DEG = 1.2, 90.0
@@ -66,7 +65,7 @@ class Gate:
             link.prepare(1.0)
         self.nominal.use(self.links)
         parts = Parts(self.links, self.nominal, contacts=self.maker.sources(), sinks=(self.ticks,))
-        self.loop = Loop(self.fleet, parts, self.operator, self.clock)
+        self.loop = ControlLoop(self.fleet, parts, self.operator, self.clock)
         self.thread = threading.Thread(target=self.loop.run, daemon=True)
         self.thread.start()
         return self
