@@ -73,7 +73,8 @@ def load_own(where: str, name: str) -> TeamPolicy:
     if hasattr(found, "reset") and hasattr(found, "act"):
         if not hasattr(found, "name"):
             found.name = f"{Path(where).stem}:{name}"
-        return found  # type: ignore[no-any-return]  # told by what it has
+        team: TeamPolicy = found  # told by what it has
+        return team
     if hasattr(found, "compute_action") and isinstance(found, type):
         return from_agents(found, Path(where).stem)
     if callable(found):

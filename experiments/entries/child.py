@@ -11,7 +11,7 @@ import pickle
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from steerclear import policies
 from steerclear.experiments.deploy.frames import read_message, write_message
@@ -48,15 +48,16 @@ class Player:
     def obey(self, order: str, arguments: Sequence[Any]) -> dict[str, Any]:
         """Do what an order says; whatever the entry raises is in the answer."""
         try:
-            return {"load": self._load, "begin": self._begin, "step": self._step}[order](*arguments)
+            orders: dict[str, Any] = {"load": self._load, "begin": self._begin, "step": self._step}
+            return dict(orders[order](*arguments))
         except SteerclearError as error:
             return {"failed": str(error)}
         except BaseException as error:  # foreign code may raise anything
             return {"failed": f"policy {self._name()!r} cannot {order}: {describe_error(error)}"}
 
     def _load(self, path: str, options: Mapping[str, Any]) -> dict[str, Any]:
-        self._team = policies.make(path, **options)
-        return {"name": self._team.name}
+        self._team = team = cast(GuardedTeam, policies.make(path, **options))  # as it makes of paths
+        return {"name": team.name}
 
     def _begin(self, facts: GameFacts, agent_ids: Sequence[str], seed: int) -> dict[str, Any]:
         self._ids = agent_ids

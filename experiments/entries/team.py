@@ -217,7 +217,7 @@ def make_team(name: str, game: int | None = None, trust: bool = False, answer_s:
     """
     if not is_entry(name):
         return policies.make(name, game=game)
-    options = {"allow_code": trust or None} if name.startswith(SB3_PREFIX) else {}
+    options: dict[str, Any] = {"allow_code": trust or None} if name.startswith(SB3_PREFIX) else {}
     lacking = unlimited()
     if lacking:
         _say_once(lacking)

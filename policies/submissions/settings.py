@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-Part = tuple[Callable[[], Any], Callable[[Any], None]]
+Part = tuple[Callable[[], Any], Callable[[Any], object]]
 """How a setting is read and written."""
 
 
@@ -55,7 +55,8 @@ def _lists() -> list[list[Any]]:
 
 
 def _set_lists(values: list[list[Any]]) -> None:
-    for kept, items in zip((sys.path, warnings.filters), values, strict=True):
+    both: tuple[Any, Any] = (sys.path, warnings.filters)
+    for kept, items in zip(both, values, strict=True):
         if kept != items:
             kept[:] = items
 

@@ -12,7 +12,7 @@ from steerclear.shield.platforms.proving import reference_models
 
 
 def _platform(entries: dict[str, Any]) -> Platform:
-    pids = {name: Gains(**entries.pop(name)) for name in ("speed_pid", "heading_pid")}
+    pids: dict[str, Any] = {name: Gains(**entries.pop(name)) for name in ("speed_pid", "heading_pid")}
     points = tuple(tuple(point) for point in entries.pop("thrust_map"))
     return Platform(thrust_map=points, **pids, **entries)
 
