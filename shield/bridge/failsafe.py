@@ -105,6 +105,14 @@ class Failsafe:
         self.handed_over: set[str] = set()
         self._fleet, self._tracker, self._boats = fleet, tracker, tracker.commanded
         self._seen, self._verdict = Seen(-math.inf, {}, Answer()), Verdict()
+        self._after_s: dict[str, float] = {}
+        self._responses: dict[str, str] = {}
+        for name, row in CONDITIONS.items():
+            key = row.response.partition("`")[2].partition("`")[0] if row.response.startswith("`") else ""
+            response = setting(key, fleet.limits, fleet.end) if key else row.response
+            self._responses[name] = response if response in STRENGTH else "stop"  # all others are a link's own stop
+            if row.within.startswith("`"):
+                self._after_s[name] = setting(row.within.strip("`"), fleet.limits, fleet.end)
         self._good_s: dict[str, float] = {}
         self._rivals_s: dict[str, float] = {}
         self._outside_s: dict[str, float] = {}
@@ -131,7 +139,7 @@ class Failsafe:
 
     def _after(self, name: str) -> float:
         """The time of a row of the table, s."""
-        return float(setting(CONDITIONS[name].within.strip("`"), self._fleet.limits, self._fleet.end))
+        return self._after_s[name]
 
     def _due(
         self, name: str, subject: str, text: str, boats: Collection[str] | None = None, response: str | None = None
@@ -145,14 +153,11 @@ class Failsafe:
             boats: whom its response concerns; None: all of this process.
             response: instead of the table's.
         """
-        condition, row = name.partition(".")[0], CONDITIONS[name]
+        condition = name.partition(".")[0]
         if response is None:
             if any(entry.covers(condition, subject) for entry in self._seen.overrides):
                 return
-            _, key, _ = f"{row.response}``".split("`", 2)
-            is_key = row.response.startswith("`")
-            response = setting(key, self._fleet.limits, self._fleet.end) if is_key else row.response
-            response = response if response in STRENGTH else "stop"  # all others are a link's own stop
+            response = self._responses[name]
         self._verdict.actions.append(Action(subject, condition, response, text))
         for boat in self._boats if boats is None else boats:
             before = self._verdict.responses.get(boat, "go_on")

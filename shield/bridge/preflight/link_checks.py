@@ -26,7 +26,7 @@ REST_MPS = 0.3
 SPREAD_M = 1.5
 RMS_M = 0.5
 _REFUSED = (
-    "bad_checksum", "clock", "jump", "frozen", "impossible_position", "impossible_speed", "impossible_attitude",
+    "bad_checksum", "clock", "impossible_position", "impossible_speed", "impossible_attitude",
     "no_fix", "fix_silent", "poor_fix", "no_estimate",
 )  # fmt: skip
 

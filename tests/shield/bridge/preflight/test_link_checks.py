@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.mavlink.commands import OTHERS
 from steerclear.shield.bridge.mavlink.vehicle import LinkHealth
 from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.preflight.link_checks import (
@@ -18,6 +17,7 @@ from steerclear.shield.bridge.preflight.link_checks import (
     check_spread,
     link_checks,
 )
+from steerclear.shield.bridge.preflight.parameters import ASKED
 from steerclear.shield.bridge.preflight.result import run_checks
 from steerclear.shield.platforms import get_platform
 
@@ -105,7 +105,7 @@ def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
         ({"age": 0.8}, {}, "0.80 s old, more than 0.5 s"),
         ({"age": math.inf}, {}, "wait for GPS"),
         ({"age": math.nan}, {}, "check the radio"),
-        ({"faults": {"jump": 2, "duplicate": 9}}, {}, "refused while watched: 2 jump;"),
+        ({"faults": {"no_fix": 2, "duplicate": 9}}, {}, "refused while watched: 2 no_fix;"),
         ({"count": 0}, {}, "inf s old"),
     ],
 )
@@ -247,8 +247,8 @@ def test_what_was_refused_before_the_watch_is_not_of_it():
 
 
 def test_every_parameter_that_is_looked_at_is_asked_for():
-    assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*OTHERS}
-    assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "FENCE_ACTION", "GUID_TIMEOUT"} <= {*OTHERS}
+    assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*ASKED}
+    assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "FENCE_ACTION", "GUID_TIMEOUT"} <= {*ASKED}
 
 
 def test_an_autopilot_that_told_nothing_does_not_pass():
