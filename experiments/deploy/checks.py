@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 from steerclear.shield.bridge.blackbox import check_disk
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
@@ -14,6 +14,7 @@ from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight.drill import Drill
+from steerclear.shield.bridge.preflight.fence import check_fence
 from steerclear.shield.bridge.preflight.link_checks import link_checks
 from steerclear.shield.bridge.preflight.missed import Missed
 from steerclear.shield.bridge.preflight.response import drill_checks
@@ -60,7 +61,8 @@ def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
     mavlink = {name: link for name, link in station.links.items() if isinstance(link, MavlinkLink)}
     moos = {name: link for name, link in station.links.items() if isinstance(link, MoosLink)}
-    links = [*link_checks(mavlink, fleet.platform_of, station.clock), *moos_checks(moos, fleet)]
+    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
+    links = [*link_checks(mavlink, fleet.platform_of, station.clock), *fences, *moos_checks(moos, fleet)]
     grounds = grounds_of(fleet)
     situation = [
         Check(name, lambda name=name: check_situation(name, fleet, look.roster, grounds)) for name in SITUATION

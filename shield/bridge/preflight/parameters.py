@@ -19,16 +19,17 @@ NEEDED_CHECKS = {2: "compass", 3: "GPS", 4: "INS"}
 """Arming checks, by their bit, of what position and heading rest on."""
 
 OBSTACLE_SENSORS = ("PRX1_TYPE", "PRX_TYPE")
-FENCE_ACTS = 2.0
 AVOIDS = 3.0
-"""What Rover's FENCE_ACTION and AVOID_ENABLE are where nobody heard them: their defaults."""
+"""What Rover's AVOID_ENABLE is where nobody heard it: its default."""
 
 ASKED = (
     "FS_GCS_ENABLE", "GUID_TIMEOUT", "SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "MAV_OPTIONS",
-    "ARMING_CHECK", "ARMING_SKIPCHK", "FENCE_ENABLE", "FENCE_ACTION", "AVOID_ENABLE", *OBSTACLE_SENSORS, "BCN_TYPE",
+    "ARMING_CHECK", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", *OBSTACLE_SENSORS, "BCN_TYPE",
     "OA_TYPE", "SAIL_ENABLE",
 )  # fmt: skip
 """Parameters that are looked at here, besides WP_SPEED."""
+FENCE_ASKED = ("FENCE_TYPE", "FENCE_RADIUS", "FENCE_MARGIN", "AVOID_MARGIN")
+"""Those of a fence that is on, see `fence`."""
 
 
 def parameter_faults(known: Mapping[str, float], platform: Platform) -> list[str]:
@@ -92,18 +93,6 @@ def _changes(known: Mapping[str, float]) -> list[str]:
     """What in the autopilot changes a command after the shield, or takes the boat away from it."""
     faults = []
     avoid = _bits(known.get("AVOID_ENABLE", AVOIDS))
-    if known.get("FENCE_ENABLE", 0.0) != 0.0:
-        if avoid & 1:
-            faults.append(
-                "FENCE_ENABLE is on and AVOID_ENABLE has bit 0, so the autopilot slows and turns the boat at its own "
-                "fence, after the shield: set FENCE_ENABLE to 0; the geofence of the file is kept by the shield"
-            )
-        action = known.get("FENCE_ACTION", FENCE_ACTS)
-        if action != 0.0:
-            faults.append(
-                f"FENCE_ENABLE is on and FENCE_ACTION is {action:g}, so the autopilot takes the boat away at its own "
-                "fence: set FENCE_ENABLE to 0, or FENCE_ACTION to 0 (report only)"
-            )
     sensors = [name for name in OBSTACLE_SENSORS if known.get(name, 0.0) != 0.0]
     if avoid & 2 and sensors:
         faults.append(_after(f"AVOID_ENABLE has bit 1 and {sensors[0]} is on", "AVOID_ENABLE"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from steerclear.experiments.commands.sea_trial import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
-from steerclear.experiments.fit.runs import runs_of
+from steerclear.experiments.fit.streams import NEEDED, Streams, untold
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
@@ -70,7 +70,11 @@ def test_the_trial_shows_turns_and_stops_of_both_sides():
     assert turn.max() > 30.0
     assert turn.min() < -30.0
     assert rows[:, 4].max() > 2.8
-    runs = runs_of("trial", rows[:, 0], rows[:, 1:5], rows[:, 5:7])
+    log = Streams("trial", untold)
+    for time_s, *values in rows:
+        for what, value in zip(NEEDED, values, strict=True):
+            log.add(what, time_s, value)
+    runs = log.runs(NEEDED)
     assert sum(run.seconds for run in runs) > 120.0
 
 

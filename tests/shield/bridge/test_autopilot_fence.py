@@ -1,19 +1,14 @@
 """The autopilot's own fence is accepted only where no boat gets to before the shield has stopped it."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from bridge_fakes import fleet_of, fleet_text
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.autopilot_fence import (
-    FenceReader,
-    FenceZone,
-    check_fence,
-    hard_line,
-    needed_m,
-    stopping_way_m,
-)
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.mavlink.fence import FenceReader, FenceZone
+from steerclear.shield.bridge.preflight.fence import check_fence, hard_line, needed_m, stopping_way_m
 from steerclear.shield.platforms import get_platform
 
 FLEET = fleet_of(platform="ardurover_boat")
@@ -33,7 +28,8 @@ def box(out_m, inside=True):
 
 
 def checked(zones, parameters=ON, home=None, fleet=FLEET):
-    return check_fence("blue_1", fleet, parameters, zones, home)
+    health = SimpleNamespace(parameters=parameters, fence=zones, home_deg=home)
+    return check_fence("blue_1", fleet, SimpleNamespace(health=lambda: health))
 
 
 def test_the_hard_line_lies_ten_metres_out_and_the_boat_needs_its_way_to_stop():

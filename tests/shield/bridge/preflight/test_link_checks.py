@@ -181,10 +181,6 @@ def test_spread():
         ({"ARMING_SKIPCHK": 8.0}, "ARMING_SKIPCHK 8 leaves GPS unchecked: set it to 0"),
         ({"ARMING_SKIPCHK": 1048574.0}, "leaves compass, GPS, INS unchecked"),
         ({"ARMING_CHECK": 64.0}, "ARMING_CHECK 64 leaves compass, GPS, INS unchecked: set it to 1"),
-        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 7.0, "FENCE_ACTION": 0.0}, "slows and turns the boat at its own fence"),
-        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 1.0, "FENCE_ACTION": 0.0}, "set FENCE_ENABLE to 0"),
-        ({"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0, "FENCE_ACTION": 1.0}, "FENCE_ACTION is 1, so the autopilot takes"),
-        ({"FENCE_ENABLE": 1.0}, "AVOID_ENABLE has bit 0"),
         ({"AVOID_ENABLE": 2.0, "PRX1_TYPE": 2.0}, "AVOID_ENABLE has bit 1 and PRX1_TYPE is on"),
         ({"AVOID_ENABLE": 3.0, "PRX_TYPE": 2.0}, "AVOID_ENABLE has bit 1 and PRX_TYPE is on"),
         ({"AVOID_ENABLE": 7.0, "BCN_TYPE": 1.0}, "AVOID_ENABLE has bit 2 and BCN_TYPE is on"),
@@ -210,7 +206,7 @@ def test_autopilot(parameters, words):
         {"ARMING_CHECK": 1.0},
         {"ARMING_CHECK": 28.0},
         {"FENCE_ENABLE": 0.0, "AVOID_ENABLE": 7.0, "FENCE_ACTION": 2.0},
-        {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0, "FENCE_ACTION": 0.0},
+        {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0},
         {"AVOID_ENABLE": 3.0, "PRX1_TYPE": 0.0},
         {"OA_TYPE": 0.0},
     ],
@@ -248,7 +244,7 @@ def test_what_was_refused_before_the_watch_is_not_of_it():
 
 def test_every_parameter_that_is_looked_at_is_asked_for():
     assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*ASKED}
-    assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "FENCE_ACTION", "GUID_TIMEOUT"} <= {*ASKED}
+    assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "GUID_TIMEOUT"} <= {*ASKED}
 
 
 def test_an_autopilot_that_told_nothing_does_not_pass():

@@ -1,142 +1,52 @@
-"""The autopilot's own fence as last resort: read over MAVLink, and accepted where no boat of ours gets to by itself.
+"""The autopilot's own fence as last resort: accepted where no boat of ours gets to by itself.
 
-ArduPilot keeps a circle around home (FENCE_RADIUS) and zones that are uploaded as a mission of their own (polygons and
-circles to stay inside of or outside of). Where one of them acts, it takes the boat away from the shield. It may do so
-only beyond the hard line (`geofence.beyond_m`) and the way that a boat stopped there still runs.
+ArduPilot keeps a circle around home (FENCE_RADIUS) and zones to stay inside of or outside of. Where one of them acts,
+it takes the boat away from the shield. It may do so only beyond the hard line (`geofence.beyond_m`) and the way that a
+boat stopped there still runs.
 """
 
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..platforms import Platform, step_boat
-from ..platforms import layout as L
-from ..platforms.limits import cruise
-from .fleet_file import FleetFile
-from .preflight.result import CheckResult
+from ...platforms import Platform, step_boat
+from ...platforms import layout as L
+from ...platforms.limits import cruise
+from ..fleet_file import FleetFile
+from ..mavlink.fence import FenceZone, Point
+from ..mavlink.vehicle import LinkHealth
+from .result import CheckResult
 
-FENCE_PARAMETERS = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_MARGIN", "AVOID_ENABLE", "AVOID_MARGIN")
 CIRCLE_TYPE, POLYGON_TYPE = 2, 4
 """Bits of FENCE_TYPE; the first bit is altitude."""
 DEFAULTS = {"FENCE_TYPE": 6.0, "FENCE_RADIUS": 150.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_MARGIN": 2.0}
 """Of ArduPilot Rover, for what was not heard."""
-MISSION = int(mavlink.MAV_MISSION_TYPE_FENCE)
-POLYGONS = {
-    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION): True,
-    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION): False,
-}
-CIRCLES = {
-    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION): True,
-    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION): False,
-}
-MOST_ITEMS = 500
 STOPPED_SHARE, LONGEST_STOP_S = 0.02, 120.0
 
-Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True)
-class FenceZone:
-    """One zone of a fence.
+class Fenced(Protocol):
+    """A link to a boat that may have a fence of its own."""
 
-    Attributes:
-        inside: whether boats must stay inside of it, else outside.
-        places: latitude and longitude, deg, of its corners, or of its middle alone.
-        radius_m: of a circle; 0: it is a polygon.
-    """
-
-    inside: bool
-    places: tuple[Point, ...]
-    radius_m: float = 0.0
+    def health(self) -> LinkHealth:
+        """What the link knows of the boat."""
 
 
-class FenceReader:
-    """Downloads an autopilot's fence and its home; messages come in on the link's thread.
-
-    Args:
-        target: system and component of the autopilot.
-        send: sends a message, never waits.
-    """
-
-    def __init__(self, target: tuple[int, int], send: Callable[[Any], bool]) -> None:
-        self._target, self._send = target, send
-        self._lock = threading.Lock()
-        self._count: int | None = None
-        self._items: dict[int, Any] = {}
-        self.home_deg: Point | None = None
-
-    def hear(self, message: Any) -> None:
-        """Take an answer in."""
-        kind = message.get_type()
-        with self._lock:
-            if kind == "HOME_POSITION":
-                self.home_deg = message.latitude / 1e7, message.longitude / 1e7
-            elif kind == "MISSION_COUNT" and message.mission_type == MISSION:
-                self._count, self._items = min(int(message.count), MOST_ITEMS + 1), {}
-            elif kind == "MISSION_ITEM_INT" and message.mission_type == MISSION and message.seq < (self._count or 0):
-                self._items[message.seq] = message
-
-    def ask(self) -> None:
-        """Ask for what is not known yet; to be repeated."""
-        with self._lock:
-            count, known = self._count, set(self._items)
-        if self.home_deg is None:
-            number = mavlink.MAVLINK_MSG_ID_HOME_POSITION
-            request = mavlink.MAV_CMD_REQUEST_MESSAGE
-            self._send(mavlink.MAVLink_command_long_message(*self._target, request, 0, number, 0, 0, 0, 0, 0, 0))
-        if count is None:
-            self._send(mavlink.MAVLink_mission_request_list_message(*self._target, mission_type=MISSION))
-            return
-        for number in [number for number in range(count) if number not in known][:20]:
-            self._send(mavlink.MAVLink_mission_request_int_message(*self._target, number, mission_type=MISSION))
-
-    @property
-    def is_known(self) -> bool:
-        """Whether all of it was heard."""
-        with self._lock:
-            return self.home_deg is not None and self._count is not None and len(self._items) == self._count
-
-    @property
-    def zones(self) -> tuple[FenceZone, ...] | None:
-        """Its zones; None: not all heard, or more than `MOST_ITEMS`."""
-        with self._lock:
-            if self._count is None or len(self._items) != self._count or self._count > MOST_ITEMS:
-                return None
-            items = [self._items[number] for number in range(self._count)]
-        zones, begin = [], 0
-        while begin < len(items):
-            item = items[begin]
-            place = item.x / 1e7, item.y / 1e7
-            if item.command in CIRCLES:
-                zones.append(FenceZone(CIRCLES[item.command], (place,), float(item.param1)))
-            elif item.command in POLYGONS:
-                corners = items[begin : begin + max(1, int(item.param1))]
-                zones.append(FenceZone(POLYGONS[item.command], tuple((c.x / 1e7, c.y / 1e7) for c in corners)))
-                begin += len(corners) - 1
-            begin += 1
-        return tuple(zones)
-
-
-def check_fence(
-    boat: str, fleet: FleetFile, known: Mapping[str, float], zones: Sequence[FenceZone] | None, home_deg: Point | None
-) -> CheckResult:
+def check_fence(boat: str, fleet: FleetFile, link: Fenced) -> CheckResult:
     """The autopilot's own fence is off, or so far out that no boat of ours gets there before it is stopped.
 
     Args:
         boat: its name.
         fleet: the file.
-        known: parameters heard, by name.
-        zones: of its fence; None: not heard.
-        home_deg: its home, latitude and longitude; None: not heard.
+        link: to it, once it was asked for parameters and fence.
     """
+    health = link.health()
+    known, zones, home_deg = health.parameters, health.fence, health.home_deg
     name, off = f"fence:{boat}", "set FENCE_ENABLE to 0"
     if known.get("FENCE_ENABLE", 0.0) == 0.0:
         return CheckResult(name, True, "its own fence is off")
