@@ -94,7 +94,7 @@ class MoosLink:
         """
         self.client.start()
         end_s = time.monotonic() + timeout_s
-        while not math.isfinite(self.read().age_s):
+        while self._unheard():
             if time.monotonic() > end_s:
                 raise LinkError(f"boat {self.boat}: {self._missing(timeout_s)}")
             time.sleep(POLL_S)
@@ -306,16 +306,21 @@ class MoosLink:
             counter.clear()
         return found
 
+    def _unheard(self) -> list[str]:
+        """What of the boat was never heard."""
+        with self._lock:
+            seen = self._navigation
+            heard = {"NAV_X and NAV_Y of one moment": seen.position_s, "NAV_HEADING": seen.heading_s}
+            heard["NAV_SPEED"] = seen.speed_s
+        return [name for name, time_s in heard.items() if not math.isfinite(time_s)]
+
     def _missing(self, timeout_s: float) -> str:
         health = self.client.health()
         if not health.connected:
             return health.fault
         with self._lock:
-            seen = self._navigation
-            parts = (("NAV_X and NAV_Y of one moment", seen.position_s), ("NAV_HEADING", seen.heading_s))
-            missing = [name for name, time_s in (*parts, ("NAV_SPEED", seen.speed_s)) if not math.isfinite(time_s)]
             said = "; ".join(self._texts)
-        what = f"nobody posts {', '.join(missing)} in MOOSDB {self.client.address} ({health.community})"
+        what = f"nobody posts {', '.join(self._unheard())} in MOOSDB {self.client.address} ({health.community})"
         return f"{what} within {timeout_s:g} s; start its simulator or sensors" + (f"; {said}" if said else "")
 
 

@@ -184,3 +184,12 @@ def test_a_link_that_is_none_is_refused_with_its_form(link, word):
     text += "geofence: {xmin_m: 0, ymin_m: 0, xmax_m: 80, ymax_m: 40}\n"
     with pytest.raises(FleetFileError, match=word):
         parse_fleet(f"{text}boats:\n  - {{name: b, team: blue, platform: heron, link: {link}}}\n")
+
+
+def test_what_is_said_while_a_boat_is_connected_is_kept_for_the_operator():
+    fleet = fleet_of(1, 1)
+    with sim_of(fleet) as boats:
+        boats.boats["blue_1"].community.post("MOOS_MANUAL_OVERRIDE", "true", "pMarineViewer")
+        with link_of(fleet) as (link, _):
+            assert "took it by hand" in " ".join(link.read().texts)
+            assert not link.read().ready
