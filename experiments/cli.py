@@ -31,7 +31,7 @@ from .commands.train import train
 from .commands.train_study import train_study
 from .commands.warm_up import warm_up
 from .optional import optional_command
-from .runs.provenance import package_version
+from .provenance import package_version
 from .terminal import prepare
 
 app = App(

@@ -13,8 +13,8 @@ from .entrants.listing import entrants
 from .own import file_of, own_code
 from .registry import SB3_PREFIX, WEIGHTS_PREFIX, names
 
-RUN_FILE, ENVIRONMENT_FILE = "games.jsonl", "pyvenv.cfg"
-"""What tells folders of results and virtual environments, which are no part of a policy."""
+NO_PART = ("rows.jsonl", "games.jsonl", "pyvenv.cfg")
+"""What tells folders of results (also of 0.8.0 and before) and virtual environments, which are no part of a policy."""
 
 
 def fingerprint(name_or_path: str | Path) -> str:
@@ -62,7 +62,7 @@ def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
         if not entry.is_dir():
             if entry.is_file() or entry.is_symlink():  # no pipes and sockets: reading one may never end
                 yield path
-        elif not any((path / name).exists() for name in (RUN_FILE, ENVIRONMENT_FILE)):
+        elif not any((path / name).exists() for name in NO_PART):
             yield from _files(path, seen)
 
 

@@ -11,7 +11,7 @@ from steerclear.env.record_meta import meta_of
 
 REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
-COMPILING = "from steerclear.experiments.runs.warming import compile_share; compile_share({}, {})"
+COMPILING = "from steerclear.experiments.warming import compile_share; compile_share({}, {})"
 
 
 def pytest_configure(config):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -14,67 +14,43 @@ from ..encounters.play import play
 from ..encounters.replays import records_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import scenes_of
-from ..report.replay_html import write_replay
-from ..report.tables import number_text, titled
-from ..runs.pool import Engine, run_all
-from ..runs.provenance import machine, versions
-from ..runs.store import LINES_FILE, ResultStore, write_json
-from .search import Search, run_search
+from ..replay_html import write_replay
+from ..result_files import write_json
+from ..runner import RESULTS_FILE, ROWS_FILE, Experiment, Run
+from ..tables import number_text, titled
+from ..warming import compile_encounters, compile_judge
+from .search import Search, run_job
 
 MOST_REPLAYS = 10
 
 
-def searches_of(first: Search, restarts: int) -> list[Search]:
+def experiment_of(first: Search, restarts: int) -> Experiment:
     """The same search from so many starts."""
-    return [replace(first, restart=k) for k in range(restarts)]
+    jobs = [asdict(replace(first, restart=k)) for k in range(restarts)]
+    settings = {**asdict(first), "restarts": restarts}
+    return Experiment("attack", settings, jobs, run_job, "searches", (compile_encounters, compile_judge))
 
 
-def run_searches(
-    searches: Sequence[Search], store: ResultStore, processes: int | Engine, notice: Callable[[int], None]
-) -> list[dict[str, Any]]:
-    """Run what is not in the store yet; return what failed."""
-    before, failed = store.load(), []
-    missing = [search for search in searches if search.key not in before]
-    done = len(searches) - len(missing)
-    notice(done)
-    for outcome in run_all(run_search, missing, processes):
-        if outcome.answer is None:
-            failed.append({"restart": outcome.job.restart, **outcome.why})
-        else:
-            store.append(outcome.job.key, outcome.answer)
-        done += 1
-        notice(done)
-    return failed
-
-
-def write_all(
-    folder: Path, searches: Sequence[Search], store: ResultStore, failed: Sequence[Any], wall_s: float
-) -> dict[str, Any]:
-    """Write scenes, replay and results.json of what is in the store; return the content of results.json."""
-    kept = store.load()
-    found = [kept[search.key] for search in searches if search.key in kept]
-    files: dict[str, str] = {"searches": LINES_FILE, "results": "results.json"}
+def write_all(run: Run) -> dict[str, Any]:
+    """Write scenes, replay and results.json of what was found; return the content of results.json."""
+    files: dict[str, str] = {"searches": ROWS_FILE, "results": RESULTS_FILE}
     rows = []
-    for entry in found:
+    for entry in run.rows:
         name = None
         if entry["scene"] is not None:
             name = f"scenes/attack-{entry['restart']:03d}.json"
-            write_json(folder / name, entry["scene"])
+            write_json(run.folder / name, entry["scene"])
         rows.append({k: v for k, v in entry.items() if k not in ("scene", "closest_scene")} | {"scene": name})
-    if found:
-        files["replay"] = _write_replay(folder, searches[0].guard, found).name
+    if run.rows and not run.interrupted:
+        files["replay"] = _write_replay(run.folder, run.experiment.settings["guard"], run.rows).name
     results = {
-        "command": "attack",
-        "settings": {**asdict(searches[0]), "restarts": len(searches)},
-        "versions": versions(),
-        "machine": machine(),
-        "wall_s": wall_s,
+        **run.head(),
         "searches": rows,
-        "failed": list(failed),
+        "failed": [{name: job[name] for name in ("restart", "error", "fault")} for job in run.failed],
         "found": sum(row["scene"] is not None for row in rows),
         "files": files,
     }
-    write_json(folder / "results.json", results)
+    run.write(results)
     return results
 
 

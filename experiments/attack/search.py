@@ -10,7 +10,7 @@ minimised: with a share of the guard's least certificate added, fewer searches o
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from ..encounters.start import start_certificate_m
 from ..encounters.tally import Columns, tally
 from ..encounters.verdicts import judge_game, side_name
 from ..play.spec import check_count, check_seed
-from ..runs.store import key_of
+from ..workers import Job, Row
 from .opponents import Duel
 
 MOST_PLAYED = 10_000
@@ -78,10 +78,11 @@ class Search:
         """The own boats that are attacked."""
         return Duel(self.own, self.other, self.attackers, self.own_boats, self.conditions, self.seed, self.restart)
 
-    @property
-    def key(self) -> str:
-        """Name under which the result is kept."""
-        return key_of(asdict(self))
+    @classmethod
+    def of_job(cls, job: Job) -> Search:
+        """The search that plain values describe, as `dataclasses.asdict` gives them."""
+        known = {name: job[name] for name in cls.__dataclass_fields__}
+        return cls(**{**known, "conditions": Conditions(**job["conditions"])})
 
 
 class _Hunt:
@@ -166,3 +167,8 @@ def run_search(search: Search) -> dict[str, Any]:
         "scene": hunt.avoidable,
         "closest_scene": scene_content(hunt.duel.scenes(hunt.point[None]), search.conditions, guard=search.guard),
     }
+
+
+def run_job(job: Job) -> list[Row]:
+    """Run a search that plain values describe; its one row."""
+    return [run_search(Search.of_job(job))]

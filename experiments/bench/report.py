@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..report.tables import number_text
+from ..tables import number_text
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any
 
 from steerclear.shield import ShieldConfig
 
-from ..measure.tally import RADII_M
+from ..metrics import RADII_M
 from ..play.spec import check_seed
-from ..runs.provenance import machine, versions
+from ..provenance import machine, versions
 from .batch import BatchSize, batch_memory, steps_per_s
 from .decide import COUNTS, decide_times, scaling
 from .lookups import lookup_times
@@ -81,7 +81,8 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
     for name, words, measure in _parts(settings, shield):
         notice(words)
         content[name] = measure()
-    return {**content, "bars": bench_bars(content), "wall_s": time.perf_counter() - started}
+    goals = bench_goals(content)
+    return {**content, "goals": goals, "deprecated": {"bars": goals}, "wall_s": time.perf_counter() - started}
 
 
 def _parts(settings: BenchSettings, shield: ShieldConfig) -> Iterator[tuple[str, str, Callable[[], Any]]]:
@@ -119,7 +120,7 @@ def _parts(settings: BenchSettings, shield: ShieldConfig) -> Iterator[tuple[str,
     )
 
 
-def bench_bars(content: dict[str, Any]) -> list[dict[str, Any]]:
+def bench_goals(content: dict[str, Any]) -> list[dict[str, Any]]:
     """Judge the figures; slowest of the policies counts for the batch."""
     decide, by_table, memory = content["decide"]["all"], content["decide_by_table"]["all"], content["memory"]
     plain, shielded = (

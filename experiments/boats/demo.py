@@ -26,7 +26,7 @@ def demo_text(link: str = "mavlink") -> str:
     Raises:
         ConfigError: another.
     """
-    text = resources.files("steerclear.experiments.report").joinpath("templates", NAME).read_text(encoding="utf-8")
+    text = resources.files("steerclear.experiments").joinpath("templates", NAME).read_text(encoding="utf-8")
     if link not in LINKS:
         raise ConfigError(f"--link is {link!r}; choose one of {', '.join(LINKS)}")
     if link == "moos":

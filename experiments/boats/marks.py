@@ -55,7 +55,7 @@ class Marks:
         return np.array(rows, dtype=np.bool_).reshape(-1, n_boats)
 
     def of(self, step: int, boats: Sequence[int]) -> dict[str, Any]:
-        """Entries of a breach at a step (1 the first that was moved) between boats, see `boats_keys.SIM_BOATS`."""
+        """Entries of a breach at a step (1 the first that was moved) between boats, see `docs_keys.SIM_BOATS`."""
         recent = self._rows[max(0, step - round(RECENT_S / STEP_S)) : step]
         faults = {kind for row in recent for boat in boats for kind in row[boat].faults}
         return {

@@ -6,8 +6,8 @@ from collections import Counter
 from typing import Any
 
 from rich.console import Group
-from steerclear.experiments.report.tables import titled
-from steerclear.experiments.runs.provenance import machine, versions
+from steerclear.experiments.provenance import machine, versions
+from steerclear.experiments.tables import titled
 
 from .fleet import SimFleet
 

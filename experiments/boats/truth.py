@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from steerclear.env.record import GameRecorder, Record, find_breaches
 from steerclear.env.record_meta import DEFAULT_SEPARATION_M, meta_of
-from steerclear.experiments.measure.judging import StateLog, judge_game
+from steerclear.experiments.verdicts import StateLog, judge_game
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
-from ..measure.score import DEFAULT_PENALTY
+from ..ablation import AblationSettings
+from ..ablation import quick as small_version
+from ..game_metrics import DEFAULT_PENALTY
 from ..play.conditions import Conditions
 from ..play.spec import ANSWER_S
-from ..runs.ablation import AblationSettings
-from ..runs.ablation import quick as small_version
-from ..runs.engines import engine_of
-from ..runs.store import write_json
+from ..workers import workers_of
 from . import options as o
-from .console import command, finish
-from .games import check_complete, run_games
+from .console import command
+from .games import end_run, run_games
 
 QUICK_GAMES = 6
 QUICK_TIME_S = 300.0
@@ -77,13 +75,5 @@ def ablate(
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
-    results = run_games("ablate", settings, out, engine_of(engine, address, jobs), resume, quick)
-    end_run(results, check, json_file)
-
-
-def end_run(results: dict[str, Any], check: bool, json_file: o.JsonFile) -> None:
-    """Write the JSON a user asked for and choose the exit status."""
-    if json_file is not None:
-        write_json(json_file, results)
-    check_complete(results)
-    finish(not check or all(bar["met"] is not False for bar in results["bars"]))
+    results, run = run_games("ablate", settings, out, workers_of(engine, address, jobs), resume, quick)
+    end_run(results, run, check, json_file)

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..attack.campaign import passed, run_searches, searches_of, searches_table, write_all
+from ..attack.campaign import experiment_of, passed, searches_table, write_all
 from ..attack.search import MOST_PLAYED, Search
 from ..encounters.guards import parse_guards
 from ..encounters.scenes import Conditions
 from ..play.spec import check_count
-from ..runs.engines import Workers as Engines
-from ..runs.engines import engine_of
-from ..runs.failed_jobs import end_failed
-from ..runs.store import LINES_FILE, ResultStore, write_json
+from ..result_files import write_json
+from ..runner import execute
+from ..workers import workers_of
 from . import options as o
-from .console import Interrupted, command, finish, out, progress
+from .console import command, finish, out, progress
 from .encounters import Current, Delay, Noise, Radius, Workers, platform_pairs
 from .games import results_folder
 from .scenes import play_scene_files
@@ -66,26 +64,16 @@ def attack(
     conditions = Conditions(radius, delay, noise, current)
     first = Search(*pairs[0], attackers, own, guards[0], conditions, seed, 0, population, generations)
     first.duel()
-    results = _run(searches_of(first, restarts), folder, engine_of(engine, address, workers), resume)
-    if json_file is not None:
-        write_json(json_file, results)
-    if results["failed"]:
-        end_failed(results["failed"], f"{len(results['failed'])} searches failed", f": {results['failed'][0]['error']}")
-    finish(passed(results))
-
-
-def _run(searches: list[Search], folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
     folder = results_folder("attack", folder, resume)
-    store, started = ResultStore(folder, resume, "attack"), time.perf_counter()
-    try:
-        with progress("searches", len(searches)) as notice:
-            failed = run_searches(searches, store, workers, notice)
-    except KeyboardInterrupt:
-        results = write_all(folder, searches, store, [], time.perf_counter() - started)
-        kept = f"{len(results['searches'])} of {len(searches)} searches kept in {folder / LINES_FILE}"
-        raise Interrupted(f"interrupted: {kept}; the same command with --out {folder} --resume goes on") from None
-    results = write_all(folder, searches, store, failed, time.perf_counter() - started)
-    out().print(searches_table(results))
-    for name in results["files"].values():
-        out().print(f"{folder / name}", soft_wrap=True)
-    return results
+    with progress("searches", restarts) as notice:
+        workers_asked = workers_of(engine, address, workers)
+        run = execute(experiment_of(first, restarts), folder, workers_asked, resume, lambda done, of: notice(done))
+    results = write_all(run)
+    if not run.interrupted:
+        out().print(searches_table(results))
+        for name in results["files"].values():
+            out().print(f"{folder / name}", soft_wrap=True)
+        if json_file is not None:
+            write_json(json_file, results)
+    run.end()
+    finish(passed(results))

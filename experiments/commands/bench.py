@@ -9,8 +9,8 @@ from rich.text import Text
 
 from ..bench.report import bench_tables
 from ..bench.run import BenchSettings, run_bench
-from ..report.tables import bars_table, titled
-from ..runs.store import write_json
+from ..result_files import write_json
+from ..tables import goals_table, titled
 from . import options as o
 from .console import command, err, finish, out
 
@@ -34,7 +34,7 @@ def bench(
         out().print("This was the small version: its figures are rough. Leave out --quick for real ones.")
     if json_file is not None:
         write_json(json_file, content)
-    finish(not check or all(bar["met"] for bar in content["bars"]))
+    finish(not check or all(goal["met"] for goal in content["goals"]))
 
 
 def _run(settings: BenchSettings) -> dict[str, Any]:
@@ -50,4 +50,4 @@ def _show(content: dict[str, Any]) -> None:
     for table in bench_tables(content):
         console.print(titled(table.title, table.heads, table.rows, width=12 if len(table.heads) < 6 else 8))
         console.print()
-    console.print(bars_table(content["bars"]))
+    console.print(goals_table(content["goals"]))

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from ..report.tables import interval_text, short_limit, titled
-from ..runs.paired import compare_runs, read_run
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..compare_runs import compare_runs, read_run
+from ..provenance import machine, versions
+from ..result_files import write_json
+from ..tables import interval_text, short_limit, titled
 from . import options as o
 from .console import command, out
 from .games import FEW_GAMES

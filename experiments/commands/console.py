@@ -15,13 +15,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from steerclear.shield.exceptions import SteerclearError
 
-from ..runs.failed_jobs import JobFault
-from ..runs.faults import fault_words, machine_words
-from ..runs.pool import interrupted_by_sigterm
+from ..faults import fault_words, machine_words
+from ..runner import Interrupted
 from ..terminal import SafeConsole
+from ..workers import JobFault, interrupted_by_sigterm
 from .files import check_files
 from .plain_progress import PlainProgress
 
+__all__ = ["ExitCode", "Interrupted", "command", "err", "finish", "leave_failed", "out", "progress", "unbroken"]
 Command = TypeVar("Command", bound=Callable[..., Any])
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
@@ -31,15 +32,11 @@ class ExitCode(IntEnum):
     """What the command's exit status means."""
 
     OK = 0
-    BAR_FAILED = 1
+    GOAL_MISSED = 1
     BAD_INPUT = 2
     NOT_PROVED = 3
     FAULT = 70
     INTERRUPTED = 130
-
-
-class Interrupted(Exception):
-    """The user pressed Ctrl-C, or SIGTERM came; the text says what is kept and how to go on."""
 
 
 def out(least: int = 0) -> Console:
@@ -102,7 +99,7 @@ def leave_failed(error: Exception) -> NoReturn:
 def finish(passed: bool) -> None:
     """End a command that judged something: exit status 1 when it did not pass."""
     if not passed:
-        raise typer.Exit(int(ExitCode.BAR_FAILED))
+        raise typer.Exit(int(ExitCode.GOAL_MISSED))
 
 
 @contextmanager

@@ -13,9 +13,8 @@ from steerclear.shield.extras import install_command
 
 from ..play.match import Match
 from ..play.spec import MatchSpec
-from ..report.tables import game_table
-from ..runs.new_file import NEW
-from ..runs.store import write_table
+from ..result_files import NEW, write_table
+from ..tables import game_table
 from . import options as o
 from .console import command, err, out
 from .files import check_ending

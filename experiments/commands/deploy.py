@@ -29,7 +29,7 @@ from ..deploy.rules import game_config
 from ..deploy.run import deploy as run_boats
 from ..deploy.tally import distance_words
 from ..play.spec import check_seed
-from ..runs.store import write_json
+from ..result_files import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

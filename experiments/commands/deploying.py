@@ -13,7 +13,7 @@ from rich.text import Text
 from steerclear.shield.bridge.preflight.result import CheckResult, not_passed
 
 from ..deploy.orders import Outcome
-from ..runs.provenance import machine, versions
+from ..provenance import machine, versions
 
 Boat = Annotated[
     str | None,

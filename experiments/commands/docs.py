@@ -9,9 +9,9 @@ import typer
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.files import read_table
 
-from ..pages.docs_pages import SOURCES, write_pages
-from ..runs.json_file import read_json
-from ..runs.results import NAMES
+from ..docs import SOURCES, write_pages
+from ..result_files import read_json
+from ..runner import RESULTS_FILE
 from .console import command, out
 
 Sources = Annotated[
@@ -33,7 +33,7 @@ def docs(sources: Sources = None, folder: Folder = Path("docs")) -> None:
 def _read(source: Path) -> dict[str, Any]:
     if source.suffix == ".npz":
         return {"command": "reach", "card": read_table(source).card.to_json()}
-    path = source / NAMES["results"] if source.is_dir() else source
+    path = source / RESULTS_FILE if source.is_dir() else source
     content = read_json(path, "results", "give a results folder or a JSON file")
     if not isinstance(content, dict):
         raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {SOURCES}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,18 +10,18 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import is_path
 
-from ..encounters.campaign import Campaign, Pair, Settings
+from ..encounters.campaign import Pair, Settings
 from ..encounters.families import FAMILIES
 from ..encounters.guards import parse_guards
 from ..encounters.results import cells_table, heads_legend, results_of, write_all
 from ..encounters.scenes import Conditions
-from ..report.tables import bars_table
-from ..runs.engines import Workers as Engines
-from ..runs.engines import engine_of
-from ..runs.failed_jobs import end_failed
-from ..runs.store import LINES_FILE, ResultStore, write_json
+from ..result_files import write_json
+from ..runner import Run, execute
+from ..tables import goals_table
+from ..workers import Workers as Engines
+from ..workers import workers_of
 from . import options as o
-from .console import Interrupted, command, finish, out, progress
+from .console import command, finish, out, progress
 from .games import results_folder
 from .scenes import play_scene_files
 
@@ -101,13 +100,11 @@ def encounters(
         conditions=Conditions(radius, delay, noise, current),
         judge=not no_judge,
     )
-    results = _run(settings, folder, engine_of(engine, address, workers), resume)
-    if json_file is not None:
+    results, run = _run(settings, folder, workers_of(engine, address, workers), resume)
+    if json_file is not None and not run.interrupted:
         write_json(json_file, results)
-    if results["failed"]:
-        count = len(results["failed"])
-        end_failed(results["failed"], f"{count} chunks could not be played", " (see above); mend it, then --resume")
-    finish(not any(bar["met"] is False and bar["limit"] == 0.0 for bar in results["bars"]))
+    run.end()
+    finish(not any(goal["met"] is False and goal["limit"] == 0.0 for goal in results["goals"]))
 
 
 def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> None:
@@ -168,25 +165,17 @@ def family_names(text: str) -> tuple[str, ...]:
     return tuple(FAMILIES) if names == ("all",) else names
 
 
-def _run(settings: Settings, folder: Path | None, workers: Engines, resume: bool) -> dict[str, Any]:
-    folder = results_folder("encounters", folder, resume)
-    campaign = Campaign(settings, ResultStore(folder, resume, "encounters"), workers)
-    started = time.perf_counter()
-    try:
-        with progress("encounters", campaign.encounters) as notice:
-            campaign.run(notice)
-    except KeyboardInterrupt:
-        results = results_of(campaign, time.perf_counter() - started)
-        if results["cells"]:
-            write_all(folder, results, campaign, replays=False)
-        kept = f"{results['encounters_played']} of {campaign.encounters} encounters kept in {folder / LINES_FILE}"
-        again = f"the same command with --out {folder} --resume goes on from there"
-        raise Interrupted(f"interrupted: {kept}; {again}") from None
-    results = results_of(campaign, time.perf_counter() - started)
+def _run(settings: Settings, folder: Path | None, workers: Engines, resume: bool) -> tuple[dict[str, Any], Run]:
+    experiment = settings.experiment()
+    with progress("chunks of encounters", len(experiment.jobs)) as notice:
+        folder = results_folder("encounters", folder, resume)
+        run = execute(experiment, folder, workers, resume, lambda done, of: notice(done))
+    results = results_of(run)
     if results["cells"]:
-        write_all(folder, results, campaign)
-    _show(results, folder)
-    return results
+        write_all(run, settings, results)
+    if not run.interrupted:
+        _show(results, run.folder)
+    return results, run
 
 
 def _show(results: dict[str, Any], folder: Path) -> None:
@@ -196,12 +185,11 @@ def _show(results: dict[str, Any], folder: Path) -> None:
         console.print()
     if results["cells"]:
         console.print(f"{heads_legend()}\n", style="dim")
-    if results["bars"]:
-        console.print(bars_table(results["bars"]))
+    if results["goals"]:
+        console.print(goals_table(results["goals"]))
         console.print()
     for failed in results["failed"]:
-        console.print(
-            f"not played: {failed['guard']}, {failed['family']}: {failed['error']}", markup=False, soft_wrap=True
-        )
+        words = f"not played: {failed['guard']}, {failed['family']}: {failed['error']}"
+        console.print(words, markup=False, soft_wrap=True)
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)

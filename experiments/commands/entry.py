@@ -10,22 +10,22 @@ import typer
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
+from ..ablation import AblationSettings, spec_of
+from ..ablation import quick as small_version
 from ..entries.check import always_late, check_entry, headline
 from ..entries.report_page import games_to_look_at, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrap import wrap_entry
 from ..play.match import play_match
 from ..play.spec import ANSWER_S
-from ..report.replay_html import write_replay
-from ..runs.ablation import AblationSettings, spec_of
-from ..runs.ablation import quick as small_version
-from ..runs.new_file import NEW
-from ..runs.pool import check_jobs, run_all
-from ..runs.provenance import machine, versions
-from ..runs.store import ResultStore, write_json
+from ..provenance import machine, versions
+from ..replay_html import write_replay
+from ..result_files import NEW, write_json
+from ..runner import Run
+from ..workers import outcomes, processes_of
 from . import options as o
 from .console import command, err, finish, out, progress
-from .games import check_complete, results_folder, run_games, say_of_distance
+from .games import end_run, results_folder, run_games, say_of_distance
 from .once import App
 from .policies_tried import say_of_elsewhere
 
@@ -157,13 +157,12 @@ def report(
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
-    processes = check_jobs(jobs)
+    processes = processes_of(jobs)
     folder = results_folder("entry-report", out_folder, resume)
-    results = run_games("entry report", settings, folder, processes, resume, quick)
-    _show(settings, folder, results, looks, processes)
-    if json_file is not None:
-        write_json(json_file, results)
-    check_complete(results)
+    results, run = run_games("entry report", settings, folder, processes, resume, quick)
+    if not run.interrupted:
+        _show(settings, run, results, looks, processes)
+    end_run(results, run, False, json_file)
 
 
 @app.command()
@@ -197,19 +196,17 @@ def wrap(
         write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})
 
 
-def _show(settings: AblationSettings, folder: Path, results: dict[str, Any], looks: int, processes: int) -> None:
+def _show(settings: AblationSettings, run: Run, results: dict[str, Any], looks: int, processes: int) -> None:
     """Write the page and the replays of the games to look at, and say where they are."""
-    specs = settings.specs()
-    kept = ResultStore(folder, True, "entry report").load()
-    rows = [kept[spec.key] for spec in specs if spec.key in kept]
+    specs, rows, folder = settings.specs(), run.rows, run.folder
     if not rows:
         return
     links = []
     for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
         chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
         with progress(f"replay {number + 1}", 1):
-            outcomes = run_all(play_match, chosen, processes)
-            found = {one.job.key: one.answer.record for one in outcomes if one.answer is not None}
+            answers = outcomes(play_match, chosen, processes)
+            found = {one.job.key: one.answer.record for one in answers if one.answer is not None}
         records = [found[spec.key] for spec in chosen if spec.key in found]
         if len(records) == len(chosen):
             name = f"look_{number + 1}.html"

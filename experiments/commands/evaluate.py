@@ -8,16 +8,16 @@ from typing import Annotated
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..measure.score import DEFAULT_PENALTY
+from ..ablation import AblationSettings
+from ..ablation import quick as small_version
+from ..game_metrics import DEFAULT_PENALTY
 from ..play.conditions import Conditions
 from ..play.spec import ANSWER_S
-from ..runs.ablation import AblationSettings
-from ..runs.ablation import quick as small_version
-from ..runs.pool import check_jobs
+from ..workers import processes_of
 from . import options as o
-from .ablate import QUICK_GAMES, QUICK_TIME_S, end_run
+from .ablate import QUICK_GAMES, QUICK_TIME_S
 from .console import command
-from .games import run_games
+from .games import end_run, run_games
 
 Policy = Annotated[str, typer.Argument(help="A registered policy, or the folder or zip of a submission.")]
 Shield = Annotated[bool, typer.Option("--shield/--no-shield", help="Whether the policy's boats are shielded.")]
@@ -82,4 +82,5 @@ def evaluate(
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
     settings = settings if games is None else replace(settings, games=games)
-    end_run(run_games("evaluate", settings, out, check_jobs(jobs), resume, quick), False, json_file)
+    results, run = run_games("evaluate", settings, out, processes_of(jobs), resume, quick)
+    end_run(results, run, False, json_file)

@@ -13,7 +13,7 @@ from steerclear.policies.entrants.learned.sb3_file import read_sb3
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.new_file import NEW
+from ..result_files import NEW
 from ..training.export import write_submission
 from .console import command, out
 from .files import check_ending

@@ -11,8 +11,8 @@ from typing import Any
 from steerclear.shield.exceptions import ConfigError
 from typer.models import OptionInfo
 
-from ..runs.new_file import NEW, check_new, check_place
-from ..runs.store import BESIDE, LINES_FILE, RESULTS_FILE
+from ..result_files import NEW, check_new, check_place
+from ..runner import BESIDE, EXPERIMENT_FILE, RESULTS_FILE, ROWS_FILE
 
 OTHERS = {
     ".mcap": "black boxes",
@@ -102,7 +102,10 @@ def check_not_in(paths: Any, option: str, folders: Iterable[Path]) -> None:
     """
     for path in _files(paths):
         for folder in folders:
-            if path.name in (LINES_FILE, RESULTS_FILE, *BESIDE) and path.resolve().parent == folder.resolve():
+            if (
+                path.name in (EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE, *BESIDE)
+                and path.resolve().parent == folder.resolve()
+            ):
                 raise ConfigError(
                     f"{option} {path} is what the command writes into {folder} itself; leave it out, or name another"
                 )

@@ -15,8 +15,7 @@ from ..fit.models import MODELS
 from ..fit.plot import draw
 from ..fit.reading import read_logs
 from ..fit.words import about_the_boat, promise
-from ..runs.new_file import NEW, check_new, make_folder_of
-from ..runs.store import write_json
+from ..result_files import NEW, check_new, make_folder_of, write_json
 from . import options as o
 from .console import command, err, out
 from .files import check_each_once, check_ending

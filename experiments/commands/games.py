@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,19 @@ from rich.console import Console
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..measure.judging import check_judge
-from ..measure.score import check_penalty
-from ..measure.tally import RADII_M
+from ..ablation import AblationSettings, replay_of, results_of, write_results
+from ..game_metrics import check_penalty
+from ..metrics import RADII_M
 from ..play.conditions import words_of, words_of_settings
 from ..play.kept_distance import check_shield, words_of_less
 from ..play.learned_elsewhere import made_of
 from ..play.sea import check_current
-from ..report.tables import bars_table, pairing_table, verdict_table
-from ..runs.ablation import AblationSettings
-from ..runs.campaign import Campaign, Played
-from ..runs.engines import Workers
-from ..runs.failed_jobs import end_failed
-from ..runs.results import replay_of, results_of, write_results
-from ..runs.store import LINES_FILE, ResultStore
-from ..runs.warming import WARMED, warm_up
-from .console import Interrupted, err, out, progress
+from ..result_files import write_json
+from ..runner import Run, execute
+from ..tables import goals_table, pairing_table, verdict_table
+from ..verdicts import check_judge
+from ..workers import Workers
+from .console import err, finish, out, progress
 from .policies_tried import try_policies
 
 FEW_GAMES = 20
@@ -99,7 +95,7 @@ def run_games(
     workers: Workers = 1,
     resume: bool = False,
     quick: bool = False,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], Run]:
     """Play all games of the settings, write everything, show the tables.
 
     Args:
@@ -111,27 +107,47 @@ def run_games(
         quick: whether this is the small version.
 
     Returns:
-        The content of results.json.
+        The content of results.json, and the run, whose `end` ends the command.
 
     Raises:
         SteerclearError: bad input; what was played before stays on disk.
-        Interrupted: by Ctrl-C; what is finished has been written.
     """
     check_settings(settings)
     folder = results_folder(command, folder, resume)
-    campaign = Campaign(settings.specs(), ResultStore(folder, resume, command), workers)
-    if resume:
-        warn(campaign.words_of_before)
-    started = time.perf_counter()
-    try:
-        played = _play(campaign, workers)
-        replay = replay_of(played.rows, campaign.specs, settings.separation_m, workers)
-    except KeyboardInterrupt:
-        _write(command, settings, folder, campaign.so_far(), time.perf_counter() - started, quick)
-        raise Interrupted(_how_to_go_on(folder, campaign)) from None
-    results = _write(command, settings, folder, played, time.perf_counter() - started, quick, replay)
-    show(out(), results, folder)
-    return results
+    experiment = settings.experiment(command)
+    with progress("games", len(experiment.jobs)) as notice:
+        run = execute(experiment, folder, workers, resume, lambda done, of: notice(done))
+    replay = None
+    if not run.interrupted:
+        try:
+            replay = replay_of(run.table, settings.specs(), settings.separation_m, workers)
+        except KeyboardInterrupt:
+            run.interrupted = True
+    results = results_of(run, settings, quick) | {"files": {}}
+    if run.rows:
+        entry, records = replay or (None, [])
+        results |= {"replay": entry} if entry is not None else {}
+        write_results(run, results, records)
+    return results, run
+
+
+def end_run(results: dict[str, Any], run: Run, check: bool, json_file: Path | None) -> None:
+    """Show the tables, write the JSON a user asked for and choose the exit status.
+
+    Raises:
+        Interrupted: by Ctrl-C; what is finished has been written.
+        ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
+        PolicyError: a policy gave nothing usable throughout some game.
+    """
+    if not run.interrupted:
+        show(out(), results, run.folder)
+        if json_file is not None:
+            write_json(json_file, results)
+    run.end()
+    if results["held"]:
+        raise PolicyError("; ".join(results["held"]))
+    finish(not check or all(goal["met"] is not False for goal in results["goals"]))
 
 
 def show(console: Console, results: dict[str, Any], folder: Path) -> None:
@@ -150,8 +166,8 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
         console.print()
     if results["pairings"]:
         console.print(f"{HITS_WORDS}\n", soft_wrap=True)
-    if results["bars"]:
-        console.print(bars_table(results["bars"]))
+    if results["goals"]:
+        console.print(goals_table(results["goals"]))
         console.print()
     for failed in results["failed"]:
         state = "on" if failed["shielded"] else "off"
@@ -166,55 +182,6 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
             f"Intervals of {results['settings']['games']} games per pairing say little: those of means are drawn from "
             f"these games alone. Ask for {FEW_GAMES} and more."
         )
-
-
-def check_complete(results: dict[str, Any], folder_known: bool = True) -> None:
-    """End with an error when games are missing, or a policy did not play in some.
-
-    Raises:
-        ConfigError: some games could not be played.
-        JobFault: for one of them a fault of steerclear is why.
-        PolicyError: a policy gave nothing usable throughout some game.
-    """
-    if results["failed"]:
-        words = f"{len(results['failed'])} games could not be played"
-        end_failed(results["failed"], words, " (see above); put that right, then add --resume")
-    if results["held"]:
-        raise PolicyError("; ".join(results["held"]))
-
-
-def _play(campaign: Campaign, workers: Workers) -> Played:
-    if isinstance(workers, int) and workers > 1 and len(campaign.specs) > 1:
-        with progress("compiling; the first time a minute or two", WARMED) as notice:
-            warm_up(campaign.specs, workers, notice)
-    with progress("games", len(campaign.specs)) as notice:
-        return campaign.run(notice)
-
-
-def _write(
-    command: str,
-    settings: AblationSettings,
-    folder: Path,
-    played: Played,
-    wall_s: float,
-    quick: bool,
-    replay: tuple[dict[str, Any], list[Any]] | None = None,
-) -> dict[str, Any]:
-    results = results_of(command, settings, played, wall_s, quick) | {"files": {}}
-    if played.rows:
-        entry, records = replay or (None, [])
-        if entry is not None:
-            results["replay"] = entry
-        write_results(folder, results, played.rows, records)
-    return results
-
-
-def _how_to_go_on(folder: Path, campaign: Campaign) -> str:
-    kept = len(campaign.so_far().rows)
-    return (
-        f"interrupted: {kept} of {len(campaign.specs)} games kept in {folder / LINES_FILE}; "
-        f"the same command with --out {folder} --resume goes on from there"
-    )
 
 
 def _small_version(settings: dict[str, Any]) -> str:

@@ -13,9 +13,9 @@ from steerclear.env.config import GameConfig
 from steerclear.shield.config import PROFILES, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..measure.tally import RADII_M
+from ..metrics import RADII_M
 from ..play.kept_distance import counted_m
-from ..runs.new_file import NEW
+from ..result_files import NEW
 
 Preset = Annotated[str, typer.Option(metavar="NAME", help="Rules of the game: aamas2024, mctf2025 or mctf2026.")]
 Own = Annotated[str, typer.Option(metavar="NAME", help="Policy of the shielded team: a name or a submission's path.")]

@@ -14,11 +14,10 @@ from rich.text import Text
 from steerclear.env.parity import replay_trace
 from steerclear.env.parity_report import ParityReport, Tolerances
 
-from ..report.tables import titled
-from ..runs.failed_jobs import end_failed
-from ..runs.pool import check_jobs, run_all
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..provenance import machine, versions
+from ..result_files import write_json
+from ..tables import titled
+from ..workers import end_failed, outcomes, processes_of
 from . import options as o
 from .console import command, finish, out, progress
 
@@ -34,7 +33,7 @@ def parity(traces: Traces, jobs: o.Jobs = 1, json_file: o.JsonFile = None) -> No
     Exit status: 0 all within the limits, 1 a deviation is over its limit or an event differs, 2 bad input.
     """
     started = time.perf_counter()
-    reports = _replay(traces, check_jobs(jobs))
+    reports = _replay(traces, processes_of(jobs))
     passed = all(report.passed for report in reports)
     _show(reports, passed)
     if json_file is not None:
@@ -49,7 +48,7 @@ def parity(traces: Traces, jobs: o.Jobs = 1, json_file: o.JsonFile = None) -> No
 def _replay(traces: Sequence[Path], processes: int) -> list[ParityReport]:
     reports: dict[Path, ParityReport] = {}
     with progress("traces", len(traces)) as notice:
-        for outcome in run_all(replay_trace, list(traces), processes):
+        for outcome in outcomes(replay_trace, list(traces), processes):
             if outcome.answer is None:
                 end_failed([outcome.why], f"{outcome.job} could not be replayed", f": {outcome.error}")
             reports[outcome.job] = outcome.answer

@@ -16,7 +16,7 @@ from steerclear.shield.platforms.files import PlatformFile, is_path, load_platfo
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
 
 from ..fit.words import about_the_boat, promise
-from ..runs.new_file import NEW, check_new, make_folder_of
+from ..result_files import NEW, check_new, make_folder_of
 from .console import command, out
 from .files import check_ending
 from .once import App

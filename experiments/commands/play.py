@@ -15,17 +15,16 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..measure.score import DEFAULT_PENALTY, check_penalty
+from ..ablation import held_games
+from ..game_metrics import DEFAULT_PENALTY, check_penalty
 from ..play.conditions import Conditions
 from ..play.kept_distance import check_shield
 from ..play.match import MatchResult, Watcher, play_match
 from ..play.sea import check_current
 from ..play.spec import ANSWER_S, MatchSpec
-from ..report.tables import game_table
-from ..runs.failure_words import held_games
-from ..runs.new_file import NEW
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..provenance import machine, versions
+from ..result_files import NEW, write_json
+from ..tables import game_table
 from . import options as o
 from .console import command, err, out, progress
 from .games import say_of_distance

@@ -14,7 +14,7 @@ from steerclear.shield.bridge.fleet_file import load_fleet
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.preflighting import preflight as check_boats
-from ..runs.store import write_json
+from ..result_files import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

@@ -25,7 +25,7 @@ from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
 from ..reach.show import check_picture, draw_sets, show_card
-from ..runs.new_file import NEW, check_new
+from ..result_files import NEW, check_new
 from . import options as o
 from .console import Interrupted, command, err, finish, out
 from .once import App

@@ -12,8 +12,8 @@ from steerclear.shield.tables.settings import problem_of
 
 from ..reach.unsafe_sets import compare_sets, looks_up, places, sets_config
 from ..reach.unsafe_sets_page import HEADS, LOOKED_UP, content_of, rows_of
-from ..report.tables import bars_table, titled
-from ..runs.store import write_json
+from ..result_files import write_json
+from ..tables import goals_table, titled
 from . import options as o
 from .console import command, finish, out, progress
 
@@ -43,9 +43,9 @@ def compare(
     settings = {"own": own, "other": other, "radius_m": radius, "shield": given}
     content = content_of(settings, pairs, looks_up(values, config), time.perf_counter() - started)
     out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(pairs)))
-    out().print(bars_table(content["bars"]))
+    out().print(goals_table(content["goals"]))
     if content["looked_up"]:
         out().print(" ".join(LOOKED_UP.split()), markup=False)
     if json_file is not None:
         write_json(json_file, content)
-    finish(all(bar["met"] is not False for bar in content["bars"]))
+    finish(all(goal["met"] is not False for goal in content["goals"]))

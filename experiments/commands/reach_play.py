@@ -5,22 +5,22 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from steerclear.shield.tables.files import load_table
 from steerclear.shield.tables.make import check_radii
 from steerclear.shield.tables.settings import problem_of
 
-from ..reach.played_sets import PlayedSet, Task, check_settings, play_set, tasks_of
+from ..reach.played_sets import PlayedSet, check_settings, play_job, tasks_of
 from ..reach.played_sets_page import HEADS, content_of, rows_of
 from ..reach.unsafe_sets import places
-from ..report.tables import bars_table, titled
-from ..runs.failed_jobs import end_failed
-from ..runs.pool import check_jobs, run_all
-from ..runs.store import ResultStore, key_of, write_json
+from ..result_files import write_json
+from ..runner import RESULTS_FILE, Experiment, execute
+from ..tables import goals_table, titled
+from ..workers import processes_of
 from . import options as o
-from .console import Interrupted, command, finish, out, progress
+from .console import command, finish, out, progress
 from .reach_compare import OtherBoat, OwnBoat
 
 
@@ -49,40 +49,19 @@ def play(
     check_radii(problem_of(own, other), (radius,))
     given = o.key_values(shield_set, "--shield-set")
     check_settings(given)
-    tasks = tasks_of(own, other, radius, given, places(values))
-    processes = check_jobs(jobs)
-    folder = out_folder or Path("results") / f"reach_play_{own}_{other}_{radius:g}"
-    store = ResultStore(folder, resume, "reach-play")
-    sets = _played(tasks, store, processes)
+    tasks = [asdict(task) for task in tasks_of(own, other, radius, given, places(values))]
     settings = {"own": own, "other": other, "radius_m": radius, "shield": given}
+    folder = out_folder or Path("results") / f"reach_play_{own}_{other}_{radius:g}"
+    with progress("sets", len(tasks)) as notice:
+        experiment = Experiment("reach-play", settings, tasks, play_job, "sets")
+        run = execute(experiment, folder, processes_of(jobs), resume, lambda done, of: notice(done))
+    run.end()
+    sets = [PlayedSet(**row) for row in run.rows]
     content = content_of(settings, sets, time.perf_counter() - started)
     out().print(titled(f"{own} meets {other}, {radius:g} m", list(HEADS), rows_of(sets)))
-    out().print(bars_table(content["bars"]))
-    write_json(store.folder / "results.json", content)
-    out().print(store.folder / "results.json", soft_wrap=True)
+    out().print(goals_table(content["goals"]))
+    run.write(content)
+    out().print(f"{folder / RESULTS_FILE}", soft_wrap=True)
     if json_file is not None:
         write_json(json_file, content)
-    finish(all(bar["met"] is not False for bar in content["bars"]))
-
-
-def _played(tasks: list[Task], store: ResultStore, processes: int) -> list[PlayedSet]:
-    """Sets of all tasks, those that an earlier run left in the store taken from there."""
-    keys = [key_of(asdict(task)) for task in tasks]
-    found: dict[str, dict[str, Any]] = {key: row for key, row in store.load().items() if key in keys}
-    missing = [task for task, key in zip(tasks, keys, strict=True) if key not in found]
-    try:
-        with progress("sets", len(tasks)) as notice:
-            notice(len(found))
-            for outcome in run_all(play_set, missing, processes):
-                if outcome.answer is None:
-                    end_failed([outcome.why], "a set could not be played", f": {outcome.error}")
-                key = key_of(asdict(outcome.job))
-                found[key] = asdict(outcome.answer)
-                store.append(key, found[key])
-                notice(len(found))
-    except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted: {len(found)} of {len(tasks)} sets kept in {store.lines}; the same command with --out "
-            f"{store.folder} --resume goes on from there"
-        ) from None
-    return [PlayedSet(**found[key]) for key in keys]
+    finish(all(bar["met"] is not False for bar in content["goals"]))

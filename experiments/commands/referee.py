@@ -19,8 +19,8 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..deploy.lifeline import end_with_parent
 from ..deploy.referee import RATE_HZ, Referee
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..provenance import machine, versions
+from ..result_files import write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, out

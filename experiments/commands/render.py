@@ -10,10 +10,9 @@ import typer
 from steerclear.env.record import load
 from steerclear.shield.exceptions import ConfigError
 
-from ..report.replay_html import write_replay
-from ..runs.new_file import NEW, check_new
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..provenance import machine, versions
+from ..replay_html import write_replay
+from ..result_files import NEW, check_new, write_json
 from . import options as o
 from .console import command, out
 from .saving import check_endings, save_record

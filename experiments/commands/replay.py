@@ -13,10 +13,9 @@ from steerclear.shield.bridge.mavlink.signing import read_key
 
 from ..deploy.replay_text import show
 from ..deploy.replaying_report import Replay, as_content, compare, draw, replay_log
-from ..report.replay_html import write_replay
-from ..runs.new_file import NEW
-from ..runs.provenance import machine, versions
-from ..runs.store import write_json
+from ..provenance import machine, versions
+from ..replay_html import write_replay
+from ..result_files import NEW, write_json
 from . import options as o
 from .console import ExitCode, command, finish, out
 from .files import check_ending

@@ -9,7 +9,7 @@ from typing import Any
 from steerclear.env.record import Record, save
 from steerclear.shield.exceptions import ConfigError
 
-from ..report.replay_html import write_replay
+from ..replay_html import write_replay
 from .console import progress
 
 ENDINGS = (".npz", ".html", ".mp4", ".gif", ".png")
@@ -85,7 +85,7 @@ def closest_step(record: Record) -> int:
     """Find the step at which a shielded boat (any boat, without a shield) is closest to another."""
     import numpy as np
 
-    from ..measure.breaches import PairDistances
+    from ..game_metrics import PairDistances
 
     covered: Any = record["intervened"].any(axis=0)
     distances = PairDistances.of(record["position"])

@@ -13,9 +13,9 @@ from ..encounters.play import play
 from ..encounters.replays import record_of
 from ..encounters.results import is_shield
 from ..encounters.scene_file import read_scene
-from ..report.replay_html import write_replay
-from ..report.tables import number_text, titled
-from ..runs.new_file import check_new
+from ..replay_html import write_replay
+from ..result_files import check_new
+from ..tables import number_text, titled
 from .console import out
 
 

@@ -25,8 +25,7 @@ from ..boats.off import off_platform
 from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from ..deploy.lifeline import end_with_parent
 from ..play.spec import check_seed
-from ..runs.new_file import NEW
-from ..runs.store import write_json
+from ..result_files import NEW, write_json
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

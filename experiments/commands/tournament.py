@@ -9,17 +9,14 @@ from typing import Annotated, Any
 import typer
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-from ..measure.judging import check_judge
-from ..measure.score import DEFAULT_PENALTY, check_penalty
+from ..game_metrics import DEFAULT_PENALTY, check_penalty
 from ..play.conditions import CALM
 from ..play.kept_distance import check_shield
 from ..play.sea import check_current
 from ..play.spec import ANSWER_S
-from ..report.tables import bars_table, titled
-from ..runs.engines import Workers, engine_of
-from ..runs.failed_jobs import end_failed
-from ..runs.store import LINES_FILE, RESULTS_FILE, ResultStore, write_json, write_table
-from ..runs.warming import WARMED, warm_up
+from ..result_files import write_json, write_table
+from ..runner import RESULTS_FILE, ROWS_FILE
+from ..tables import goals_table, titled
 from ..tournament.campaign import Tournament
 from ..tournament.pages import subtitle, write_html
 from ..tournament.paper import SCRIPTED
@@ -27,6 +24,8 @@ from ..tournament.replays import chosen_games, write_replays
 from ..tournament.results import compared_states, results_of, silent_teams
 from ..tournament.settings import FINAL, TournamentSettings, quick
 from ..tournament.tables import all_tables, cycle_lines
+from ..verdicts import check_judge
+from ..workers import Workers, end_failed, workers_of
 from . import options as o
 from .console import Interrupted, command, err, finish, out, progress
 from .games import KEYBOARD, results_folder, say_of_distance
@@ -102,14 +101,14 @@ def tournament(
         answer_s=answer_time,
     )
     settings = quick(settings, QUICK_TIME_S) if quick_version else settings
-    workers = engine_of(engine, address, jobs)
+    workers = workers_of(engine, address, jobs)
     _check(settings)
     folder = results_folder("tournament", out_folder, resume)
     results = _run(settings, folder, workers, resume, replays)
     if json_file is not None:
         write_json(json_file, results)
     _check_complete(results)
-    finish(not check or all(bar["met"] is not False for bar in results["bars"]))
+    finish(not check or all(bar["met"] is not False for bar in results["goals"]))
 
 
 def _check(settings: TournamentSettings) -> None:
@@ -129,9 +128,9 @@ def _check(settings: TournamentSettings) -> None:
 
 
 def _run(settings: TournamentSettings, folder: Path, workers: Workers, resume: bool, replays: bool) -> dict[str, Any]:
-    played = Tournament(settings, ResultStore(folder, resume, "tournament"), workers)
+    played = Tournament(settings, folder, resume, workers)
     if resume:
-        err().print(f"{played.resumed} games are in {folder / LINES_FILE} and are taken from there", soft_wrap=True)
+        err().print(f"{played.resumed} games are in {folder / ROWS_FILE} and are taken from there", soft_wrap=True)
     started = time.perf_counter()
     try:
         _play(played, workers)
@@ -139,7 +138,7 @@ def _run(settings: TournamentSettings, folder: Path, workers: Workers, resume: b
     except KeyboardInterrupt:
         _write(played, folder, time.perf_counter() - started, [])
         raise Interrupted(
-            f"interrupted: {len(played.rows())} of {played.expected} games kept in {folder / LINES_FILE}; "
+            f"interrupted: {len(played.rows())} of {played.expected} games kept in {folder / ROWS_FILE}; "
             f"the same command with --out {folder} --resume goes on from there"
         ) from None
     results = _write(played, folder, time.perf_counter() - started, links)
@@ -148,9 +147,6 @@ def _run(settings: TournamentSettings, folder: Path, workers: Workers, resume: b
 
 
 def _play(played: Tournament, workers: Workers) -> None:
-    if isinstance(workers, int) and workers > 1:
-        with progress("compiling; the first time a minute or two", WARMED) as notice:
-            warm_up([job.spec for job in played.jobs], workers, notice)
     with progress("games", played.expected) as notice:
         played.run(lambda done, of: notice(done))
 
@@ -184,8 +180,8 @@ def _show(results: dict[str, Any], folder: Path) -> None:
         console.print()
     for words in cycle_lines(results):
         console.print(f"{words}", markup=False, soft_wrap=True)
-    if results["bars"]:
-        console.print(bars_table(results["bars"]))
+    if results["goals"]:
+        console.print(goals_table(results["goals"]))
     for failed in results["failed"]:
         words = f"not played: {failed['blue']} against {failed['red']}, {failed['state']}: {failed['error']}"
         console.print(words, markup=False, soft_wrap=True)

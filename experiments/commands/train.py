@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import install_command
 
-from ..runs.folder_lock import lock_folder
+from ..result_files import lock_folder
 from ..training.config_file import read_config
 from .console import Interrupted, command, err, out
 from .plain_progress import PlainProgress

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.folder_lock import lock_folder
-from ..runs.pool import check_jobs
+from ..result_files import lock_folder
 from ..training.config_file import read_config
+from ..workers import processes_of
 from . import options as o
 from .console import Interrupted, command, out, progress
 from .train import Config, check_extra
@@ -31,7 +31,7 @@ def train_study(
 
     ``steerclear docs DIR`` makes its page. Exit status: 0 done, 2 bad input, 130 interrupted (the same goes on).
     """
-    settings, processes = read_config(config), check_jobs(jobs)
+    settings, processes = read_config(config), processes_of(jobs)
     check_extra()
     from ..training.study import RESULTS, cells, run_study
 

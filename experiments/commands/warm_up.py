@@ -7,7 +7,7 @@ import time
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in
 
-from ..runs.warming import parts_of_all
+from ..warming import PARTS
 from .console import command, err, out
 
 
@@ -22,7 +22,7 @@ def warm_up() -> None:
     place, started = kept_in(), time.perf_counter()
     if not place:
         raise ConfigError("compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written to")
-    for name, compile_it in parts_of_all():
+    for name, compile_it in PARTS.items():
         err().print(f"compiling {name}", soft_wrap=True)
         compile_it()
     out().print(f"done ({time.perf_counter() - started:.0f} s); kept in {place}", soft_wrap=True)

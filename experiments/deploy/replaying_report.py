@@ -12,8 +12,8 @@ from steerclear.env.record import Record
 from steerclear.shield.bridge.blackbox import ChainCheck, LogHeader, LogLine, LogReader
 from steerclear.shield.bridge.blackbox.header import describe_machine, source_digest, table_digests, versions
 
-from ..measure.breaches import PairDistances
-from ..measure.judging import NOT_JUDGED, judge_game
+from ..game_metrics import PairDistances
+from ..verdicts import NOT_JUDGED, judge_game
 from .replaying import Proof, Prover
 from .replaying_record import placed, record_of
 from .replaying_tracks import TrackBuilder, Tracks

@@ -1,8 +1,8 @@
-"""Playing all cells of a run: guards x platforms x families, in chunks, each kept on disk as it comes."""
+"""Settings of a run of encounters, and its jobs: guards x platforms x families, in chunks of alike scenes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,8 +11,9 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
 from ..play.spec import check_seed
-from ..runs.pool import Engine, run_all
-from ..runs.store import ResultStore, key_of
+from ..runner import Experiment
+from ..warming import compile_encounters, compile_judge
+from ..workers import Job, Row
 from .families import draw, get_family
 from .guards import check_guard
 from .measure import chunk_size, measure_chunk
@@ -23,9 +24,6 @@ from .tally import Columns
 Pair = tuple[str, str]
 MOST_ENCOUNTERS = 1_000_000
 """Encounters of a family, platform and guard at most: all are listed before the first is played."""
-
-COLUMNS_VERSION = 4
-"""Goes up when columns change, so that results kept by an earlier version are played anew."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +62,10 @@ class Settings:
         for name in {name for pair in self.platforms for name in pair}:
             get_platform(name)
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-ready."""
-        return asdict(self)
+    def experiment(self) -> Experiment:
+        """What `runner.execute` runs."""
+        compiles = (compile_encounters, *((compile_judge,) if self.judge else ()))
+        return Experiment("encounters", asdict(self), list(jobs_of(self)), play_job, "chunks of encounters", compiles)
 
 
 @dataclass(frozen=True)
@@ -79,30 +78,13 @@ class Cell:
     family: str
 
 
-@dataclass(frozen=True)
-class Job:
-    """Some encounters of a cell; ``columns`` tells results of different versions apart."""
-
-    cell: Cell
-    conditions: Conditions
-    seed: int
-    first: int
-    count: int
-    judge: bool
-    columns: int = COLUMNS_VERSION
-
-    @property
-    def key(self) -> str:
-        """Name under which the result is kept."""
-        return key_of(asdict(self))
-
-
-def play_job(job: Job) -> dict[str, Any]:
-    """Play some encounters; the columns as lists, and the cell."""
-    cell = job.cell
-    scenes = draw(cell.family, cell.own, cell.other, job.conditions, job.seed, job.first, job.count)
-    columns = measure_chunk(scenes, cell.guard, job.conditions, job.judge)
-    return {"cell": asdict(cell), "columns": {name: values.tolist() for name, values in columns.items()}}
+def play_job(job: Job) -> list[Row]:
+    """Play the encounters of a job; a row each."""
+    cell, conditions = Cell(**job["cell"]), Conditions(**job["conditions"])
+    scenes = draw(cell.family, cell.own, cell.other, conditions, job["seed"], job["first"], job["count"])
+    columns = measure_chunk(scenes, cell.guard, conditions, job["judge"])
+    names = asdict(cell)
+    return [{**names, **dict(zip(columns, values, strict=True))} for values in np.array([*columns.values()]).T.tolist()]
 
 
 def cells_of(settings: Settings) -> list[Cell]:
@@ -119,58 +101,21 @@ def jobs_of(settings: Settings) -> Iterator[Job]:
     """All jobs of a run."""
     for cell in cells_of(settings):
         size = chunk_size(draw(cell.family, cell.own, cell.other, settings.conditions, settings.seed, 0, 1))
+        same = {"cell": asdict(cell), "conditions": asdict(settings.conditions), "seed": settings.seed}
         for first in range(0, settings.n, size):
-            count = min(size, settings.n - first)
-            yield Job(cell, settings.conditions, settings.seed, first, count, settings.judge)
+            yield {**same, "first": first, "count": min(size, settings.n - first), "judge": settings.judge}
 
 
-class Campaign:
-    """A run, and where its results are kept.
-
-    Args:
-        settings: what to play.
-        store: where results go and where finished ones come from.
-        processes: how many at once, or the engine that plays them.
-    """
-
-    def __init__(self, settings: Settings, store: ResultStore, processes: int | Engine = 1) -> None:
-        self.settings, self.store, self.processes = settings, store, processes
-        self.jobs = list(jobs_of(settings))
-        self.failed: list[dict[str, Any]] = []
-        self.resumed = 0
-
-    @property
-    def encounters(self) -> int:
-        """How many encounters the run has, over all cells."""
-        return sum(job.count for job in self.jobs)
-
-    def run(self, notice: Callable[[int], None]) -> None:
-        """Play what is missing; ``notice`` is told how many encounters are done."""
-        before = self.store.load()
-        missing = [job for job in self.jobs if job.key not in before]
-        self.resumed = done = self.encounters - sum(job.count for job in missing)
-        notice(done)
-        for outcome in run_all(play_job, missing, self.processes):
-            if outcome.answer is None:
-                self.failed.append({**asdict(outcome.job.cell), "first": outcome.job.first, **outcome.why})
-            else:
-                self.store.append(outcome.job.key, outcome.answer)
-            done += outcome.job.count
-            notice(done)
-
-    def columns(self) -> dict[Cell, Columns]:
-        """What is on disk of this run, by cell."""
-        kept = self.store.load()
-        parts: dict[Cell, list[Mapping[str, Any]]] = {}
-        for job in self.jobs:
-            if job.key in kept:
-                parts.setdefault(job.cell, []).append(kept[job.key]["columns"])
-        return {
-            cell: {
-                name: np.concatenate([np.array(part[name], dtype=np.float64) for part in found]) for name in found[0]
-            }
-            for cell, found in parts.items()
-        }
+def columns_of(rows: Sequence[Row]) -> dict[Cell, Columns]:
+    """Rows of encounters as columns, by cell."""
+    groups: dict[Cell, list[Row]] = {}
+    names = Cell.__dataclass_fields__
+    for row in rows:
+        groups.setdefault(Cell(**{name: row[name] for name in names}), []).append(row)
+    return {
+        cell: {name: np.array([row[name] for row in found], dtype=np.float64) for name in found[0] if name not in names}
+        for cell, found in groups.items()
+    }
 
 
 def cell_summaries(columns: Mapping[Cell, Columns]) -> list[dict[str, Any]]:

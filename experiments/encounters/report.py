@@ -6,15 +6,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..report.page import as_text, report_page, template, write_page
-from ..report.parts import bars_table, legend, replay_links, values_table
-from ..report.tables import number_text
-from .cdf import Curve, distribution_plot
+from markupsafe import Markup
+
+from .. import plots
+from ..report import Plot, Report, Section, Table, Tile, made_of, plain
+from ..tables import number_text
 from .families import FAMILIES
 from .guards import NONE
 
 Cells = Sequence[Mapping[str, Any]]
-STYLES = 6
+MOST_M = 15.0
+"""Distances beyond this are cut off: nobody is in danger there, m."""
 COLUMNS = (
     ("guard", "guard"),
     ("encounters", "n"),
@@ -50,17 +52,15 @@ WORST_COLUMNS = (
     ("responsible", "last chance let pass by"),
     ("start_certificate_m", "certificate at the start, m"),
 )
-STYLE = """
-svg .curve { fill: none !important; stroke-width: 2; stroke-linejoin: round; }
-.curve.off { stroke: var(--off); } .curve.reason-0 { stroke: var(--r0); } .curve.reason-1 { stroke: var(--r1); }
-.curve.reason-2 { stroke: var(--r2); } .curve.reason-3 { stroke: var(--r3); } .curve.reason-4 { stroke: var(--r4); }
-.curve.reason-5 { stroke: var(--r5); }
-.small { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 300px), 1fr)); gap: 12px;
-  margin: 12px 0; }
-td.first, th.first { text-align: left; white-space: nowrap; }
-th.number { white-space: normal; vertical-align: bottom; }
-tr.family td { padding-top: 10px; color: var(--muted); border-bottom: none; }
-"""
+NOTE = (
+    "An encounter is breached when an own boat comes within the radius of any boat; avoidable when its own commands "
+    "could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an avoidable breach "
+    "(Clopper and Pearson), breaches that were not judged counting as avoidable. 'Started outside' are encounters in "
+    "which the shield's certificate at the first decision was at least 0 for every own boat, whatever guard played. "
+    "Changes are means over the changed steps; time to the goal is against the same scenes without a guard, a boat "
+    "that never arrives counting with the whole length. Closest distances beyond 15 m are cut off; the dashed line "
+    "marks the radius."
+)
 
 
 def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
@@ -77,19 +77,18 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     pairs = list(dict.fromkeys((cell["own"], cell["other"]) for cell in cells))
     replay = results["files"].get("replay")
     links = [{"path": replay, "label": "the worst encounters, with the guard and without"}] if replay else []
-    parts = {
-        "TITLE": "Encounters",
-        "STYLE": template("report.css") + STYLE,
-        "SUBTITLE": as_text(subtitle(results)),
-        "HEADLINES": _headlines(cells),
-        "REPLAYS": replay_links(links),
-        "BARS": bars_table(results["bars"]),
-        "PLATFORMS": "".join(_platform_section(pair, cells, results["settings"]) for pair in pairs),
-        "WORST": _worst_table(results["worst"]),
-        "SETTINGS": values_table(results["settings"]),
-        "VERSIONS": values_table({**results["versions"], **results["machine"]}),
-    }
-    return write_page(path, report_page("encounters.html", parts))
+    return Report(
+        title="Encounters",
+        subtitle=subtitle(results),
+        tiles=_tiles(cells),
+        links=links,
+        goals=results["goals"],
+        sections=[
+            *(_platform_section(pair, cells, results["settings"]) for pair in pairs),
+            Section("The worst encounters", [_worst_table(results["worst"])], NOTE, wide=True),
+            made_of(results),
+        ],
+    ).write(path)
 
 
 def subtitle(results: Mapping[str, Any]) -> str:
@@ -102,88 +101,72 @@ def subtitle(results: Mapping[str, Any]) -> str:
     return " · ".join([f"{settings['n']} encounters per cell", *parts, f"seed {settings['seed']}"])
 
 
-def _headlines(cells: Cells) -> str:
+def _tiles(cells: Cells) -> list[Tile]:
     tiles = []
     for guard in dict.fromkeys(cell["guard"] for cell in cells):
         own = [cell for cell in cells if cell["guard"] == guard]
         n, breached, avoidable = (sum(c[name] for c in own) for name in ("encounters", "breached", "avoidable"))
         judged = "no breach judged" if all(c["not_judged"] == c["breached"] for c in own) and breached else ""
         words = judged or f"avoidable: {avoidable}"
-        tiles.append(
-            f'<div class="tile"><h3>{as_text(guard)}: encounters breached</h3><p class="numbers">'
-            f'<span class="on">{breached}</span><span class="arrow">of</span>'
-            f'<span class="off">{n:,}</span></p><p class="note">{words}</p></div>'
-        )
-    return "".join(tiles)
+        tiles.append(Tile(f"{guard}: encounters breached", None, f"{breached} of {n:,}", words))
+    return tiles
 
 
-def _platform_section(pair: tuple[str, str], cells: Cells, settings: Mapping[str, Any]) -> str:
+def _platform_section(pair: tuple[str, str], cells: Cells, settings: Mapping[str, Any]) -> Section:
     chosen = [cell for cell in cells if (cell["own"], cell["other"]) == pair]
     own, other = pair
-    title = f"{own} meets {other}" if own != other else own
     families = list(dict.fromkeys(cell["family"] for cell in chosen))
-    guards = list(settings["guards"])
-    key = legend([("off", "without a guard"), *((_style(guards, g), g) for g in guards if g != NONE)])
-    plots = "".join(_family_plot(name, chosen, guards, settings) for name in families)
-    return (
-        f"<h2>{as_text(title)}</h2><section class='card wide'>{_cells_table(chosen, families)}</section>"
-        f"<h3 style='margin-top:16px'>Closest distance: share of encounters that came closer</h3>{key}"
-        f"<section class='small'>{plots}</section>"
+    rows = [[family, *_figures(cell)] for family in families for cell in chosen if cell["family"] == family]
+    return Section(
+        f"{own} meets {other}" if own != other else own,
+        [Table("", ["family", *(words for _, words in COLUMNS)], rows)],
+        plots=[_family_plot(name, chosen, settings) for name in families],
+        wide=True,
     )
 
 
-def _style(guards: Sequence[str], guard: str) -> str:
-    named = [name for name in guards if name != NONE]
-    return "off" if guard == NONE else f"reason-{named.index(guard) % STYLES}"
-
-
-def _family_plot(family: str, cells: Cells, guards: Sequence[str], settings: Mapping[str, Any]) -> str:
+def _family_plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:
+    """Share of encounters that came closer than a distance."""
     own = [cell for cell in cells if cell["family"] == family]
-    curves: list[Curve] = [("off", "without a guard", own[0]["unshielded_closest_quantiles_m"])]
+    named = [name for name in settings["guards"] if name != NONE]
+    curves = [("without a guard", "off", own[0]["unshielded_closest_quantiles_m"])]
     curves += [
-        (_style(guards, cell["guard"]), cell["guard"], cell["closest_quantiles_m"])
+        (cell["guard"], plots.SERIES[named.index(cell["guard"]) % len(plots.SERIES)], cell["closest_quantiles_m"])
         for cell in own
         if cell["guard"] != NONE
     ]
-    plot = distribution_plot(curves, "closest distance, m", settings["conditions"]["radius_m"])
-    words = FAMILIES[family].words
-    return f'<figure class="card"><h3>{as_text(family)}</h3><p class="note">{as_text(words)}</p>{plot}</figure>'
+    words = "closest distance, m: share that came closer"
+    series = [(name, colour, *_cut(quantiles)) for name, colour, quantiles in curves]
+    figure = plots.curves(series, settings["conditions"]["radius_m"], words)
+    legend = [(colour, name) for name, colour, _ in curves]
+    return Plot(family, Markup(plots.svg(figure, words)), legend, [("", FAMILIES[family].words)])
 
 
-def _cells_table(cells: Cells, families: Sequence[str]) -> str:
-    head = "".join(
-        f"<th class='{'first' if k == 0 else 'number'}'>{as_text(text)}</th>" for k, (_, text) in enumerate(COLUMNS)
-    )
-    rows = []
-    for family in families:
-        rows.append(f"<tr class='family'><td colspan='{len(COLUMNS)}'>{as_text(family)}</td></tr>")
-        for cell in (cell for cell in cells if cell["family"] == family):
-            rows.append("<tr>" + "".join(_cell(cell, name) for name, _ in COLUMNS) + "</tr>")
-    return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
+def _cut(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
+    """A distribution function from quantiles at equal steps of probability, up to `MOST_M`."""
+    steps = max(1, len(quantiles) - 1)
+    kept = [(value, k / steps) for k, value in enumerate(quantiles) if value < MOST_M]
+    kept.append((MOST_M, 1.0 if len(kept) == len(quantiles) else kept[-1][1] if kept else 0.0))
+    kept.insert(0, (kept[0][0], 0.0))
+    return [value for value, _ in kept], [share for _, share in kept]
 
 
-def _cell(cell: Mapping[str, Any], name: str) -> str:
-    value = cell[name]
-    if name == "guard":
-        return f'<td class="first">{as_text(value)}</td>'
-    if name in PERCENT:
-        value = 100.0 * value
-    bad = " bad" if name in ("avoidable", "deadlocked") and value else ""
-    text = str(value) if isinstance(value, int) else number_text(value)
-    if name == "avoidable" and cell["not_judged"]:
-        text += f" (+{cell['not_judged']} not judged)"
-    if name == "breaches_outside":
-        text += f" of {cell['started_outside']}"
-    return f'<td class="number{bad}">{text}</td>'
+def _figures(cell: Mapping[str, Any]) -> list[str]:
+    shown = []
+    for name, _ in COLUMNS:
+        value = 100.0 * cell[name] if name in PERCENT else cell[name]
+        text = str(value) if isinstance(value, str | int) else number_text(value)
+        if name == "avoidable" and cell["not_judged"]:
+            text += f" (+{cell['not_judged']} not judged)"
+        if name == "breaches_outside":
+            text += f" of {cell['started_outside']}"
+        shown.append(text)
+    return shown
 
 
-def _worst_table(worst: Cells) -> str:
-    head = "".join(f"<th>{as_text(text)}</th>" for _, text in WORST_COLUMNS)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{_plain(row[name])}</td>" for name, _ in WORST_COLUMNS) + "</tr>" for row in worst
-    )
-    return f"<table><tr>{head}</tr>{rows}</table>"
-
-
-def _plain(value: object) -> str:
-    return as_text("–" if value is None else f"{value:.2f}" if isinstance(value, float) else value)
+def _worst_table(worst: Cells) -> Table:
+    rows = [
+        [f"{row[name]:.2f}" if isinstance(row[name], float) else plain(row[name]) for name, _ in WORST_COLUMNS]
+        for row in worst
+    ]
+    return Table("", [words for _, words in WORST_COLUMNS], rows, numbers=False)

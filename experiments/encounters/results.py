@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Group
 from rich.text import Text
 
-from ..report.tables import number_text, titled
-from ..runs.provenance import machine, versions
-from ..runs.store import LINES_FILE, write_json
-from .campaign import Campaign, cell_summaries
+from ..metrics import judged
+from ..result_files import table_name
+from ..runner import RESULTS_FILE, Run
+from ..tables import number_text, titled
+from .campaign import Settings, cell_summaries, columns_of
 from .families import FAMILIES
 from .guards import SHIELD
 from .report import write_encounter_report
@@ -23,48 +23,46 @@ UNAVOIDABLE_PERCENT = 1.0
 """Most encounters with several others that may be breached unavoidably, %."""
 
 
-def results_of(campaign: Campaign, wall_s: float) -> dict[str, Any]:
+def results_of(run: Run) -> dict[str, Any]:
     """Content of results.json, of what is on disk."""
-    columns = campaign.columns()
+    columns = columns_of(run.rows)
     cells = cell_summaries(columns)
+    failed = [{**job["cell"], **{name: job[name] for name in ("first", "error", "fault")}} for job in run.failed]
     played = sum(cell["encounters"] for cell in cells)
+    goals = goals_of(cells)
     return {
-        "command": "encounters",
-        "complete": played == campaign.encounters,
-        "settings": campaign.settings.as_dict(),
-        "versions": versions(),
-        "machine": machine(),
-        "wall_s": wall_s,
+        **run.head(),
         "encounters_played": played,
-        "encounters_resumed": campaign.resumed,
-        "failed": campaign.failed,
+        "encounters_resumed": run.resumed,
+        "failed": failed,
         "cells": cells,
-        "bars": bars_of(cells),
+        "goals": goals,
         "worst": worst_encounters(columns),
-        "files": {"games": LINES_FILE},
+        "files": {"games": table_name()},
+        "deprecated": {"bars": goals},
     }
 
 
-def bars_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Bars of every shield: no avoidable breach, few unavoidable ones among several others.
+def goals_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Goals of every shield: no avoidable breach, few unavoidable ones among several others.
 
     One rammer of the same platform must not breach at all where the start was outside the unavoidable set. A count
-    that the oracle was not asked about leaves the bar without data.
+    that the oracle was not asked about leaves the goal without data.
     """
-    bars = []
+    goals = []
     for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
         own = [cell for cell in cells if cell["guard"] == guard]
         many = [cell for cell in own if FAMILIES[cell["family"]].others > 1]
-        bars.append(_bar(f"{guard}: encounters with avoidable breaches", _total(own, "avoidable"), 0.0, own))
+        goals.append(_goal(f"{guard}: encounters with avoidable breaches", _total(own, "avoidable"), 0.0, own))
         same = [cell for cell in own if cell["family"] == ONE_RAMMER and cell["own"] == cell["other"]]
         if same:
-            bars.append(
-                _bar(f"{guard}: started outside, breached by one rammer", _total(same, "breaches_outside"), 0.0)
+            goals.append(
+                _goal(f"{guard}: started outside, breached by one rammer", _total(same, "breaches_outside"), 0.0)
             )
         if many:
             share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
-            bars.append(_bar(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
-    return bars
+            goals.append(_goal(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
+    return goals
 
 
 def is_shield(guard: str) -> bool:
@@ -76,24 +74,19 @@ def _total(cells: Sequence[Mapping[str, Any]], name: str) -> float:
     return float(sum(cell[name] for cell in cells))
 
 
-def _bar(name: str, value: float, limit: float, judged: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """A bar; ``judged`` are the cells whose verdicts it hangs on: what was not judged leaves it without data."""
-    met: bool | None = value <= limit
-    if met and any(cell["not_judged"] for cell in judged):
-        met = None
-    return {"name": name, "value": value, "low": None, "high": None, "sense": "<=", "limit": limit, "met": met}
+def _goal(name: str, value: float, limit: float, cells: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """A goal; ``cells`` are those whose verdicts it hangs on: what was not judged leaves it without data."""
+    return judged(name, value, "<=", limit, open_=any(cell["not_judged"] for cell in cells))
 
 
-def write_all(folder: Path, results: dict[str, Any], campaign: Campaign, replays: bool = True) -> Path:
+def write_all(run: Run, settings: Settings, results: dict[str, Any]) -> None:
     """Write replay, report and results.json into the folder; names are noted under ``files``."""
-    settings = campaign.settings
-    results["files"] |= {"report": "report.html", "results": "results.json"}
-    if replays and results["worst"]:
-        replay_worst(results["worst"], settings.conditions, settings.seed, folder / "replay.html")
+    results["files"] |= {"report": "report.html", "results": RESULTS_FILE}
+    if results["worst"] and not run.interrupted:
+        replay_worst(results["worst"], settings.conditions, settings.seed, run.folder / "replay.html")
         results["files"]["replay"] = "replay.html"
-    write_encounter_report(results, folder / "report.html")
-    write_json(folder / "results.json", results)
-    return folder / "results.json"
+    write_encounter_report(results, run.folder / "report.html")
+    run.write(results)
 
 
 HEADS = (

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.json_file import read_json
-from ..runs.store import write_json
+from ..result_files import read_json, write_json
 from .scene_check import check_scenes
 from .scenes import Conditions, Scenes
 

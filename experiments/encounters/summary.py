@@ -5,19 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
-from ..measure.statistics import CONFIDENCE
+from ..statistics import upper_bound
 from .tally import Columns
 from .verdicts import SIDES
-
-
-def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
-    """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
-    if trials == 0 or events >= trials:
-        return 1.0
-    return float(stats.beta.ppf(confidence, events + 1, trials - events))
-
 
 QUANTILES = np.linspace(0.0, 1.0, 101)
 

@@ -10,9 +10,8 @@ from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
+from ..game_metrics import DEAD_BAND_DEG, DEADLOCK_S, deadlocks
 from ..jit import kernel
-from ..measure.deadlocks import DEADLOCK_S, deadlocks
-from ..measure.reversals import DEAD_BAND_DEG
 from .play import Film
 from .scenes import DT_S
 

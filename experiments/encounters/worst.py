@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..report.replay_html import write_replay
+from ..replay_html import write_replay
 from .campaign import Cell
 from .families import draw
 from .guards import NONE, SHIELD

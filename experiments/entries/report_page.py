@@ -8,19 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.statistics import Interval, paired_difference
-from ..measure.summary import Row, by_game
-from ..measure.tally import breach_column
-from ..report.page import as_text, html_page, template, write_page
-from ..report.tables import number_text
-from ..runs.ablation import AblationSettings, by_pairing
+from ..ablation import AblationSettings
+from ..metrics import breach_column
+from ..page import render, write_page
+from ..statistics import Interval, paired_difference
+from ..tables import number_text
+from ..workers import Row
 
 PAGE = "entry.html"
 
 
+def by_pairing(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Group rows by pairing, in the order the pairings come."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row["pairing"], []).append(row)
+    return groups
+
+
 def paired(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     """Games of one pairing that were played off and on, in the same order."""
-    off, on = by_game(rows, False), by_game(rows, True)
+    off, on = ({row["game"]: row for row in rows if bool(row["shielded"]) is state} for state in (False, True))
     both = sorted(set(off) & set(on))
     return [off[game] for game in both], [on[game] for game in both]
 
@@ -65,19 +73,17 @@ def write_entry_page(
         f"{settings.preset}: {count} against each opponent from the same seeds, without the shield and "
         f"with it; the shield keeps {radius}."
     )
-    parts = {
-        "TITLE": as_text(f"{name} and the shield"),
-        "STYLE": template("report.css"),
-        "SUBTITLE": as_text(subtitle),
-        "WARNINGS": "".join(f'<p class="card bad">{as_text(words)}</p>' for words in warnings),
-        "TILES": "".join(
-            _tile(*tile) for tile in _tiles([row for group in groups.values() for row in group], settings)
-        ),
-        "ROWS": "".join(_opponent(group, settings) for group in groups.values()),
-        "RADIUS": as_text(radius),
-        "LINKS": "".join(f'<a class="button" href="{as_text(file)}">{as_text(label)}</a>' for label, file in links),
-    }
-    return write_page(folder / PAGE, html_page("entry.html", parts))
+    page = render(
+        "entry.html",
+        title=f"{name} and the shield",
+        subtitle=subtitle,
+        warnings=warnings,
+        tiles=_tiles([row for group in groups.values() for row in group], settings),
+        rows=[_opponent(group, settings) for group in groups.values()],
+        radius=radius,
+        links=links,
+    )
+    return write_page(folder / PAGE, page)
 
 
 def _sums(rows: Sequence[Row], settings: AblationSettings) -> dict[str, float]:
@@ -92,59 +98,37 @@ def _sums(rows: Sequence[Row], settings: AblationSettings) -> dict[str, float]:
     return {short: float(sum(row[column] for row in rows)) for short, column in names.items()}
 
 
-def _tiles(rows: Sequence[Row], settings: AblationSettings) -> list[tuple[str, str, str]]:
+def _tiles(rows: Sequence[Row], settings: AblationSettings) -> list[tuple[str, str, str, str]]:
     groups = [paired(group) for group in by_pairing(rows).values()]
     off, on = [row for pair in groups for row in pair[0]], [row for pair in groups for row in pair[1]]
     before, after = _sums(off, settings), _sums(on, settings)
     games = max(1, len(on))
-    nets = [np.mean([net(row) for row in side]) if side else 0.0 for side in (off, on)]
-    return [
-        (
-            "hits with opponents",
-            _change(before["opponents"] / games, after["opponents"] / games),
-            "a game, every step looked at",
-        ),
-        (
-            "hits with team-mates",
-            _change(before["mates"] / games, after["mates"] / games),
-            "a game, every step looked at",
-        ),
-        (
-            "counted by the game",
-            _change(before["counted"] / games, after["counted"] / games),
-            "a game, once a decision",
-        ),
-        ("captures", _change(before["captures"] / games, after["captures"] / games), "a game"),
-        ("net of captures", _change(float(nets[0]), float(nets[1])), "made less given up, a game"),
-    ]
-
-
-def _change(off: float, on: float) -> str:
-    return (
-        f'<span class="off">{number_text(off)}</span><span class="arrow">→</span>'
-        f'<span class="on">{number_text(on)}</span>'
+    looked = "a game, every step looked at"
+    shown = (
+        ("hits with opponents", "opponents", looked),
+        ("hits with team-mates", "mates", looked),
+        ("counted by the game", "counted", "a game, once a decision"),
+        ("captures", "captures", "a game"),
     )
+    tiles = [
+        (label, number_text(before[name] / games), number_text(after[name] / games), note)
+        for label, name, note in shown
+    ]
+    nets = [number_text(float(np.mean([net(row) for row in side])) if side else 0.0) for side in (off, on)]
+    return [*tiles, ("net of captures", nets[0], nets[1], "made less given up, a game")]
 
 
-def _tile(label: str, numbers: str, note: str) -> str:
-    return f'<div class="tile"><h3>{label}</h3><p class="numbers">{numbers}</p><p class="note">{note}</p></div>'
-
-
-def _opponent(group: Sequence[Row], settings: AblationSettings) -> str:
+def _opponent(group: Sequence[Row], settings: AblationSettings) -> list[str]:
     """Row of the table: one opponent, totals of all paired games off and on."""
     off, on = paired(group)
     before, after = _sums(off, settings), _sums(on, settings)
     change = net_change(off, on, settings.seed) if off else Interval(float("nan"), float("nan"), float("nan"))
-    cells = [as_text(Path(group[0]["opponent"]).name), str(len(off))]
+    cells = [Path(group[0]["opponent"]).name, str(len(off))]
     for name in ("captures", "against", "mates", "opponents", "counted"):
         cells.append(f"{before[name]:g} → {after[name]:g}")
     limits = "" if change.low != change.low else f" [{number_text(change.low)}, {number_text(change.high)}]"
     cells.insert(4, f"{number_text(change.value)}{limits}")
-    return (
-        "<tr>"
-        + "".join(f'<td class="{"" if k == 0 else "number"}">{cell}</td>' for k, cell in enumerate(cells))
-        + "</tr>"
-    )
+    return cells
 
 
 def games_to_look_at(rows: Sequence[Row], settings: AblationSettings, most: int) -> list[tuple[str, Row, Row]]:

@@ -16,8 +16,7 @@ from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.new_file import check_new, check_place, make_folder_of
-from ..runs.store import told_settings
+from ..result_files import check_new, check_place, make_folder_of, told_settings
 from .check import check_entry
 from .package import code, data, game_spec, renamed
 from .team import EntryTeam

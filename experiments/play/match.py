@@ -18,10 +18,8 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
 from ..entries.team import make_team
-from ..measure.judging import StateLog, judge_game
-from ..measure.score import scores
-from ..measure.tally import reason_counts, tally
-from ..measure.verdicts import verdict_columns
+from ..game_metrics import reason_counts, scores, tally
+from ..verdicts import StateLog, judge_game, verdict_columns
 from .openings import opening
 from .playing_env import PlayingEnv, live_view, read_infos
 from .seat import Failures, Seat
@@ -39,7 +37,7 @@ class MatchResult:
 
     Attributes:
         spec: what was to be played.
-        row: flat columns, as `keys.GAME_COLUMNS` describes them.
+        row: flat columns, as `metrics.GAME_COLUMNS` and `metrics.game_metrics_of` describe them.
         record: everything that happened, see `steerclear.env.record`.
     """
 
@@ -269,9 +267,13 @@ def play_match(
         match.close()
 
 
-def play_row(spec: MatchSpec) -> dict[str, Any]:
-    """Play one game and return its row alone, small enough to travel between processes by the thousand."""
-    return play_match(spec).row
+def play_job(job: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Play one game and return its row alone, small enough to travel between processes by the thousand.
+
+    Args:
+        job: a spec's, see `MatchSpec.as_job`.
+    """
+    return [play_match(MatchSpec.of_job(job)).row]
 
 
 def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from steerclear.shield import Reason, Shield, ShieldConfig, game_facts
 from steerclear.shield.jit import Array
 from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 
-from ..measure.tally import RADII_M
+from ..metrics import RADII_M
 from ..oracle import AT_ONCE, Motion
 from .sea import Sea
 from .spec import SIDES, MatchSpec

@@ -10,10 +10,10 @@ from typing import Any
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..measure.judging import check_judge
-from ..measure.score import DEFAULT_PENALTY
-from ..measure.tally import RADII_M
-from ..runs.store import key_of
+from ..game_metrics import DEFAULT_PENALTY
+from ..metrics import RADII_M
+from ..runner import job_id
+from ..verdicts import check_judge
 from .conditions import CALM, Conditions
 
 SIDES = ("blue", "red")
@@ -86,11 +86,19 @@ class MatchSpec:
 
     @property
     def key(self) -> str:
-        """Short name that two specs share exactly when they describe the same game, however its breaches are judged."""
-        beside = {"judge"}
-        beside |= {"conditions"} if self.conditions.calm else set()
-        beside |= set() if any(self.files) else {"files"}
-        return key_of({name: value for name, value in asdict(self).items() if name not in beside})
+        """Short name that two specs share exactly when they describe the same game."""
+        return job_id(self.as_job())
+
+    def as_job(self) -> dict[str, Any]:
+        """Plain values, as `runner.Experiment` takes them."""
+        return asdict(self)
+
+    @classmethod
+    def of_job(cls, job: Mapping[str, Any]) -> MatchSpec:
+        """The game that plain values describe; entries that are none of a game's are left out."""
+        known = {name: job[name] for name in cls.__dataclass_fields__ if name in job}
+        radii_m, files = tuple(job["radii_m"]), tuple(job["files"])
+        return cls(**{**known, "conditions": Conditions(**job["conditions"]), "radii_m": radii_m, "files": files})
 
     @property
     def judged(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from steerclear.shield.tables.margin import full_thrust_state
 from steerclear.shield.tables.moves import SUB_STEP_S, sub_steps
 
 from ..jit import kernel
+from ..workers import Job, Row
 from .unsafe_sets import values_m
 
 RINGS, BEARINGS = 150, 36
@@ -96,6 +97,12 @@ class Task:
     heading_deg: float
     own_mps: float
     other_mps: float
+
+
+def play_job(job: Job) -> list[Row]:
+    """Play the task that plain values describe; its one row."""
+    settings = tuple((name, value) for name, value in job["settings"])
+    return [asdict(play_set(Task(**{**job, "settings": settings})))]
 
 
 def play_set(task: Task) -> PlayedSet:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..report.markdown import MADE, bars_table, line, table
-from ..runs.provenance import machine, versions
+from ..markdown import MADE, goals_of, goals_table, line, table
+from ..metrics import judged
+from ..provenance import machine, versions
 from .played_sets import BAND_M, BEYOND, LONGEST_S, PlayedSet
 from .unsafe_sets import RATIO_BAR
 
@@ -23,7 +24,7 @@ looks ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the headi
 one, 180° is head-on. *Reach* is the reachability set, *lost* what is lost of the positions *played* beside it, *ratio*
 both by the former, *lost beyond* how many of those tried beyond are. *By table* is the ratio of a boat that has no
 shield and no wants, but steers as the value table says is best, at top speed: what is lost there the table promised and
-could not keep, since it is a grid. The bars: {RATIO_BAR:g} times the reachability set's area in every row, and none
+could not keep, since it is a grid. The goals: {RATIO_BAR:g} times the reachability set's area in every row, and none
 lost beyond."""
 
 
@@ -44,18 +45,13 @@ def rows_of(sets: Sequence[PlayedSet]) -> list[list[str]]:
     ]
 
 
-def bars_of(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
-    """The bars over all rows."""
+def goals_of_sets(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
+    """The goals over all rows."""
     ratio, beyond = max(one.ratio for one in sets), sum(one.tried_lost for one in sets)
     return [
-        _bar("lost and reachability's set by the latter, largest", ratio, RATIO_BAR),
-        _bar("positions beyond that were lost", beyond, 0.0),
+        judged("lost and reachability's set by the latter, largest", ratio, "<=", RATIO_BAR),
+        judged("positions beyond that were lost", float(beyond), "<=", 0.0),
     ]
-
-
-def _bar(name: str, value: float, limit: float) -> dict[str, Any]:
-    plain = {"name": name, "value": value, "low": None, "high": None, "sense": "<=", "limit": limit}
-    return {**plain, "met": value <= limit}
 
 
 def content_of(settings: Mapping[str, Any], sets: Sequence[PlayedSet], wall_s: float) -> dict[str, Any]:
@@ -67,7 +63,8 @@ def content_of(settings: Mapping[str, Any], sets: Sequence[PlayedSet], wall_s: f
         "machine": machine(),
         "wall_s": wall_s,
         "sets": [{**asdict(one), "ratio": one.ratio, "player_ratio": one.player_ratio} for one in sets],
-        "bars": bars_of(sets),
+        "goals": goals_of_sets(sets),
+        "deprecated": {"bars": goals_of_sets(sets)},
     }
 
 
@@ -83,6 +80,11 @@ def played_page(contents: Sequence[Mapping[str, Any]]) -> str:
         lines += [f"## {line(settings['own'])} meets {line(settings['other'])}, {settings['radius_m']:g} m", ""]
         if settings["shield"]:
             lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
-        lines += [*table(HEADS, rows_of(sets)), "", *bars_table(content["bars"]), ""]
+        lines += [
+            *table(HEADS, rows_of(sets)),
+            "",
+            *goals_table(goals_of(content)),
+            "",
+        ]
         lines += [f"steerclear {line(content['versions']['steerclear'])}.", ""]
     return "\n".join(lines)

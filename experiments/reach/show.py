@@ -15,10 +15,10 @@ from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.files import ValueTable
 from steerclear.shield.tables.make import COARSER
 
-from ..report.markdown import MADE, line, table
-from ..report.plot_text import plot_text
-from ..report.tables import titled
-from ..runs.new_file import make_folder_of
+from ..markdown import MADE, line, table
+from ..plots import text as plot_text
+from ..result_files import make_folder_of
+from ..tables import titled
 
 COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
 SHOWN_DEG = (0.0, 90.0, 180.0)

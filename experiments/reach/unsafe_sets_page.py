@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..report.markdown import MADE, bars_table, line, table
-from ..runs.provenance import machine, versions
+from ..markdown import MADE, goals_of, goals_table, line, table
+from ..metrics import judged
+from ..provenance import machine, versions
 from .unsafe_sets import MISSED_PERCENT_BAR, RATIO_BAR, SetPair
 
 HEADS = ("own/other m/s", "heading", "shield, m²", "reachability, m²", "ratio", "missed, m²", "missed, %")
@@ -19,7 +20,7 @@ the shield calls safe, also as a share of the table's set: of each such position
 pursuers are strategies, the table's opponent is the worst that its grid and horizon can tell
 (see [tables.md](tables.md)).
 
-A set much larger than the table's costs freedom, one that misses positions costs the promise. The bars are
+A set much larger than the table's costs freedom, one that misses positions costs the promise. The goals are
 {RATIO_BAR:g} times the area and {MISSED_PERCENT_BAR:g} % missed, in every row."""
 
 
@@ -44,27 +45,19 @@ def rows_of(pairs: Sequence[SetPair]) -> list[list[str]]:
     ]
 
 
-def sets_bars(pairs: Sequence[SetPair], looked_up: bool = False) -> list[dict[str, Any]]:
-    """Bars over all pairs: how much larger the shield's set is, and how much of the table's it misses.
+def sets_goals(pairs: Sequence[SetPair], looked_up: bool = False) -> list[dict[str, Any]]:
+    """Goals over all pairs: how much larger the shield's set is, and how much of the table's it misses.
 
     Args:
         pairs: the comparison.
         looked_up: whether the shield reads the same table; what it misses then says nothing and is not judged.
     """
     ratio, missed = max(pair.ratio for pair in pairs), max(pair.missed_percent for pair in pairs)
+    missed_goal = judged("set the shield misses, %, largest", missed, "<=", MISSED_PERCENT_BAR)
     return [
-        _bar("shield's set by reachability's, largest", ratio, RATIO_BAR, ratio <= RATIO_BAR),
-        _bar(
-            "set the shield misses, %, largest",
-            missed,
-            MISSED_PERCENT_BAR,
-            None if looked_up else missed <= MISSED_PERCENT_BAR,
-        ),
+        judged("shield's set by reachability's, largest", ratio, "<=", RATIO_BAR),
+        missed_goal | ({"met": None} if looked_up else {}),
     ]
-
-
-def _bar(name: str, value: float, limit: float, met: bool | None) -> dict[str, Any]:
-    return {"name": name, "value": value, "low": None, "high": None, "sense": "<=", "limit": limit, "met": met}
 
 
 def content_of(settings: Mapping[str, Any], pairs: Sequence[SetPair], looked_up: bool, wall_s: float) -> dict[str, Any]:
@@ -77,7 +70,8 @@ def content_of(settings: Mapping[str, Any], pairs: Sequence[SetPair], looked_up:
         "wall_s": wall_s,
         "looked_up": looked_up,
         "pairs": [asdict(pair) for pair in pairs],
-        "bars": sets_bars(pairs, looked_up),
+        "goals": sets_goals(pairs, looked_up),
+        "deprecated": {"bars": sets_goals(pairs, looked_up)},
     }
 
 
@@ -91,10 +85,15 @@ def sets_page(contents: Sequence[Mapping[str, Any]]) -> str:
             lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
         if content["looked_up"]:
             lines += [LOOKED_UP, ""]
-        lines += [*table(HEADS, rows_of(pairs)), "", *bars_table(content["bars"]), ""]
-        met = sum(all(bar["met"] is not False for bar in sets_bars([pair], content["looked_up"])) for pair in pairs)
         lines += [
-            f"{met} of {len(pairs)} rows within the bars. steerclear {line(content['versions']['steerclear'])}.",
+            *table(HEADS, rows_of(pairs)),
+            "",
+            *goals_table(goals_of(content)),
+            "",
+        ]
+        met = sum(all(goal["met"] is not False for goal in sets_goals([pair], content["looked_up"])) for pair in pairs)
+        lines += [
+            f"{met} of {len(pairs)} rows within the goals. steerclear {line(content['versions']['steerclear'])}.",
             "",
         ]
     return "\n".join(lines)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-from ..runs.engines import Workers
-from ..runs.pool import run_all
-from ..runs.store import ResultStore
+from ..runner import ROWS_FILE, append_row, open_folder, read_rows
+from ..warming import compile_game, compile_judge, compile_shield
+from ..workers import Workers, outcomes
 from .play import play_game
 from .results import finalists
 from .settings import GameJob, TournamentSettings, label
@@ -21,14 +22,16 @@ class Tournament:
 
     Args:
         settings: what to play.
-        store: where games go and where finished ones come from.
+        folder: where games go and where finished ones come from.
+        resume: go on with what is there.
         workers: processes here, or a cluster.
     """
 
-    def __init__(self, settings: TournamentSettings, store: ResultStore, workers: Workers = 1) -> None:
-        self.settings, self.store, self.workers = settings, store, workers
+    def __init__(self, settings: TournamentSettings, folder: Path, resume: bool, workers: Workers = 1) -> None:
+        self.settings, self.folder, self.workers = settings, folder, workers
+        self._lock = open_folder(folder, "tournament", resume)
         self.failed: list[dict[str, Any]] = []
-        self._kept = store.load()
+        self._kept = {key: rows[0] for key, rows in read_rows(folder / ROWS_FILE).items()}
         self._jobs: list[GameJob] = (
             settings.qualifying_games() if settings.qualifying else settings.final(settings.teams)
         )
@@ -62,12 +65,20 @@ class Tournament:
     def _play(self, jobs: Sequence[GameJob], notice: Notice) -> None:
         missing = [job for job in jobs if job.key not in self._kept]
         notice(len(self.rows()), self.expected)
-        for outcome in run_all(play_game, missing, self.workers):
+        for outcome in outcomes(play_game, missing, self.workers, (compile_game, compile_shield, compile_judge)):
             job = outcome.job
             if outcome.answer is None:
                 game = {"blue": label(job.spec.own), "red": label(job.spec.opponent), "repetition": job.spec.game}
-                self.failed.append({"phase": job.phase, "state": job.state, **game, **outcome.why})
+                self.failed.append(
+                    {
+                        "phase": job.phase,
+                        "state": job.state,
+                        **game,
+                        "error": outcome.error,
+                        "fault": outcome.trace is not None,
+                    }
+                )
             else:
-                self.store.append(job.key, outcome.answer)
+                append_row(self.folder / ROWS_FILE, job.key, [outcome.answer])
                 self._kept[job.key] = outcome.answer
             notice(len(self.rows()), self.expected)

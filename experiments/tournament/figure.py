@@ -7,8 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..report.docs_plots import COLOURS
-from ..report.plot_text import plot_text
+from ..plots import COLOURS, text
 
 Results = Mapping[str, Any]
 
@@ -60,4 +59,4 @@ def _arrow(axis: Any, team: str, before: Mapping[str, Any], after: Mapping[str, 
     axis.scatter([x0], [y0], color=COLOURS["off"], zorder=3)
     axis.scatter([x1], [y1], color=COLOURS["on"], zorder=3)
     # labels alternate above and below their dots
-    axis.annotate(plot_text(team), (x0, y0), (4, 7 if number % 2 == 0 else -13), textcoords="offset points", fontsize=9)
+    axis.annotate(text(team), (x0, y0), (4, 7 if number % 2 == 0 else -13), textcoords="offset points", fontsize=9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..metrics import GOAL_KEYS
+
 _LIMITS = {"value": "figure", "low": "lower 95 % limit; null where there is none", "high": "upper 95 % limit"}
 _SIDE = {
     "shielded": "whether that side had a shield",
@@ -123,12 +125,6 @@ TOURNAMENT = {
     },
     **{f"states[].table_{n}.scripted": "null with fewer than three scripted teams" for n in (3, 4)},
     **{f"prices[].{k}": v for k, v in _PRICE.items()},
-    "bars[].name": "what is judged",
-    "bars[].value": "measured",
-    "bars[].low": "lower 95 % limit",
-    "bars[].high": "upper 95 % limit",
-    "bars[].sense": "<= or >=",
-    "bars[].limit": "what is asked",
-    "bars[].met": "whether it is met; null without data",
+    **GOAL_KEYS,
     "files.*": "what was written, relative to the folder",
 }

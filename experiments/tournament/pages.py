@@ -8,15 +8,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..report.markdown import MADE, bars_table, line, table
-from ..report.page import as_text, report_page, template, write_page
-from ..report.parts import bars_table as bars_html
-from ..report.parts import replay_links, values_table
+from markupsafe import Markup
+
+from ..markdown import MADE, goals_of, goals_table, line, table
+from ..report import Plot, Report, Section, made_of
+from ..report import Table as HtmlTable
 from .figure import can_be_drawn, draw
-from .tables import Table, all_tables, cycle_lines, shown
+from .tables import all_tables, cycle_lines, shown
 
 Results = Mapping[str, Any]
-IMAGES = "; img-src data:"
 NOTE = (
     "All figures are per double round robin (every pair once on each side); brackets are 95 % intervals of a bootstrap "
     "that draws repetitions anew within each pair and side. The paper's scores fit no single penalty, so its ranks are "
@@ -35,22 +35,19 @@ def write_html(results: Results, path: Path, replays: Sequence[Mapping[str, str]
     Raises:
         ConfigError: the file cannot be written.
     """
-    parts = {
-        "TITLE": "The competition, with the shield and without",
-        "STYLE": template("report.css"),
-        "SUBTITLE": as_text(subtitle(results)),
-        "WARNINGS": "".join(f'<p class="card bad">{as_text(words)}</p>' for words in results["warnings"]),
-        "HEADLINES": "",
-        "BARS": bars_html(results["bars"]),
-        "REPLAYS": replay_links(replays),
-        "FIGURE": _figure_html(results),
-        "NOTE": as_text(NOTE),
-        "CYCLES": "".join(f'<p class="note">{as_text(words)}</p>' for words in cycle_lines(results)),
-        "TABLES": "".join(_table_html(one) for one in all_tables(results)),
-        "SETTINGS": values_table(results["settings"]),
-        "VERSIONS": values_table({**results["versions"], **results["machine"]}),
-    }
-    return write_page(path, report_page("tournament.html", parts, IMAGES))
+    return Report(
+        title="The competition, with the shield and without",
+        subtitle=subtitle(results),
+        warnings=results["warnings"],
+        links=replays,
+        goals=results["goals"],
+        plots=_figure(results),
+        notes=[NOTE, *cycle_lines(results)],
+        sections=[
+            Section("", [HtmlTable(title, heads, rows, numbers=False) for title, heads, rows in all_tables(results)]),
+            made_of(results),
+        ],
+    ).write(path)
 
 
 def write_markdown(results: Results, folder: Path) -> tuple[str, str, list[Path]]:
@@ -66,8 +63,8 @@ def write_markdown(results: Results, folder: Path) -> tuple[str, str, list[Path]
     lines += [line(NOTE), "", *(f"- {line(words)}" for words in notes), *[""] * bool(notes)]
     for title, heads, rows in all_tables(results):
         lines += [f"## {line(title)}", "", *table(heads, rows), ""]
-    if results["bars"]:
-        lines += ["## Bars", "", *bars_table(results["bars"]), ""]
+    if goals := goals_of(results):
+        lines += ["## Goals", "", *goals_table(goals), ""]
     return f"{stem}.md", "\n".join(lines), pictures
 
 
@@ -94,21 +91,12 @@ def _there(results: Results) -> str:
     )
 
 
-def _figure_html(results: Results) -> str:
+def _figure(results: Results) -> list[Plot]:
     if not can_be_drawn(results):
-        return ""
+        return []
     buffer = BytesIO()
     draw(results, buffer)
     data = base64.b64encode(buffer.getvalue()).decode()
     words = "net captures against collisions, an arrow per team from unshielded to shielded"
-    return (
-        f'<figure class="card"><img alt="{words}" style="max-width:100%" src="data:image/png;base64,{data}"></figure>'
-    )
-
-
-def _table_html(one: Table) -> str:
-    title, heads, rows = one
-    head = "".join(f"<th>{as_text(text)}</th>" for text in heads)
-    body = "".join("<tr>" + "".join(f"<td>{as_text(text)}</td>" for text in row) + "</tr>" for row in rows)
-    table = f'<div class="scroll"><table><tr>{head}</tr>{body}</table></div>'  # many teams are wider than a card
-    return f'<section class="card"><h3>{as_text(title)}</h3>{table}</section>'
+    image = f'<img alt="{words}" style="max-width:100%" src="data:image/png;base64,{data}">'
+    return [Plot("What the shield changes for each team", Markup(image))]

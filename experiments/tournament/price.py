@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.statistics import Interval, bootstrap_interval, count_interval, mean_interval, paired_ratio
 from ..play.spec import SIDES
+from ..statistics import Interval, bootstrap_interval, count_interval, mean_interval, paired_ratio
 
 Row = Mapping[str, Any]
 KEPT = 0.95

@@ -8,9 +8,8 @@ from typing import Any
 
 from ..play.match import play_match
 from ..play.spec import SIDES
-from ..report.replay_html import write_replay
-from ..runs.engines import Workers
-from ..runs.pool import run_all
+from ..replay_html import write_replay
+from ..workers import Workers, outcomes
 from .settings import GameJob, label
 
 Row = Mapping[str, Any]
@@ -46,7 +45,7 @@ def chosen_games(rows: Sequence[Row], jobs: Sequence[GameJob], states: tuple[str
 def write_replays(chosen: Sequence[Chosen], folder: Path, workers: Workers) -> list[dict[str, str]]:
     """Play the games again and write a replay of each choice; return labels and file names."""
     specs = list({job.spec.key: job.spec for _, jobs in chosen for job in jobs}.values())
-    records = {o.job.key: o.answer.record for o in run_all(play_match, specs, workers) if o.answer is not None}
+    records = {o.job.key: o.answer.record for o in outcomes(play_match, specs, workers) if o.answer is not None}
     links = []
     for number, (words, jobs) in enumerate(chosen, start=1):
         games = [records[job.spec.key] for job in jobs if job.spec.key in records]

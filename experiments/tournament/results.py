@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..play.spec import SIDES
-from ..runs.provenance import machine, versions
-from ..runs.store import told_settings
+from ..provenance import machine, versions
+from ..result_files import told_settings
 from .agreement import agreement
 from .price import prices
 from .settings import ALL, FINAL, OFF, QUALIFYING, TournamentSettings, label
@@ -53,7 +53,8 @@ def results_of(
         "qualifying": _qualifying(rows, settings),
         "states": [state_results(final, state, teams, settings) for state in settings.states],
         "prices": _prices(final, teams, settings),
-        "bars": bars_of(final, teams, settings),
+        "goals": bars_of(final, teams, settings),
+        "deprecated": {"bars": bars_of(final, teams, settings)},
     }
 
 

@@ -11,10 +11,10 @@ from typing import Any
 from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
-from ..measure.score import DEFAULT_PENALTY
-from ..measure.tally import RADII_M
+from ..game_metrics import DEFAULT_PENALTY
+from ..metrics import RADII_M
 from ..play.spec import ANSWER_S, SIDES, MatchSpec, near
-from ..runs.store import key_of
+from ..runner import job_id
 from .paper import SCRIPTED
 
 OFF, ALL = "off", "all"
@@ -44,7 +44,7 @@ class GameJob:
     @property
     def key(self) -> str:
         """Name under which the result is kept; which state asked for the game does not matter."""
-        return key_of({"phase": self.phase, "state": self.state, "examined": self.examined, "game": self.spec.key})
+        return job_id({"phase": self.phase, "state": self.state, "examined": self.examined, "game": self.spec.key})
 
 
 @dataclass(frozen=True)

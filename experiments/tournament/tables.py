@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..report.tables import number_text
+from ..tables import number_text
 from .paper import paper_row
 
 Table = tuple[str, list[str], list[list[str]]]

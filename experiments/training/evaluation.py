@@ -10,7 +10,7 @@ from steerclear.policies.entrants.learned import batch_of
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
-from ..measure.statistics import mean_interval
+from ..statistics import mean_interval
 from .config import Learning
 from .env import core_of, shield_of
 from .opponents import opponent_of

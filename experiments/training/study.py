@@ -14,12 +14,9 @@ import numpy as np
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
-from ..runs.failed_jobs import end_failed
-from ..runs.folder_lock import lock_folder
-from ..runs.json_file import read_json
-from ..runs.pool import run_all
-from ..runs.provenance import machine, versions
-from ..runs.store import finite, write_json
+from ..provenance import machine, versions
+from ..result_files import finite, lock_folder, read_json, write_json
+from ..workers import end_failed, outcomes
 from .config import SHIELDS, PpoConfig
 from .evaluation import play_games, summary_of
 from .training import CURVE, FINAL, training_of
@@ -108,7 +105,7 @@ def run_study(
     rows: dict[Cell, list[dict[str, Any]]] = {}
     failed = []
     notice(0, "")
-    for outcome in run_all(_rows_of, trainings_of(base, folder, seeds, games), jobs):
+    for outcome in outcomes(_rows_of, trainings_of(base, folder, seeds, games), jobs):
         if outcome.answer is None:
             failed.append({**outcome.why, "error": f"{outcome.job.name}: {outcome.error}"})
             continue

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.statistics import (
+from ..markdown import MADE, line, table
+from ..statistics import (
     Interval,
     count_difference,
     count_interval,
@@ -17,7 +18,6 @@ from ..measure.statistics import (
     paired_difference,
     student_interval,
 )
-from ..report.markdown import MADE, line, table
 from .config import SHIELDS
 
 HEADS = (

@@ -16,8 +16,8 @@ from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.weights_file import write_weights
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
-from ..runs.provenance import machine, versions
-from ..runs.store import told_settings, write_table
+from ..provenance import machine, versions
+from ..result_files import told_settings, write_table
 from .evaluation import evaluation_of
 
 BEST, FINAL, CURVE, TENSORBOARD = "best.npz", "final.npz", "curve.json", "tensorboard"

@@ -12,12 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.env.record import load, save
-from steerclear.experiments import cli
-from steerclear.experiments.commands import games as games_command
+from steerclear.experiments import ablation, cli
+from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.commands import options
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.pages import keys
-from steerclear.experiments.runs import campaign
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, GameError
 from typer.testing import CliRunner
@@ -118,7 +116,7 @@ def test_a_tiny_ablation_from_end_to_end(tmp_path):
     assert keys.undocumented(content, keys.RESULTS) == []
     assert (content["games_played"], content["complete"], len(content["pairings"])) == (8, True, 2)
     assert json.loads(Path("out/results.json").read_text()) == content
-    for name in ("games.jsonl", "report.html", "replay.html", content["files"]["games"]):
+    for name in ("rows.jsonl", "report.html", "replay.html", content["files"]["games"]):
         assert (tmp_path / "out" / name).stat().st_size > 0
     assert "medium vs easy: 2 games" in done.stdout
     assert "hits with opponents at 2.5 m, on / off" in done.stdout
@@ -128,32 +126,31 @@ def test_a_tiny_ablation_from_end_to_end(tmp_path):
 
 def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
     arguments = ["ablate", "--opponents", "hold", *TINY, "--out", "out"]
-    whole = campaign.play_row
+    whole = ablation.play_job
     played = []
 
-    def stop_at_the_third(spec):
+    def stop_at_the_third(job):
         if len(played) == 2:
             raise KeyboardInterrupt
-        played.append(spec.key)
-        return whole(spec)
+        played.append(job)
+        return whole(job)
 
-    make = games_command.Campaign
-    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=stop_at_the_third))
+    monkeypatch.setattr(ablation, "play_job", stop_at_the_third)
     stopped = run(*arguments)
     assert stopped.exit_code == ExitCode.INTERRUPTED
     assert "2 of 4 games kept" in stopped.stderr
     assert "--out out --resume" in stopped.stderr
     assert json.loads(Path("out/results.json").read_text())["complete"] is False
-    monkeypatch.setattr(games_command, "Campaign", make)
+    monkeypatch.setattr(ablation, "play_job", whole)
     refused = run(*arguments)
     assert refused.exit_code == ExitCode.BAD_INPUT
     assert "add --resume" in refused.stderr
     resumed = run(*arguments, "--resume")
     assert resumed.exit_code == ExitCode.OK, resumed.output
-    assert "2 of 4 games are in out/games.jsonl and are taken from there" in resumed.stderr
+    assert "2 of 4 games are in out/rows.jsonl and are taken from there" in resumed.stderr
     content = json.loads(Path("out/results.json").read_text())
     assert (content["games_resumed"], content["games_played"], content["complete"]) == (2, 4, True)
-    assert len(Path("out/games.jsonl").read_text().splitlines()) == 4
+    assert len(Path("out/rows.jsonl").read_text().splitlines()) == 4
 
 
 BAD_INPUT, FAULT = GameError("no such game"), RuntimeError("sunk")
@@ -161,15 +158,14 @@ BAD_INPUT, FAULT = GameError("no such game"), RuntimeError("sunk")
 
 @pytest.mark.parametrize(("error", "code"), [(BAD_INPUT, ExitCode.BAD_INPUT), (FAULT, ExitCode.FAULT)])
 def test_a_game_that_cannot_be_played_is_told_and_the_rest_is_kept(error, code, monkeypatch):
-    whole = campaign.play_row
+    whole = ablation.play_job
 
-    def broken(spec):
-        if spec.opponent == "hold":
+    def broken(job):
+        if job["opponent"] == "hold":
             raise error
-        return whole(spec)
+        return whole(job)
 
-    make = games_command.Campaign
-    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
+    monkeypatch.setattr(ablation, "play_job", broken)
     done = run("ablate", "--opponents", "easy,hold", *TINY, "--out", "out")
     assert done.exit_code == code
     words = "no such game" if error is BAD_INPUT else "this is a fault of steerclear, not of yours (RuntimeError: sunk)"
@@ -184,20 +180,19 @@ def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
     def broken(spec):
         raise BAD_INPUT
 
-    make = games_command.Campaign
-    monkeypatch.setattr(games_command, "Campaign", lambda *args: make(*args, play=broken))
+    monkeypatch.setattr(ablation, "play_job", broken)
     done = run("ablate", "--opponents", "easy", *TINY, "--out", "out", "--json", "out.json")
     assert done.exit_code == ExitCode.BAD_INPUT, done.output
     assert "4 games could not be played" in done.stderr
     assert json.loads(Path("out.json").read_text())["files"] == {}
 
 
-def test_bars_decide_the_exit_status_only_when_asked(monkeypatch):
-    bar = {"name": "hits", "value": 1.0, "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": False}
-    monkeypatch.setattr("steerclear.experiments.runs.results.ablation_bars", lambda rows, separation_m: [bar])
+def test_goals_decide_the_exit_status_only_when_asked(monkeypatch):
+    goal = {"name": "hits", "value": 1.0, "low": None, "high": None, "sense": "<=", "limit": 0.0, "met": False}
+    monkeypatch.setattr(ablation, "check", lambda goals, table: [goal])
     arguments = ["ablate", "--opponents", "hold", "--games", "1", "--max-time", "1", "--jobs", "1"]
     assert run(*arguments, "--out", "a").exit_code == ExitCode.OK
-    assert run(*arguments, "--out", "b", "--check").exit_code == ExitCode.BAR_FAILED
+    assert run(*arguments, "--out", "b", "--check").exit_code == ExitCode.GOAL_MISSED
 
 
 def test_evaluate_plays_with_or_without_the_shield():
@@ -303,7 +298,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
     arrays["captures"][-1, 0] += 1
     np.savez(tmp_path / "moved.npz", **arrays)
     failed = run("parity", trace, "moved.npz", "--json", "q.json")
-    assert failed.exit_code == ExitCode.BAR_FAILED
+    assert failed.exit_code == ExitCode.GOAL_MISSED
     assert "position_m 0.001 is over 1e-06" in failed.stdout
     assert "captures of blue" in failed.stdout
     content = json.loads(Path("q.json").read_text())
@@ -388,7 +383,7 @@ def test_ctrl_c_ends_a_real_run_with_status_130_and_keeps_its_games(tmp_path):
         preexec_fn=_heed_ctrl_c,
     ) as process:
         deadline = time.monotonic() + 420.0
-        lines = tmp_path / "out" / "games.jsonl"
+        lines = tmp_path / "out" / "rows.jsonl"
         while time.monotonic() < deadline and not (lines.exists() and lines.read_text().count("\n") >= 2):
             time.sleep(0.1)
         process.send_signal(signal.SIGINT)

@@ -33,7 +33,7 @@ MISTAKES = [
     ("ablate --seed -5", "--seed must be 0 or more"),
     ("ablate --seed 99999999999999999999", "at most 4611686018427387904"),
     ("ablate --separation 2500", "if that is mm, give 2.5"),
-    ("ablate --own medium --json games.jsonl", ".json"),
+    ("ablate --own medium --json rows.jsonl", ".json"),
     ("ablate --preset aamas", "aamas2024"),
     ("ablate --preset ''", "preset"),
     ("ablate --own ''", "policy"),

@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
-from steerclear.experiments import cli
+from steerclear.experiments import cli, markdown, page, plots
 from steerclear.experiments.commands.console import ExitCode, err, out
-from steerclear.experiments.report import markdown, page, plot_text
-from steerclear.experiments.report.tables import titled
-from steerclear.experiments.runs.faults import fault_words, machine_words
+from steerclear.experiments.faults import fault_words, machine_words
+from steerclear.experiments.tables import titled
 from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
 from steerclear.shield.visible import is_drawn, visible
 from typer.testing import CliRunner
@@ -43,7 +42,7 @@ def test_a_terminal_only_shows_names(name, how):
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_page_only_shows_names(name):
-    text = page.as_text(name)
+    text = page.render("page.html", title=name).partition("<title>")[2].partition("</title>")[0]
     assert "<" not in text
     assert '"' not in text
     assert all(is_drawn(letter) or letter in "\n\t" for letter in text)
@@ -67,7 +66,7 @@ def test_a_plot_only_shows_names(name, tmp_path):
     from matplotlib.figure import Figure
 
     canvas = Figure()
-    canvas.suptitle(plot_text.plot_text(name))
+    canvas.suptitle(plots.text(name))
     canvas.savefig(tmp_path / "a.svg")
     assert (tmp_path / "a.svg").exists()
 
@@ -109,7 +108,7 @@ import sys
 from steerclear.experiments.terminal import prepare
 prepare()
 from steerclear.experiments.commands.console import out, err
-from steerclear.experiments.report.tables import titled
+from steerclear.experiments.tables import titled
 for console in (out(), err()):
     console.print(titled("54° → ⚑", ["", "≥"], [["\\u2800\\u28ff", "\\ud800…"]]))
 """
@@ -198,7 +197,7 @@ def test_what_the_machine_refuses_is_no_fault(error, words, monkeypatch):
 
 def test_a_fault_whose_file_cannot_be_written_is_told(monkeypatch):
     monkeypatch.setattr(
-        "steerclear.experiments.runs.faults.tempfile.NamedTemporaryFile", lambda *a, **k: fails(OSError(28, "full"))("")
+        "steerclear.experiments.faults.tempfile.NamedTemporaryFile", lambda *a, **k: fails(OSError(28, "full"))("")
     )
     assert "could not be written (full)" in fault_words(RuntimeError("x"))
     assert machine_words(RuntimeError("x")) == ""

@@ -57,7 +57,8 @@ def test_what_a_run_leaves_behind_does_not_count(entry):
     before = policies.fingerprint(entry)
     for place in (
         "__pycache__/solution.pyc",
-        "results/run/games.jsonl",
+        "results/run/rows.jsonl",
+        "results/old/games.jsonl",
         "results/run/replay.npz",
         ".venv/lib.py",
         "venv/pyvenv.cfg",

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.experiments import cli
+from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.attack.opponents import N_GENES, Duel
 from steerclear.experiments.attack.search import Search, _Hunt, run_search
 from steerclear.experiments.commands.console import ExitCode
@@ -11,7 +12,6 @@ from steerclear.experiments.encounters import Conditions, play
 from steerclear.experiments.encounters.measure import measure_chunk
 from steerclear.experiments.encounters.scene_file import read_scene, scenes_of
 from steerclear.experiments.encounters.verdicts import NO_VERDICT, SIDES
-from steerclear.experiments.pages import keys
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 

@@ -6,13 +6,13 @@ import pytest
 from steerclear.experiments.bench.batch import BatchSize
 from steerclear.experiments.bench.decide import decide_times
 from steerclear.experiments.bench.report import bench_tables
-from steerclear.experiments.bench.run import BenchSettings, bench_bars, run_bench
+from steerclear.experiments.bench.run import BenchSettings, bench_goals, run_bench
 from steerclear.experiments.bench.sampling import programs_of, questions_of_games, scene
 from steerclear.experiments.bench.solvers import solver_times
 from steerclear.experiments.bench.timing import memory_mib, quantiles_us, time_calls
-from steerclear.experiments.pages.docs_pages import write_pages
-from steerclear.experiments.pages.keys import BENCH, GAME_COLUMNS, KEYS, undocumented
-from steerclear.experiments.runs.store import finite, write_json
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import BENCH, GAME_ROW, KEYS, undocumented
+from steerclear.experiments.result_files import finite, write_json
 from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
@@ -60,19 +60,19 @@ def test_figures_become_tables_and_a_page(content, tmp_path):
     text = (tmp_path / "docs" / "bench.md").read_text()
     assert all(title in text for title in titles)
     assert "decision p99.9, us" in text
-    assert {page.name for page in pages} == {"bench.md", "json_keys.md", "settings.md"}
+    assert {page.name for page in pages} == {"bench.md", "json_keys.md"}
 
 
-def test_bars_judge_the_slower_policy(content):
+def test_goals_judge_the_slower_policy(content):
     rows = [
         {"shielded": shielded, "median": rate}
         for shielded, rate in ((False, 3e5), (False, 2e5), (True, 9e4), (True, 8.5e4))
     ]
     quick, tabled = {"p50_us": 100.0, "p99_9_us": 3000.0}, {"p50_us": 101.0, "p99_9_us": 900.0}
     memory = {"games": 4096, "games_mib": 100.0, "shield_mib": 91.0}
-    bars = bench_bars({"decide": {"all": quick}, "decide_by_table": {"all": tabled}, "batch": rows, "memory": memory})
-    assert [bar["met"] for bar in bars] == [True, False, False, True, False, True, False]
-    assert [bar["value"] for bar in bars] == [100.0, 3000.0, 101.0, 900.0, 2e5, 8.5e4, 191.0]
+    goals = bench_goals({"decide": {"all": quick}, "decide_by_table": {"all": tabled}, "batch": rows, "memory": memory})
+    assert [goal["met"] for goal in goals] == [True, False, False, True, False, True, False]
+    assert [goal["value"] for goal in goals] == [100.0, 3000.0, 101.0, 900.0, 2e5, 8.5e4, 191.0]
 
 
 def test_states_of_games_are_seeded_and_not_overwritten_by_the_game():
@@ -134,7 +134,7 @@ def test_the_page_of_keys_holds_every_key(tmp_path):
 
 
 def test_every_key_of_changed_commands_says_whether_it_is_a_fraction_or_percent():
-    tables = (*KEYS.values(), GAME_COLUMNS, TOURNAMENT_GAME)
+    tables = (*KEYS.values(), GAME_ROW, TOURNAMENT_GAME)
     found = {key: words for keys in tables for key, words in keys.items() if "changed_share" in key}
     assert len(found) == 6
     for key, words in found.items():
@@ -154,7 +154,7 @@ def test_no_page_is_made_of_other_results(tmp_path):
 
 def test_no_page_is_written_over_another(tmp_path):
     settings = {"preset": "aamas2024", "own": "medium", "games": 1, "rules": {}}
-    about = {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "bars": []}
+    about = {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "goals": []}
     games = {"command": "evaluate", "settings": settings, "pairings": [], **about}
     with pytest.raises(ConfigError, match=r"two of the results make evaluation_aamas2024\.md; give them one at a time"):
         write_pages([games, games], tmp_path)

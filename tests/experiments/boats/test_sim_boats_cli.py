@@ -8,7 +8,7 @@ from steerclear.experiments.boats import SimFleet
 from steerclear.experiments.boats.demo import demo_fleet, demo_text
 from steerclear.experiments.boats.incidents import Incident, parse_incident
 from steerclear.experiments.cli import app
-from steerclear.experiments.pages.keys import SIM_BOATS, undocumented
+from steerclear.experiments.docs_keys import SIM_BOATS, undocumented
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner

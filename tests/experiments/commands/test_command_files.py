@@ -11,7 +11,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.commands.ablate import ablate
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.files import check_apart, check_files, check_json_file, written_by
-from steerclear.experiments.runs.new_file import check_new
+from steerclear.experiments.result_files import check_new
 from steerclear.policies.entrants.learned.entered import FILES
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
@@ -103,7 +103,7 @@ def test_no_json_is_written_where_the_command_keeps_its_own_results(words, more,
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["games.jsonl", "games.csv", "games.parquet", "boat.png", "a.zip", "a.gif"])
+@pytest.mark.parametrize("name", ["rows.jsonl", "rows.csv", "rows.parquet", "boat.png", "a.zip", "a.gif"])
 def test_json_has_no_ending_of_other_results(name):
     with pytest.raises(ConfigError, match=r"has the ending of .*; give a name that ends in \.json"):
         check_json_file(Path(name))
@@ -273,7 +273,7 @@ def test_a_run_that_is_gone_on_with_writes_its_json_again(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["ablate --quick", "evaluate medium --quick", "encounters", "attack", "tournament"])
-@pytest.mark.parametrize("name", ["report.html", "games.csv"])
+@pytest.mark.parametrize("name", ["report.html", "rows.csv"])
 def test_results_write_over_nothing(command, name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("out").mkdir()

@@ -19,7 +19,7 @@ from steerclear.experiments.deploy.replaying import prove
 from steerclear.experiments.deploy.rules import game_config, player_names, state_of
 from steerclear.experiments.deploy.run import deploy
 from steerclear.experiments.deploy.tally import Tally
-from steerclear.experiments.pages.keys import KEYS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed import FeedSender

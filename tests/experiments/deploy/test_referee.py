@@ -17,7 +17,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.referee import Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
-from steerclear.experiments.pages.keys import KEYS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
 from steerclear.shield.bridge.fleet_file import load_fleet

@@ -7,7 +7,7 @@ import pytest
 from logged_runs import Encounter, header_of, write_log
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
-from steerclear.experiments.pages.keys import KEYS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.blackbox import McapWriter
 from typer.testing import CliRunner

@@ -8,14 +8,14 @@ import pytest
 from rich.console import Console
 from steerclear.env.record import read_meta, validate
 from steerclear.experiments import cli
+from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, campaign, draw, play
 from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
 from steerclear.experiments.encounters.replays import record_of, records_of
-from steerclear.experiments.encounters.results import bars_of, cells_table
+from steerclear.experiments.encounters.results import cells_table, goals_of
 from steerclear.experiments.encounters.scene_file import write_scene
 from steerclear.experiments.encounters.worst import worst_encounters
-from steerclear.experiments.pages import keys
 from typer.testing import CliRunner
 
 USUAL = Conditions()
@@ -39,7 +39,7 @@ def test_a_small_run_from_end_to_end_and_again():
     assert keys.undocumented(content, keys.ENCOUNTERS) == []
     assert (content["complete"], content["encounters_played"], content["encounters_resumed"]) == (True, 6, 0)
     assert [cell["family"] for cell in content["cells"]] == ["head_on", "doorway"]
-    assert content["bars"] == []
+    assert content["goals"] == []
     assert "head_on" in Path("out/report.html").read_text()
     assert Path("out/replay.html").stat().st_size > 0
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
@@ -75,7 +75,7 @@ def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
 def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):
     monkeypatch.setattr(campaign, "measure_chunk", _breaching(campaign.measure_chunk))
     done = run(*SMALL, "--guard", "none,shield", "--no-judge", "--out", "out")
-    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     cells = json.loads(Path("out/results.json").read_text())["cells"]
     bare = {(cell["guard"], cell["family"]): cell["unshielded_breached"] for cell in cells}
     assert bare["none", "head_on"] == bare["shield", "head_on"]
@@ -169,19 +169,19 @@ def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
     ("avoidable", "unavoidable", "not_judged", "expected"),
     [(0, 0, 0, [True, True]), (1, 0, 0, [False, True]), (0, 2, 0, [True, False]), (0, 0, 1, [None, None])],
 )
-def test_bars_of_the_shield(avoidable, unavoidable, not_judged, expected):
+def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
     counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
     cell = asdict(campaign.Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
-    assert [bar["met"] for bar in bars_of([cell])] == expected
-    assert bars_of([cell | {"guard": "parabolic"}]) == []
+    assert [goal["met"] for goal in goals_of([cell])] == expected
+    assert goals_of([cell | {"guard": "parabolic"}]) == []
 
 
 @pytest.mark.parametrize(("hits", "met"), [(0, True), (1, False)])
 def test_one_rammer_must_not_breach_what_started_outside(hits, met):
     counts = {"avoidable": 0, "unavoidable": 0, "not_judged": 1, "encounters": 100, "breaches_outside": hits}
     cell = asdict(campaign.Cell("shield", "heron", "heron", "rammer_1")) | counts
-    assert bars_of([cell])[1]["met"] is met
-    assert len(bars_of([cell | {"other": "surveyor"}])) == 1
+    assert goals_of([cell])[1]["met"] is met
+    assert len(goals_of([cell | {"other": "surveyor"}])) == 1
 
 
 def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():

@@ -12,7 +12,7 @@ from steerclear.experiments.encounters.start import start_certificate_m
 from steerclear.experiments.encounters.summary import summarise, upper_bound
 from steerclear.experiments.encounters.tally import tally
 from steerclear.experiments.encounters.verdicts import SIDES, VERDICT_COLUMNS, judge_game, judge_worst
-from steerclear.experiments.measure.reversals import count_reversals
+from steerclear.experiments.game_metrics import count_reversals
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 

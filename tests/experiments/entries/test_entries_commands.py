@@ -102,7 +102,7 @@ def test_sigterm_keeps_what_is_finished_and_leaves_nobody(write_entry, tmp_path)
     arguments = ["--opponents", "hold", "--games", "40", "--max-time", "1", "--jobs", "2", "--judge", "none"]
     done = steerclear("evaluate", entry, *arguments, "--out", "out")
     try:
-        lines, end_s = Path("out/games.jsonl"), time.monotonic() + 200.0
+        lines, end_s = Path("out/rows.jsonl"), time.monotonic() + 200.0
         while not (lines.exists() and lines.read_text().count("\n") >= 2):
             assert time.monotonic() < end_s
             assert done.poll() is None, done.communicate()
@@ -112,7 +112,7 @@ def test_sigterm_keeps_what_is_finished_and_leaves_nobody(write_entry, tmp_path)
     finally:
         done.kill()
     assert done.returncode == ExitCode.INTERRUPTED
-    assert "of 40 games kept in out/games.jsonl" in said.replace("\n", " ")
+    assert "of 40 games kept in out/rows.jsonl" in said.replace("\n", " ")
     content = json.loads(Path("out/results.json").read_text())
     assert (content["complete"], content["games_played"]) == (False, len(lines.read_text().splitlines()))
     end_s = time.monotonic() + 20.0

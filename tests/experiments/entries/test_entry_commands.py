@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments import cli
+from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.entry import time_text
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.imports import imports_of
 from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
-from steerclear.experiments.pages.keys import KEYS, undocumented
-from steerclear.experiments.runs.ablation import AblationSettings
-from steerclear.experiments.runs.pool import available_cores
+from steerclear.experiments.provenance import available_cores
 from steerclear.shield.exceptions import PolicyError
 from typer.testing import CliRunner
 
@@ -66,7 +66,7 @@ def test_an_entry_that_does_not_play_is_one_line(write_entry, body, start, words
 def test_one_boat_that_fails_is_said_first_and_named(write_entry):
     entry = write_entry("return 4 if agent_id != 'agent_1' else full_obs[agent_id]['nothing']")
     done = run("check", entry, "--max-time", "3", "--json", "a.json")
-    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     assert "plays, but agent_1 failed in 3 of 3 steps." in done.stdout.splitlines()[0]
     assert "failed: raised KeyError (agent_1 x 3): KeyError: 'nothing'" in done.stdout
     content = json.loads(Path("a.json").read_text())

@@ -17,10 +17,10 @@ from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.onboard.state import GameSpec
 from steerclear.experiments.entries.onboard.team_shield import ShieldedTeam, _tuples
 from steerclear.experiments.entries.package import code, game_spec
-from steerclear.experiments.pages.keys import KEYS, undocumented
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from typer.testing import CliRunner
@@ -258,7 +258,7 @@ def test_what_fails_inside_a_zip_is_counted_as_that_of_a_bare_entry(tmp_path):
     flag.touch()
     for entry in ("team", "s.zip"):
         done = run("check", tmp_path / entry, "--max-time", "2")
-        assert done.exit_code == ExitCode.BAR_FAILED, done.output
+        assert done.exit_code == ExitCode.GOAL_MISSED, done.output
         assert "plays, but agent_1 failed in 2 of 2 steps, agent_2 failed in 2 of 2 steps." in done.stdout
         assert "failed: raised Mute (agent_1 x 2): Mute: (no text)" in done.stdout
         assert "failed: raised SystemExit (agent_2 x 2)" in done.stdout

@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.experiments import cli
+from steerclear.experiments import docs_keys as keys
+from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.pages import keys
-from steerclear.experiments.pages.docs_pages import write_pages
+from steerclear.experiments.docs import write_pages
 from steerclear.experiments.play.conditions import CALM, Conditions, draw, words_of, words_of_settings
 from steerclear.experiments.play.spec import MatchSpec
-from steerclear.experiments.runs.ablation import AblationSettings
-from steerclear.experiments.runs.campaign import Campaign
-from steerclear.experiments.runs.store import ResultStore
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
@@ -67,10 +65,9 @@ def test_games_under_other_conditions_are_other_games(tmp_path):
     others = [Conditions(delay_s=0.3), Conditions(noise_m=0.3), Conditions(current_mps=0.3)]
     assert len({spec.key, *(replace(spec, conditions=entry).key for entry in others)}) == 4
     settings = AblationSettings(opponents=("hold",), games=1, rules={"max_time_s": 2.0}, conditions=ROUGH)
-    Campaign(settings.specs(), ResultStore(tmp_path)).run()
-    for conditions, resumed in ((ROUGH, 2), (CALM, 0), (replace(ROUGH, delay_s=0.2), 0)):
-        specs = replace(settings, conditions=conditions).specs()
-        assert Campaign(specs, ResultStore(tmp_path, resume=True)).so_far().resumed == resumed
+    played = {spec.key for spec in settings.specs()}
+    for conditions, same in ((ROUGH, 2), (CALM, 0), (replace(ROUGH, delay_s=0.2), 0)):
+        assert len(played & {spec.key for spec in replace(settings, conditions=conditions).specs()}) == same
 
 
 def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):

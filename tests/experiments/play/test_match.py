@@ -9,7 +9,7 @@ from steerclear.env.record import read_meta
 from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.openings import GAP_M, opening
 from steerclear.experiments.play.spec import MatchSpec
-from steerclear.experiments.runs.store import key_of
+from steerclear.experiments.runner import job_id as key_of
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
 SHORT = {"max_time_s": 6.0}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import read_meta
-from steerclear.experiments.measure import judging
+from steerclear.experiments import verdicts
 from steerclear.experiments.play.conditions import CALM, Conditions
 from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.sea import Sea
@@ -137,13 +137,13 @@ def test_the_other_teams_shield_is_not_told_of_a_delay_its_boats_do_not_have(sid
 
 
 def test_the_oracle_is_told_of_the_same_physics(monkeypatch):
-    told, ask = [], judging.oracle.judge_breaches
+    told, ask = [], verdicts.oracle.judge_breaches
 
     def note(*args, motion, **kwargs):
         told.append(motion)
         return ask(*args, motion=motion, **kwargs)
 
-    monkeypatch.setattr(judging.oracle, "judge_breaches", note)
+    monkeypatch.setattr(verdicts.oracle, "judge_breaches", note)
     match = Match(spec_of(ALL, seed=1, judge="all", rules={"max_time_s": 40.0}))
     row = match.play().row
     assert told == [match.shielding.motion]

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.pages.docs_pages import write_pages
-from steerclear.experiments.pages.keys import PLAYED_SETS, undocumented
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import PLAYED_SETS, undocumented
 from steerclear.experiments.reach import played_sets, unsafe_sets
 from steerclear.experiments.reach.played_sets import PlayedSet, duels_lost, games_lost, play_set, tasks_of
-from steerclear.experiments.reach.played_sets_page import HEADS, bars_of, rows_of
+from steerclear.experiments.reach.played_sets_page import HEADS, goals_of_sets, rows_of
 from steerclear.experiments.reach.unsafe_sets import RATIO_BAR, values_m
 from steerclear.shield import ShieldConfig
 from steerclear.shield.platforms import get_platform
@@ -126,7 +126,7 @@ def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few
     again = play("--out", str(folder), "--resume", "--json", str(file))
     assert json.loads(file.read_text())["sets"] == content["sets"]
     assert again.exit_code == 0
-    assert len((folder / "games.jsonl").read_text().splitlines()) == 1
+    assert len((folder / "rows.jsonl").read_text().splitlines()) == 1
     write_pages([content], tmp_path)
     page = (tmp_path / "played_sets.md").read_text()
     assert "heron meets heron, 2.5 m" in page
@@ -155,8 +155,8 @@ def test_the_worst_row_is_judged():
     fine, large, beyond = (
         PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 3.0, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
     )
-    assert [bar["met"] for bar in bars_of([fine])] == [True, True]
-    assert [(bar["met"], bar["limit"]) for bar in bars_of([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
-    assert [bar["met"] for bar in bars_of([fine, beyond])] == [True, False]
+    assert [bar["met"] for bar in goals_of_sets([fine])] == [True, True]
+    assert [(bar["met"], bar["limit"]) for bar in goals_of_sets([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
+    assert [bar["met"] for bar in goals_of_sets([fine, beyond])] == [True, False]
     row = dict(zip(HEADS, rows_of([large])[0], strict=True))
     assert (row["ratio"], row["by table"], row["lost beyond"]) == ("1.20", "1.10", "0 of 50")

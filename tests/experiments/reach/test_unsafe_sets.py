@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.pages.docs_pages import write_pages
-from steerclear.experiments.pages.keys import SETS, undocumented
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import SETS, undocumented
 from steerclear.experiments.reach import unsafe_sets
 from steerclear.experiments.reach.unsafe_sets import (
     MISSED_PERCENT_BAR,
@@ -17,7 +17,7 @@ from steerclear.experiments.reach.unsafe_sets import (
     compare_sets,
     sets_config,
 )
-from steerclear.experiments.reach.unsafe_sets_page import HEADS, content_of, rows_of, sets_bars
+from steerclear.experiments.reach.unsafe_sets_page import HEADS, content_of, rows_of, sets_goals
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.areas import area_m2
@@ -64,7 +64,7 @@ def test_opponents_that_only_hold_their_course_leave_a_smaller_set_that_misses_w
     assert math.pi * RADIUS_M**2 <= pair.shield_m2 < pair.reach_m2
     assert pair.missed_m2 >= pair.reach_m2 - pair.shield_m2 - 1e-9
     assert pair.ratio <= RATIO_BAR
-    assert not {bar["name"]: bar["met"] for bar in sets_bars([pair])}["set the shield misses, %, largest"]
+    assert not {bar["name"]: bar["met"] for bar in sets_goals([pair])}["set the shield misses, %, largest"]
 
 
 def test_areas_of_the_same_size_in_other_places_are_seen(heron, monkeypatch):
@@ -87,7 +87,7 @@ def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_pa
     assert compare("--json", str(file), *settings).exit_code == 0
     content = json.loads(file.read_text())
     assert content["looked_up"]
-    assert {bar["met"] for bar in content["bars"] if "misses" in bar["name"]} == {None}
+    assert {bar["met"] for bar in content["goals"] if "misses" in bar["name"]} == {None}
     write_pages([content], tmp_path)
     assert "looks opponents up in this very table" in (tmp_path / "unsafe_sets.md").read_text()
     file.unlink()
@@ -138,11 +138,11 @@ def test_rows_show_the_ratio_and_what_is_missed():
 
 def test_bars_judge_the_worst_pair():
     fine, large, missing = (SetPair(2.0, 2.0, 0.0, *areas) for areas in ((30, 30, 0.1), (60, 30, 0), (30, 30, 3)))
-    assert [bar["met"] for bar in sets_bars([fine])] == [True, True]
-    assert [bar["met"] for bar in sets_bars([fine, large])] == [False, True]
-    assert [bar["met"] for bar in sets_bars([missing, fine])] == [True, False]
-    assert [bar["limit"] for bar in sets_bars([fine])] == [RATIO_BAR, MISSED_PERCENT_BAR]
-    assert [bar["value"] for bar in sets_bars([large, missing])] == pytest.approx([2.0, 10.0])
+    assert [bar["met"] for bar in sets_goals([fine])] == [True, True]
+    assert [bar["met"] for bar in sets_goals([fine, large])] == [False, True]
+    assert [bar["met"] for bar in sets_goals([missing, fine])] == [True, False]
+    assert [bar["limit"] for bar in sets_goals([fine])] == [RATIO_BAR, MISSED_PERCENT_BAR]
+    assert [bar["value"] for bar in sets_goals([large, missing])] == pytest.approx([2.0, 10.0])
 
 
 def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_on):
@@ -161,7 +161,7 @@ def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_o
     assert "heron meets heron, 2.5 m" in page
     assert "tail_s=5" in page
     assert f"| {content['pairs'][0]['shield_m2']:.1f} | {content['pairs'][0]['reach_m2']:.1f} |" in page
-    for bar in content["bars"]:
+    for bar in content["goals"]:
         assert f"| {bar['name']} |" in page
 
 

@@ -7,8 +7,7 @@ import textwrap
 import time
 
 import pytest
-from steerclear.experiments.pages.keys import KEYS, undocumented
-from steerclear.experiments.runs.store import ResultStore
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.tournament import campaign as played
 from steerclear.experiments.tournament.campaign import Tournament
 from steerclear.experiments.tournament.keys import TOURNAMENT_GAME
@@ -78,7 +77,7 @@ def test_every_pair_meets_on_both_sides_from_the_same_seeds():
 
 
 def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatch):
-    whole = Tournament(settings(), ResultStore(tmp_path / "whole"))
+    whole = Tournament(settings(), tmp_path / "whole", False)
     whole.run()
     assert len(whole.rows()) == whole.expected == 6
     count = iter(range(100))
@@ -90,9 +89,9 @@ def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatc
 
     monkeypatch.setattr(played, "play_game", killed_at_the_third)
     with pytest.raises(KeyboardInterrupt):
-        Tournament(settings(), ResultStore(tmp_path / "cut")).run()
+        Tournament(settings(), tmp_path / "cut", False).run()
     monkeypatch.undo()
-    again = Tournament(settings(), ResultStore(tmp_path / "cut", resume=True))
+    again = Tournament(settings(), tmp_path / "cut", True)
     assert again.resumed == 2
     assert subtitle(results(again)).endswith("not complete: no shields 2 games, repetitions of every pair that met: 1")
     again.run()
@@ -104,7 +103,7 @@ def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatc
 def test_a_tournament_that_was_killed_goes_on_to_the_same_table(tmp_path):
     command = [sys.executable, "-m", "steerclear.experiments.cli", "tournament", "--teams", "ohto,meo,hold"]
     command += ["--shield", "off", "--max-time", "20", "--jobs", "1", "--no-replays", "--out"]
-    lines = tmp_path / "cut" / "games.jsonl"
+    lines = tmp_path / "cut" / "rows.jsonl"
     killed = subprocess.Popen([*command, str(tmp_path / "cut")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 300.0
     while time.monotonic() < deadline and not (lines.exists() and lines.read_bytes().count(b"\n") >= 2):
@@ -123,7 +122,7 @@ def test_a_tournament_that_was_killed_goes_on_to_the_same_table(tmp_path):
 
 
 def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
-    run = Tournament(settings(states=("off",)), ResultStore(tmp_path / "run"))
+    run = Tournament(settings(states=("off",)), tmp_path / "run", False)
     run.run()
     content = results(run)
     assert undocumented(content, KEYS["tournament"]) == []
@@ -153,7 +152,7 @@ def test_a_polluter_changes_nothing_for_the_team_beside_it(tmp_path):
 
 def test_a_team_that_ends_itself_is_named_and_stops_nothing(tmp_path):
     quitter = entry(tmp_path, "quitter", "import os\nclass solution:\n    compute_action = lambda *a: os._exit(3)\n")
-    run = Tournament(settings(teams=("ohto", quitter)), ResultStore(tmp_path / "run"))
+    run = Tournament(settings(teams=("ohto", quitter)), tmp_path / "run", False)
     run.run()
     content = results(run)
     assert content["complete"]
@@ -163,7 +162,7 @@ def test_a_team_that_ends_itself_is_named_and_stops_nothing(tmp_path):
 
 def test_the_best_of_the_qualifying_go_on(tmp_path, monkeypatch):
     monkeypatch.setattr(played, "play_game", played_by_rank)
-    run = Tournament(settings(qualifying=True, finalists=2), ResultStore(tmp_path / "run"))
+    run = Tournament(settings(qualifying=True, finalists=2), tmp_path / "run", False)
     run.run()
     assert len(run.rows()) == run.expected == 3 * 5 * 2 + 2
     assert {row["blue"] for row in run.rows() if row["phase"] == "final"} == {"ohto", "hold"}

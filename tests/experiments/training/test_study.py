@@ -1,8 +1,8 @@
 import json
 
 import pytest
-from steerclear.experiments.pages.docs_pages import write_pages
-from steerclear.experiments.runs.store import write_json
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.result_files import write_json
 from steerclear.experiments.training.config_file import config_of
 from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
 from steerclear.shield.exceptions import ConfigError

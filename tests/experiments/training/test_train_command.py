@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from steerclear.experiments.cli import app
 from steerclear.experiments.commands import train
-from steerclear.experiments.runs.folder_lock import _HELD
+from steerclear.experiments.result_files import lock_folder
 from steerclear.policies.submissions.made_for import made_for
 from typer.testing import CliRunner
 
@@ -60,9 +60,9 @@ def test_a_training_without_a_terminal_tells_how_far_it_is(tiny, tmp_path, monke
 
 def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
     held = []
-    monkeypatch.setattr(train, "_run", lambda training, folder: held.append(folder.resolve() in _HELD))
+    monkeypatch.setattr(train, "_run", lambda training, folder: held.append(lock_folder(folder).lock_counter))
     assert call("train", tiny(), "--out", tmp_path / "alone").exit_code == 0
-    assert held == [True]
+    assert held == [2], "the command's own, and this one of the same process"
 
 
 def test_bad_input_is_one_line(tiny, tmp_path):

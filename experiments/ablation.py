@@ -1,0 +1,314 @@
+"""Games of one policy against others, without and with the shield, from the same seeds: ablate, evaluate, entries.
+
+The ablation is the experiment that the others are written after: settings, jobs, ``run``, metrics, goals, report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import pandas as pd
+from steerclear import policies
+
+from .game_metrics import DEFAULT_PENALTY
+from .metrics import RADII_M, breach_column, check, game_goals, game_metrics_of, pairs_of
+from .play.conditions import CALM, Conditions
+from .play.match import play_job, play_match
+from .play.spec import ANSWER_S, SIDES, MatchSpec
+from .replay_html import write_replay
+from .report import write_report
+from .result_files import table_name
+from .runner import RESULTS_FILE, Experiment, Run
+from .statistics import DIFFERENCE, summarise
+from .verdicts import all_breaches, summarise_verdicts
+from .warming import compile_game, compile_judge, compile_shield
+from .workers import Row, Workers, outcomes
+
+STATES = {False: "off", True: "on", DIFFERENCE: DIFFERENCE}
+"""What the states of the shield, and their difference, are called in results."""
+TIMED = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
+"""Columns that differ when a game is played again."""
+
+
+@dataclass(frozen=True)
+class AblationSettings:
+    """Settings of an ablation; they are the command line and what results.json keeps.
+
+    Attributes:
+        preset: rules of the game.
+        own: policy of the team that is shielded.
+        opponents: policies it meets, one pairing each.
+        games: games per pairing and shield state.
+        seed: game g is played from seed + g, in every pairing, off and on.
+        sides: colours the own team takes in turn, game by game.
+        shield: settings of the shield.
+        states: shield states to play, False for off and True for on.
+        shield_autopilot: see `MatchSpec`; as the rest.
+    """
+
+    preset: str = "aamas2024"
+    own: str = "medium"
+    opponents: tuple[str, ...] = ("easy", "medium", "hidden")
+    games: int = 20
+    seed: int = 0
+    sides: tuple[str, ...] = SIDES
+    shield: Mapping[str, Any] = field(default_factory=dict)
+    states: tuple[bool, ...] = (False, True)
+    shield_autopilot: bool = True
+    rules: Mapping[str, Any] = field(default_factory=dict)
+    fixed_start: bool = False
+    penalty: float = DEFAULT_PENALTY
+    judge: str = "shielded"
+    conditions: Conditions = CALM
+    trust: bool = False
+    answer_s: float = ANSWER_S
+
+    @property
+    def separation_m(self) -> float:
+        """Radius the shield keeps, m: the one at which its goals are judged."""
+        return float(self.shield.get("separation_m", RADII_M[0]))
+
+    @property
+    def radii_m(self) -> tuple[float, ...]:
+        """Radii at which breaches are counted, m: the usual two and the shield's own."""
+        return tuple(sorted({*RADII_M, self.separation_m}))
+
+    def specs(self) -> list[MatchSpec]:
+        """List all games, those with the same number next to each other, so that an early end leaves pairs."""
+        digests = {name: policies.fingerprint(name) for name in (self.own, *self.opponents)}
+        same = {name: getattr(self, name) for name in ("preset", "own", "shield_autopilot", "fixed_start", "penalty")}
+        same |= {name: getattr(self, name) for name in ("judge", "conditions", "trust", "answer_s", "radii_m")}
+        return [
+            MatchSpec(
+                **same,
+                opponent=opponent,
+                game=game,
+                seed=self.seed + game,
+                side=self.sides[game % len(self.sides)],
+                shield=dict(self.shield) if shielded else None,
+                rules=dict(self.rules),
+                files=(digests[self.own], digests[opponent]),
+            )
+            for game in range(self.games)
+            for opponent in self.opponents
+            for shielded in self.states
+        ]
+
+    def experiment(self, command: str) -> Experiment:
+        """What `runner.execute` runs."""
+        compiles = [compile_game, *([compile_shield] if any(self.states) else [])]
+        compiles += [compile_judge] if self.judge != "none" else []
+        jobs = [spec.as_job() for spec in self.specs()]
+        return Experiment(command, asdict(self), jobs, play_job, "games", compiles)
+
+
+def quick(settings: AblationSettings, max_time_s: float, games: int) -> AblationSettings:
+    """Return the small version of an ablation: fewer and shorter games."""
+    return replace(settings, games=games, rules={**settings.rules, "max_time_s": max_time_s})
+
+
+def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> dict[str, Any]:
+    """Put together the content of results.json; `docs_keys` describes it.
+
+    Args:
+        run: what was played; fewer games than the settings ask for when it was interrupted.
+        settings: of the run.
+        is_quick: whether it is the small version.
+    """
+    rows = run.rows
+    goals = [] if pairs_of(run.table).empty else check(game_goals(settings.separation_m), run.table)
+    named = ("pairing", "game", "shielded", "error", "fault")
+    failed = [{**_names(MatchSpec.of_job(job)), **job} for job in run.failed]
+    return {
+        **run.head(),
+        "quick": is_quick,
+        "policy_files": _policy_files(rows),
+        "seeds": [settings.seed + game for game in range(settings.games)],
+        "games_played": len(rows),
+        "games_resumed": run.resumed,
+        "failed": [{name: job[name] for name in named} for job in failed],
+        "warnings": failure_warnings(rows),
+        "held": held_games(rows),
+        "pairings": pairings_of(run.table, settings.radii_m, settings.seed),
+        "goals": goals,
+        "breaches": all_breaches(rows),
+        "deprecated": {"bars": goals},
+    }
+
+
+def _names(spec: MatchSpec) -> dict[str, Any]:
+    return {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None}
+
+
+def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) -> list[dict[str, Any]]:
+    """Summarise every pairing.
+
+    Returns:
+        Of each, JSON-ready: ``pairing``, ``games_off``, ``games_on``, ``metrics`` (per key ``label``, ``off``, ``on``,
+        ``difference``, each with value, low, high, n; absent where there is none), ``verdicts``, ``reasons``,
+        ``policy_failures``.
+    """
+    if table.empty:
+        return []
+    metrics = game_metrics_of(radii_m)
+    table = table.drop_duplicates(["pairing", "game", "shielded"], keep="last")
+    figures = summarise(table, metrics, ["pairing"], ("shielded", False, True), ["game"], seed)
+    found = []
+    for pairing, games in table.groupby("pairing", sort=False):
+        shielded = games["shielded"].astype(bool)
+        lines = figures[figures["pairing"] == pairing]
+        found.append(
+            {
+                "pairing": pairing,
+                "games_off": int((~shielded).sum()),
+                "games_on": int(shielded.sum()),
+                "metrics": {m.key: {"label": m.label, **_states(lines, m.key)} for m in metrics},
+                "verdicts": summarise_verdicts(games.to_dict("records")),
+                "reasons": _reasons(games[shielded]),
+                "policy_failures": int(games["policy_failures"].sum()),
+            }
+        )
+    return found
+
+
+def _states(lines: pd.DataFrame, key: str) -> dict[str, Any]:
+    chosen = lines[lines["metric"] == key]
+    return {
+        STATES[line["shielded"]]: {name: line[name] for name in ("value", "low", "high", "n")}
+        for line in chosen.to_dict("records")
+    }
+
+
+def _reasons(games: pd.DataFrame) -> dict[str, int]:
+    totals = games[[name for name in games if name.startswith("reason_")]].sum()
+    return {name.removeprefix("reason_"): int(count) for name, count in totals.items()}
+
+
+def _policy_files(rows: Sequence[Row]) -> dict[str, str]:
+    """Digests of the files that were played, by policy; none of named policies."""
+    pairs = {(row[side], row.get(f"{side}_files")) for row in rows for side in ("own", "opponent")}
+    return {name: digest for name, digest in sorted(pairs, key=str) if digest}
+
+
+def write_results(run: Run, results: dict[str, Any], records: Sequence[Any] = ()) -> None:
+    """Write report, replay and results.json into the folder and note the names under ``files``.
+
+    Args:
+        run: the games.
+        results: from `results_of`; gains ``files``.
+        records: games for the replay, unshielded first; none, no replay.
+    """
+    files = {"results": RESULTS_FILE, "games": table_name()}
+    results["files"] = files
+    links = []
+    if records:
+        files["replay"] = write_replay(records, run.folder / "replay.html").name
+        played = results["replay"]
+        label = f"{played['pairing']}, game {played['game']}: without the shield and with it"
+        links = [{"label": label, "path": files["replay"]}]
+    flat = [{name: value for name, value in row.items() if name != "breaches"} for row in run.rows]
+    files["report"] = write_report({**results, "games": flat, "replays": links}, run.folder / "report.html").name
+    run.write(results)
+
+
+def replay_of(
+    table: pd.DataFrame, specs: Sequence[MatchSpec], separation_m: float, workers: Workers
+) -> tuple[dict[str, Any], list[Any]] | None:
+    """Play again, for its records, the pair of games with the most breaches when unshielded.
+
+    Returns:
+        The ``replay`` entry of results.json and the records off and on; None without a pair of games.
+    """
+    pair = most_instructive(table, separation_m)
+    if pair is None:
+        return None
+    chosen = [spec_of(row, specs) for row in pair]
+    answers = {outcome.job.key: outcome.answer for outcome in outcomes(play_match, chosen, workers)}
+    again = [answers[spec.key] for spec in chosen]
+    if any(result is None for result in again):
+        return None
+    entry = {
+        "pairing": pair[0]["pairing"],
+        "game": pair[0]["game"],
+        "breaches_off": _breaches(pair[0], separation_m),
+        "breaches_on": _breaches(pair[1], separation_m),
+        "same_as_played": all(same_game(row, result.row) for row, result in zip(pair, again, strict=True)),
+    }
+    return entry, [result.record for result in again]
+
+
+def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row] | None:
+    """Choose the pair of games, off and on, with the most breaches when unshielded; None without a pair."""
+    pairs = pairs_of(table)
+    if pairs.empty:
+        return None
+    hits = sum(pairs[breach_column(kind, separation_m) + "_off"] for kind in ("teammate", "opponent"))
+    chosen = pairs.iloc[int(hits.to_numpy().argmax())]
+    rows = table.to_dict("records")
+    off, on = (
+        next(r for r in rows if (r["pairing"], r["game"], r["shielded"]) == (chosen["pairing"], chosen["game"], state))
+        for state in (False, True)
+    )
+    return off, on
+
+
+def spec_of(row: Row, specs: Sequence[MatchSpec]) -> MatchSpec:
+    """Find the spec a row was played from."""
+    wanted = (row["pairing"], row["game"], row["shielded"])
+    return next(spec for spec in specs if (spec.pairing, spec.game, spec.shield is not None) == wanted)
+
+
+def same_game(first: Row, second: Row) -> bool:
+    """Tell whether two rows are the same game; times of computing may differ."""
+    return all(
+        _same(first.get(name), value) for name, value in second.items() if name not in TIMED and name != "breaches"
+    )
+
+
+def _same(first: Any, second: Any) -> bool:
+    return bool(first == second or (second is None and (first is None or first != first)))
+
+
+def _breaches(row: Row, separation_m: float) -> int:
+    return sum(int(row[breach_column(kind, separation_m)]) for kind in ("teammate", "opponent"))
+
+
+_SEATS = (("own policy", "", "own: "), ("opponents' policy", "opponent_", "opponent: "))
+"""Words, how the columns begin, and how the texts of its failures do."""
+
+
+def failure_warnings(rows: Sequence[Row]) -> list[str]:
+    """Sentences about failures of policies: one for each side that failed."""
+    found = []
+    for words, column, begin in _SEATS:
+        failed = [row for row in rows if row[f"{column}policy_failures"]]
+        if failed:
+            count = sum(int(row[f"{column}policy_failures"]) for row in failed)
+            text = _first_text(failed, begin)
+            found.append(
+                f"The {words} failed {count:,} time{'s' if count > 1 else ''}, in {len(failed)} of {len(rows)} games; "
+                "its boats stopped for those steps, so the figures are not those of a working policy."
+                + (f" First failure: {text}" if text else "")
+            )
+    return found
+
+
+def held_games(rows: Sequence[Row]) -> list[str]:
+    """Sentences about policies that did not play: in no step of a game had a boat of theirs a usable answer."""
+    found = []
+    for words, column, begin in _SEATS:
+        held = [row for row in rows if row["steps"] > 0 and row[f"{column}policy_usable_steps"] == 0]
+        if held:
+            text = _first_text(held, begin)
+            found.append(
+                f"the {words} gave no usable answer throughout {len(held)} of {len(rows)} games; its boats lay still, "
+                f"so these are figures of no policy{f' ({text})' if text else ''}; mend it or leave it out"
+            )
+    return found
+
+
+def _first_text(rows: Sequence[Row], begin: str) -> str:
+    texts = (str(row["first_failure"] or "") for row in rows)
+    return next((text.removeprefix(begin) for text in texts if text.startswith(begin)), "")

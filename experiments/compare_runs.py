@@ -1,0 +1,218 @@
+"""Two results set beside one another, game by game from the same seeds: what one setting changes against another."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from steerclear.shield.exceptions import ConfigError
+
+from .metrics import Metric, game_metrics_of
+from .result_files import read_json
+from .runner import OLD_ROWS_FILE, RESULTS_FILE, ROWS_FILE, job_id, read_line
+from .statistics import DIFFERENCE, summarise
+
+COMMANDS = ("ablate", "evaluate", "entry report")
+SAME = ("preset", "rules", "fixed_start", "penalty")
+"""Settings without which games of one seed are no pairs."""
+BESIDE = ("opponents", "games", "seed", "sides", "states", "judge", "trust", "answer_s")
+"""Settings that say which games there are, or change nothing in them."""
+GAME = ("opponent", "seed", "side")
+"""What makes two games a pair."""
+
+
+@dataclass(frozen=True)
+class PlayedRun:
+    """Results of a run.
+
+    Attributes:
+        folder: where they are.
+        settings: of the run, as its results keep them.
+        version: of steerclear that played it.
+        code: digests of the code that played its games.
+        shielded: whether its games are those with the shield: where there are any, they are.
+        table: its games, one a line.
+    """
+
+    folder: Path
+    settings: Mapping[str, Any]
+    version: str
+    code: frozenset[str]
+    shielded: bool
+    table: pd.DataFrame
+
+
+def read_run(folder: Path) -> PlayedRun:
+    """Read a results folder, of this version or of 0.8.0 and before.
+
+    Raises:
+        ConfigError: it holds no results of games, or games of several settings.
+    """
+    remedy = "give a results folder of ablate or evaluate"
+    if not folder.is_dir():
+        raise ConfigError(f"{folder} is no folder; {remedy}")
+    content = read_json(folder / RESULTS_FILE, "results", remedy)
+    command = content.get("command") if isinstance(content, dict) else None
+    if command not in COMMANDS:
+        raise ConfigError(f"{folder} holds results of {command!r}, not of games; {remedy}")
+    try:
+        settings, seeds = content["settings"], content["seeds"]
+        shielded = any(settings["states"])
+        table, code = _games(folder, settings, seeds, shielded)
+        return PlayedRun(folder, settings, content["versions"]["steerclear"], code, shielded, table)
+    except (KeyError, TypeError, IndexError) as error:
+        raise ConfigError(f"{folder} holds results of another version ({error!r}); make them again") from error
+
+
+def _games(
+    folder: Path, settings: Mapping[str, Any], seeds: Sequence[int], shielded: bool
+) -> tuple[pd.DataFrame, frozenset[str]]:
+    """The games of a run that count, and digests of the code that played them."""
+    old = (folder / OLD_ROWS_FILE).exists()
+    path = folder / (OLD_ROWS_FILE if old else ROWS_FILE)
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot read the games of {path} ({error}); give a results folder as it was made") from error
+    found: dict[tuple[Any, ...], Mapping[str, Any]] = {}
+    keys: dict[tuple[Any, ...], str] = {}
+    code = set()
+    for name, row, digest in (entry for line in lines for entry in (_old_row if old else _rows)(line)):
+        if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"]:
+            continue
+        if row["shielded"] is not shielded or row["seed"] not in seeds:
+            continue
+        game = tuple(row[part] for part in GAME)
+        if keys.setdefault(game, name) != name:
+            raise ConfigError(
+                f"{path} holds games of several settings, or of a policy before its files changed; play into a folder "
+                "of its own (--out)"
+            )
+        found[game] = row
+        code.add(digest)
+    return pd.DataFrame([*found.values()]), frozenset(code)
+
+
+def _rows(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
+    entry = read_line(line)
+    return [] if entry is None else [(entry["job"], row, entry["code"]) for row in entry["rows"]]
+
+
+def _old_row(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
+    """As 0.8.0 and before wrote it: a line holds the columns of one game, its key, code and sum."""
+    try:
+        entry = json.loads(line)
+        whole = isinstance(entry, dict) and entry.pop("sum", None) == job_id(entry)
+    except (ValueError, RecursionError):
+        return []
+    if not whole:
+        return []
+    entry.setdefault("net_captures", entry["captures"] - entry["captures_against"])
+    return [(entry["key"], entry, entry["code"])]
+
+
+def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str, Any]:
+    """Set two runs beside one another.
+
+    Args:
+        first: what the other is compared with.
+        second: the other.
+        seed: of the bootstrap.
+
+    Returns:
+        What `docs_keys.COMPARE` describes, but for where and when it was made.
+
+    Raises:
+        ConfigError: their games are no pairs: of other rules, or none from the same seed.
+    """
+    for name in SAME:
+        if first.settings[name] != second.settings[name]:
+            raise ConfigError(
+                f"{first.folder} and {second.folder} have another {name} ({first.settings[name]!r} and "
+                f"{second.settings[name]!r}), so their games are no pairs; play both alike but for what you compare"
+            )
+    pairs = _paired(first, second)
+    metrics = [m for m in game_metrics_of(_radii_m(first, second)) if m.paired]
+    order = [name for name in first.settings["opponents"] if (pairs["opponent"] == name).any()]
+    lines = summarise(pairs, metrics, ["opponent"], ("run", "first", "second"), ["seed", "side"], seed)
+    return {
+        "first": _about(first),
+        "second": _about(second),
+        "differs": differs(first, second),
+        "pairings": [
+            {
+                "opponent": opponent,
+                "pairs": int(((pairs["opponent"] == opponent) & (pairs["run"] == "first")).sum()),
+                "metrics": _figures(lines[lines["opponent"] == opponent], metrics),
+            }
+            for opponent in order
+        ],
+    }
+
+
+def _paired(first: PlayedRun, second: PlayedRun) -> pd.DataFrame:
+    """Games of both from the same seeds, against the same files of the opponent, one below the other."""
+    for run in (first, second):
+        if run.table.empty:
+            raise ConfigError(f"{run.folder} holds no game of its settings; play it again into a folder of its own")
+    both = first.table[list(GAME)].merge(second.table[list(GAME)], on=list(GAME))
+    if both.empty:
+        raise ConfigError(
+            f"{first.folder} and {second.folder} have no game of the same opponent, seed and side; play both with the "
+            "same --opponents and --seed"
+        )
+    named = (("first", first), ("second", second))
+    chosen = [run.table.merge(both, on=list(GAME)).assign(run=name) for name, run in named]
+    files = [table.set_index(list(GAME))["opponent_files"] for table in chosen]
+    changed = files[0] != files[1].reindex(files[0].index)
+    if changed.any():
+        opponent = changed[changed].index[0][0]
+        raise ConfigError(f"the files of {opponent} changed between both runs, so their games are no pairs; play again")
+    return pd.concat(chosen, ignore_index=True)
+
+
+def _about(run: PlayedRun) -> dict[str, Any]:
+    return {"folder": str(run.folder), "own": run.settings["own"], "shielded": run.shielded, "games": len(run.table)}
+
+
+def differs(first: PlayedRun, second: PlayedRun) -> dict[str, list[Any]]:
+    """Settings, and versions of the code, that differ, each with both values; None: not given."""
+    before, after = (_flat(run) for run in (first, second))
+    names = [*before, *(name for name in after if name not in before)]
+    return {name: [before.get(name), after.get(name)] for name in names if before.get(name) != after.get(name)}
+
+
+def _flat(run: PlayedRun) -> dict[str, Any]:
+    """What may differ between two runs, by name."""
+    settings = {name: value for name, value in run.settings.items() if name not in (*SAME, *BESIDE)}
+    shield, conditions = settings.pop("shield"), settings.pop("conditions")
+    found = {**settings, "shielded": run.shielded, **{f"conditions.{k}": v for k, v in conditions.items()}}
+    if run.shielded:
+        found |= {f"shield.{name}": value for name, value in shield.items()}
+    files = sorted(set(run.table["own_files"].fillna(""))) if len(run.table) else []
+    return {**found, "policy_files": files, "version": run.version, "code": sorted(run.code)}
+
+
+def _radii_m(first: PlayedRun, second: PlayedRun) -> tuple[float, ...]:
+    """Radii at which both counted breaches, m."""
+    begin = "breaches_opponent_"
+    counted = [
+        {float(name.removeprefix(begin).removesuffix("m")) for name in run.table if name.startswith(begin)}
+        for run in (first, second)
+    ]
+    return tuple(sorted(counted[0] & counted[1]))
+
+
+def _figures(lines: pd.DataFrame, metrics: Sequence[Metric]) -> dict[str, Any]:
+    """Per metric its label, both figures over the pairs, and the paired difference."""
+    found = {}
+    for metric in metrics:
+        chosen = lines[lines["metric"] == metric.key].set_index("run")[["value", "low", "high", "n"]]
+        if {"first", "second", DIFFERENCE} <= set(chosen.index) and chosen["value"][["first", "second"]].notna().any():
+            parts = {part: chosen.loc[part].to_dict() for part in ("first", "second", DIFFERENCE)}
+            found[metric.key] = {"label": metric.label, **{k: {**v, "n": int(v["n"])} for k, v in parts.items()}}
+    return found

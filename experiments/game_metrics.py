@@ -1,0 +1,318 @@
+"""What happened in a game, as numbers, computed from its record alone.
+
+A separation violation ("breach") is a pair of boats whose centres come within a radius of each other. It is counted
+once per entry, per pair: the pair is inside after this step and was not after the one before. The start position itself
+is not counted, so a pair that starts inside counts at the first step, as in the reference simulator. Distances are
+sampled once per step (0.1 s).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from steerclear.env.record import NOT_COVERED, Record, read_meta
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array, BoolArray, kernel
+
+from .metrics import RADII_M, breach_column
+
+
+@dataclass(frozen=True)
+class PairDistances:
+    """Distances of every pair of boats after every step.
+
+    Attributes:
+        pairs: (p, 2) int64, the two boats, smaller index first.
+        distance_m: (T, p), after steps 1..T.
+    """
+
+    pairs: NDArray[np.int64]
+    distance_m: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, position: ArrayLike) -> PairDistances:
+        """Measure a track.
+
+        Args:
+            position: (T+1, n, 2) m, index 0 is the start.
+
+        Raises:
+            ConfigError: another shape, or a position that is not finite.
+        """
+        track = np.asarray(position, dtype=np.float64)
+        if track.ndim != 3 or track.shape[2] != 2 or track.shape[0] < 1:
+            raise ConfigError(f"a track has shape (steps + 1, boats, 2); got {track.shape}")
+        if not np.isfinite(track).all():
+            raise ConfigError("a track holds positions that are not finite; check the recorder or the file")
+        first, second = np.triu_indices(track.shape[1], k=1)
+        gap = track[1:, first] - track[1:, second]
+        return cls(np.column_stack([first, second]).astype(np.int64), np.hypot(gap[..., 0], gap[..., 1]))
+
+    def of_pairs(self, chosen: NDArray[np.bool_]) -> PairDistances:
+        """Keep the pairs where ``chosen`` (p,) is true."""
+        return PairDistances(self.pairs[chosen], self.distance_m[:, chosen])
+
+    def closest_m(self) -> float:
+        """Return the smallest distance, m; infinity where there is no pair or no step."""
+        return float(self.distance_m.min(initial=np.inf))
+
+
+def entries(distances: PairDistances, radius_m: ArrayLike) -> NDArray[np.bool_]:
+    """Mark the steps at which a pair enters the radius.
+
+    Args:
+        distances: T steps, p pairs.
+        radius_m: one radius or one per pair; two boats at exactly this distance are inside.
+
+    Returns:
+        (T, p), row t for step t + 1.
+
+    Raises:
+        ConfigError: a radius that is not positive.
+    """
+    if not (np.asarray(radius_m) > 0.0).all():
+        raise ConfigError(f"the separation radius must be positive, in metres; got {radius_m}")
+    inside = distances.distance_m <= radius_m
+    before = np.zeros_like(inside)
+    before[1:] = inside[:-1]
+    return inside & ~before
+
+
+def count_breaches(distances: PairDistances, radius_m: ArrayLike) -> int:
+    """Count the entries of all pairs into the radius (m, one or one per pair)."""
+    return int(entries(distances, radius_m).sum())
+
+
+def team_pairs(team: ArrayLike, side: int, kind: str) -> NDArray[np.bool_]:
+    """Choose a team's pairs, in the order of `PairDistances.of`.
+
+    Args:
+        team: (n,) team number of each boat.
+        side: the team in question.
+        kind: "teammate" (both boats its own) or "opponent" (exactly one is).
+
+    Raises:
+        ConfigError: another kind.
+    """
+    own = np.asarray(team, dtype=np.int64) == side
+    first, second = np.triu_indices(len(own), k=1)
+    if kind == "teammate":
+        return own[first] & own[second]
+    if kind == "opponent":
+        return own[first] != own[second]
+    raise ConfigError(f"unknown kind of pair {kind!r}; choose teammate or opponent")
+
+
+STILL_MPS = 0.2
+"""A boat slower than this stands still; one that is asked for more wants to move."""
+DEADLOCK_S = 10.0
+"""Two team-mates that stand still for longer than this, both wanting to move, are deadlocked."""
+
+
+@kernel
+def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int, out: Array) -> None:
+    """Count pairs of own boats that both want to move and both stay below `STILL_MPS` for over ``longest`` steps.
+
+    A pair counts once for every time that begins.
+
+    Args:
+        speed_mps: (T, B, n) speed after each step of B games.
+        wanted_mps: (T, B, n) speed wanted in it, before a shield.
+        own: (n,).
+        longest: steps that are still no deadlock.
+        out: (B,) written.
+    """
+    n = speed_mps.shape[2]
+    for b in range(speed_mps.shape[1]):
+        out[b] = 0.0
+        still = np.zeros((n, n), np.int64)
+        for t in range(speed_mps.shape[0]):
+            for i in range(n):
+                if not own[i]:
+                    continue
+                stuck = speed_mps[t, b, i] < STILL_MPS and wanted_mps[t, b, i] > STILL_MPS
+                for j in range(i):
+                    if not own[j]:
+                        continue
+                    if stuck and speed_mps[t, b, j] < STILL_MPS and wanted_mps[t, b, j] > STILL_MPS:
+                        still[i, j] += 1
+                        if still[i, j] == longest + 1:
+                            out[b] += 1.0
+                    else:
+                        still[i, j] = 0
+
+
+def count_deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, dt_s: float) -> int:
+    """Count the deadlocks of one game's own boats.
+
+    Args:
+        speed_mps: (T, n) after each step.
+        wanted_mps: (T, n).
+        own: (n,).
+        dt_s: length of a step, s.
+    """
+    found = np.empty(1)
+    deadlocks(
+        np.ascontiguousarray(speed_mps[:, None], dtype=np.float64),
+        np.ascontiguousarray(wanted_mps[:, None], dtype=np.float64),
+        np.ascontiguousarray(own),
+        round(DEADLOCK_S / dt_s),
+        found,
+    )
+    return int(found[0])
+
+
+DEAD_BAND_DEG = 5.0
+"""Turns smaller than this are steady steering, not a side."""
+
+
+def heading_change_deg(later: ArrayLike, earlier: ArrayLike) -> NDArray[np.float64]:
+    """Return ``later - earlier`` in [-180, 180), deg."""
+    difference = np.asarray(later, dtype=np.float64) - np.asarray(earlier, dtype=np.float64)
+    return np.asarray((difference + 180.0) % 360.0 - 180.0)
+
+
+def count_reversals(command_heading_deg: ArrayLike, heading_deg: ArrayLike) -> int:
+    """Count the flips of the commanded side of all boats.
+
+    A boat's commanded side is the sign of (command - heading) where that exceeds `DEAD_BAND_DEG`; between,
+    the last side stays. A reversal is a change of that side.
+
+    Args:
+        command_heading_deg: (T, n) absolute heading asked of each boat.
+        heading_deg: (T, n) heading each boat has at that moment.
+    """
+    turn = heading_change_deg(command_heading_deg, heading_deg)
+    side = np.where(np.abs(turn) > DEAD_BAND_DEG, np.sign(turn), 0.0)
+    total = 0
+    for column in side.T:
+        taken = column[column != 0.0]
+        total += int(np.count_nonzero(taken[1:] != taken[:-1]))
+    return total
+
+
+DEFAULT_PENALTY = 0.25
+"""Weight of a collision: fits the competition's published results; its rules say 0.025. Always a setting."""
+
+
+def check_penalty(penalty: float) -> float:
+    """Return the weight of a collision.
+
+    Raises:
+        ConfigError: negative or not a finite number.
+    """
+    if not 0.0 <= penalty < float("inf"):
+        raise ConfigError(f"--penalty must be a number >= 0; got {penalty}; the competition used 0.25 and 0.025")
+    return penalty
+
+
+def scores(counts: Mapping[str, Any], penalty: float = DEFAULT_PENALTY) -> dict[str, float]:
+    """Score one team by the competition's two scores.
+
+    Args:
+        counts: `captures`, `grabs`, `tags` of the team, the same with `_against` of the other, `collisions`.
+        penalty: weight of a collision in the primary score.
+
+    Returns:
+        ``net_captures`` = captures - captures_against,
+        ``primary`` = captures - captures_against - penalty * collisions,
+        ``secondary`` = grabs + tags - grabs_against - tags_against.
+    """
+    return {
+        "net_captures": counts["captures"] - counts["captures_against"],
+        "primary": counts["captures"] - counts["captures_against"] - penalty * counts["collisions"],
+        "secondary": float(counts["grabs"] + counts["tags"] - counts["grabs_against"] - counts["tags_against"]),
+    }
+
+
+def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict[str, Any]:
+    """Count for one team.
+
+    Args:
+        record: a game.
+        side: the team in question, 0 blue or 1 red.
+        radii_m: radii at which to count breaches.
+
+    Returns:
+        Flat columns: ``breaches_teammate_2.5m`` and so on, ``closest_*_m`` (None without such a pair),
+        ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns of
+        `shield_columns` and ``deadlocks``.
+    """
+    meta = read_meta(record)
+    distances = PairDistances.of(record["position"])
+    own, dt_s = np.asarray(meta["team"]) == side, float(meta["dt_s"])
+    return {
+        **_breach_columns(distances, meta, side, radii_m),
+        "collisions": scored_collisions(_when_looked(record, meta), meta, side),
+        **shield_columns(record, own, dt_s),
+        "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
+    }
+
+
+def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: int) -> int:
+    """Count collisions as the game does: per entry into the sum of the agent radii, for each boat of the team.
+
+    Two team-mates that collide thus count twice.
+    """
+    own_radius_m = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(meta["team"]))
+    total = 0
+    for kind, boats_in_it in (("teammate", 2), ("opponent", 1)):
+        pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
+        total += boats_in_it * count_breaches(pairs, own_radius_m[pairs.pairs].sum(axis=1))
+    return total
+
+
+def _when_looked(record: Record, meta: Mapping[str, Any]) -> PairDistances:
+    """Distances when the game looks for collisions: after every decision, whose steps of motion are recorded each."""
+    return PairDistances.of(record["position"][:: int(meta.get("decision_steps", 1))])
+
+
+def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[str, Any]:
+    """Describe what the shield did to the boats ``own`` (n,): shares, mean changes, reversals.
+
+    A changed step is one boat's command in one step that was sent otherwise than wanted. Means are over the
+    changed steps, None where there are none.
+    """
+    wanted, sent = record["wanted"][:, own], record["sent"][:, own]
+    covered = int((record["reason"][:, own] != NOT_COVERED).sum())
+    changed = record["intervened"][:, own]
+    turned_deg = np.abs(heading_change_deg(sent[..., 1], wanted[..., 1]))[changed]
+    slowed_mps = np.abs(sent[..., 0] - wanted[..., 0])[changed]
+    minutes = len(wanted) * own.sum() * dt_s / 60.0
+    reversals = count_reversals(sent[..., 1], record["heading_deg"][:-1, own])
+    return {
+        "covered_steps": covered,
+        "changed_steps": int(changed.sum()),
+        "changed_share": float(changed.sum() / covered) if covered else None,
+        "mean_heading_change_deg": float(turned_deg.mean()) if turned_deg.size else None,
+        "mean_speed_change_mps": float(slowed_mps.mean()) if slowed_mps.size else None,
+        "reversals_per_boat_minute": float(reversals / minutes) if minutes else None,
+    }
+
+
+def reason_counts(record: Record, side: int) -> dict[str, int]:
+    """Count boat-steps per reason name, for the boats of one team that a shield decided for."""
+    meta = read_meta(record)
+    codes = record["reason"][:, np.asarray(meta["team"]) == side]
+    names = meta["reason_names"]
+    return {name: int((codes == code).sum()) for code, name in enumerate(names) if code != NOT_COVERED}
+
+
+def _breach_columns(
+    distances: PairDistances, meta: Mapping[str, Any], side: int, radii_m: Sequence[float]
+) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    for kind in ("teammate", "opponent"):
+        pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
+        for radius_m in radii_m:
+            columns[breach_column(kind, radius_m)] = count_breaches(pairs, radius_m)
+        closest_m = pairs.closest_m()
+        columns[f"closest_{kind}_m"] = closest_m if np.isfinite(closest_m) else None
+    found = [columns[f"closest_{kind}_m"] for kind in ("teammate", "opponent")]
+    columns["closest_m"] = min((value for value in found if value is not None), default=None)
+    columns["clean_games"] = not any(columns[breach_column(kind, min(radii_m))] for kind in ("teammate", "opponent"))
+    return columns

@@ -1,0 +1,49 @@
+"""Markdown of the pages that `steerclear docs` makes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from steerclear.shield.visible import visible
+
+from .tables import measured_text, number_text
+
+MADE = "<!-- made by `steerclear docs`; do not edit -->"
+
+
+def line(content: object) -> str:
+    """Text of one line that a page shows as it is: no HTML, no link, nothing that turns letters round."""
+    text = re.sub(r"<(?=[a-zA-Z/!?])", "&lt;", visible(content))
+    return text.replace("](", "]\\(").replace("`", "\\`")
+
+
+def cell(content: object) -> str:
+    """Text of a table's cell: as `line`, and no bar ends it. Code in backticks is for our own words."""
+    text = str(content)
+    ours = text.startswith("`") and text.endswith("`") and text.count("`") == 2
+    return (visible(text) if ours else line(text)).replace("|", "\\|")
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
+    """Lines of a table: the first column words, the others numbers."""
+    ruler = ["---", *("---:" for _ in heads[1:])]
+    body = [[cell(one) for one in row] for row in (heads, *rows)]
+    return [f"| {' | '.join(row)} |" for row in (body[0], ruler, *body[1:])]
+
+
+def goals_table(goals: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Lines of the table of goals: what was measured, what is asked, whether it is met."""
+    verdict = {True: "met", False: "**not met**", None: "no data"}
+    rows = [
+        [bar["name"], measured_text(bar), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
+        for bar in goals
+    ]
+    return table(["", "measured", "goal", ""], rows)
+
+
+def goals_of(content: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Goals of results, which those of 0.8.0 and before call bars."""
+    found: Sequence[Mapping[str, Any]] = content["goals"] if "goals" in content else content["bars"]
+    return found

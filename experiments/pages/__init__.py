@@ -1,1 +1,0 @@
-"""Pages of docs that are made of results, and what the keys of results mean."""

@@ -1,0 +1,306 @@
+"""Plots of reports (SVG that the page's style sheet colours) and of documentation pages (PNG).
+
+Each function draws one figure; `svg` and `png` write it. Colours are names of the style sheet's variables, so that
+plots follow a reader's dark or light page.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from steerclear.shield.visible import visible
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+else:
+    Figure = Any
+
+WIDTH_IN = 6.0
+COLOURS = {
+    "off": "#94a3b8", "on": "#0b8a8f", "ink": "#0f172a", "muted": "#546276", "line": "#d8dfe8", "mark": "#be1893",
+    "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#64748b",
+}  # fmt: skip
+"""By name of the variable in ``report.css`` (its light page's values)."""
+SERIES = ("on", "r1", "r2", "mark", "r4", "r5")
+"""Colours of parts and curves, in turn."""
+LABEL_LETTERS = 22
+MOST_DOTS = 600
+Labelled = Sequence[tuple[str, Sequence[tuple[str, Mapping[str, Any]]]]]
+"""Groups: label, and per state its name and figure (value, low, high)."""
+
+
+@cache
+def _prepared() -> None:
+    import matplotlib as mpl
+
+    mpl.rcParams.update(
+        {"svg.fonttype": "none", "svg.hashsalt": "steerclear", "font.size": 9, "text.parse_math": False}
+    )
+
+
+def _canvas(height_in: float, columns: int = 1, width_in: float = WIDTH_IN, rows: int = 1) -> tuple[Figure, Any]:
+    """A figure and its axes; without pyplot, so that no window system is touched."""
+    _prepared()
+    from matplotlib.figure import Figure
+
+    canvas = Figure(figsize=(width_in, height_in), layout="constrained")
+    canvas.patch.set_alpha(0.0)
+    axes = canvas.subplots(rows, columns, squeeze=False).ravel()
+    for axis in axes:
+        axis.patch.set_alpha(0.0)
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.spines[["left", "bottom"]].set_color(COLOURS["line"])
+        axis.tick_params(colors=COLOURS["muted"], labelcolor=COLOURS["muted"])
+        axis.set_axisbelow(True)
+    return canvas, axes if len(axes) > 1 else axes[0]
+
+
+def text(words: object) -> str:
+    """Text that a plot shows as it is."""
+    return visible(words)
+
+
+def label(words: str) -> str:
+    """A group's label, its beginning left out when there is no room for it."""
+    words = text(words)
+    return words if len(words) <= LABEL_LETTERS else "…" + words[1 - LABEL_LETTERS :]
+
+
+def bars(groups: Labelled, axis_words: str, reference: float | None = None) -> Figure:
+    """Draw groups of bars with their intervals, from top to bottom.
+
+    Args:
+        groups: what to draw; the state is the colour's name.
+        axis_words: text of the axis.
+        reference: a value to mark with a line.
+    """
+    lines = sum(len(group) for _, group in groups)
+    canvas, axis = _canvas(0.7 + 0.21 * lines + 0.12 * len(groups))
+    y, places = 0.0, []
+    for _, group in groups:
+        places.append(y + (len(group) - 1) / 2.0)
+        for state, figure in group:
+            _bar(axis, y, COLOURS[state], figure)
+            y += 1.0
+        y += 0.6
+    _ended(axis, places, [label(name) for name, _ in groups], axis_words, reference)
+    return canvas
+
+
+def _bar(axis: Any, y: float, colour: str, figure: Mapping[str, Any]) -> None:
+    value, low, high = (_number(figure.get(name)) for name in ("value", "low", "high"))
+    if value is None:
+        axis.text(0.0, y, " -", va="center", color=COLOURS["ink"])
+        return
+    axis.barh(y, value, 0.82, color=colour)
+    end = value
+    if low is not None and high is not None:
+        axis.errorbar(
+            [value], [y], xerr=[[value - low], [high - value]], fmt="none", ecolor=COLOURS["ink"], capsize=2.5
+        )
+        end = max(value, high)
+    axis.annotate(short(value), (end, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
+
+
+def short(value: float) -> str:
+    """A number with about three digits."""
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}"
+
+
+def dots(
+    groups: Sequence[tuple[str, Sequence[tuple[str, Sequence[float]]]]], axis_words: str, reference: float | None = None
+) -> Figure:
+    """Draw values as dots, those alike on top of each other.
+
+    Args:
+        groups: label and, per state, its name and values.
+        axis_words: text of the axis.
+        reference: a value to mark with a line.
+    """
+    rows = [(name, state, values) for name, group in groups for state, values in group]
+    most = max([*(v for *_, values in rows for v in values), reference or 0.0, 1e-9])
+    each = max(1, math.ceil(max((len(values) for *_, values in rows), default=0) / MOST_DOTS))
+    stacks = [_stacks(values[::each], most) for *_, values in rows]
+    heights = [max((y for _, y in stack), default=0) + 2.0 for stack in stacks]
+    canvas, axis = _canvas(0.8 + 0.1 * sum(heights))
+    floor, middles = 0.0, dict[str, list[float]]()
+    for (name, state, _), stack, height in zip(rows, stacks, heights, strict=True):
+        floor -= height
+        middles.setdefault(name, []).append(floor + height / 2.0)
+        if stack:
+            axis.plot(*np.array([(x, floor + y) for x, y in stack]).T, "o", ms=4.6, color=COLOURS[state], mew=0)
+        axis.axhline(floor - 0.6, color=COLOURS["line"], lw=0.7)
+    words = axis_words if each == 1 else f"{axis_words} (one of {each} shown)"
+    places = [-float(np.mean(values)) for values in middles.values()]
+    axis.set_ylim(floor - 1.0, 0.5)
+    _ended(axis, [-p for p in places], [label(name) for name in middles], words, reference, turned=False)
+    return canvas
+
+
+def _stacks(values: Sequence[float], most: float) -> list[tuple[float, int]]:
+    columns = dict[int, int]()
+    found = []
+    for value in sorted(values):
+        column = round(value / most * 90)
+        found.append((value, columns.get(column, 0)))
+        columns[column] = columns.get(column, 0) + 1
+    return found
+
+
+def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words: str) -> Figure:
+    """Draw one bar per group, made of its parts.
+
+    Args:
+        groups: label and, per part, its name and percent; parts come in the same order everywhere.
+        axis_words: text of the axis.
+    """
+    canvas, axis = _canvas(0.7 + 0.34 * len(groups))
+    for y, (_, parts) in enumerate(groups):
+        left = 0.0
+        for k, (_, percent) in enumerate(parts):
+            axis.barh(y, percent, 0.6, left=left, color=COLOURS[SERIES[k % len(SERIES)]])
+            left += percent
+        axis.annotate(f"{left:.2f} %", (left, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
+    _ended(axis, list(range(len(groups))), [label(name) for name, _ in groups], axis_words, None)
+    return canvas
+
+
+def _ended(
+    axis: Any,
+    places: Sequence[float],
+    names: Sequence[str],
+    words: str,
+    reference: float | None,
+    turned: bool = True,
+) -> None:
+    axis.set_yticks(places, names)
+    axis.tick_params(axis="y", length=0, labelcolor=COLOURS["ink"])
+    axis.set_xlabel(words, color=COLOURS["muted"])
+    axis.grid(axis="x", color=COLOURS["line"], lw=0.8)
+    if reference is not None:
+        axis.axvline(reference, color=COLOURS["mark"], ls="--", lw=1.3)
+    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]), right=axis.get_xlim()[1] * 1.08)
+    if turned:
+        axis.invert_yaxis()
+
+
+def curves(series: Sequence[tuple[str, str, Sequence[float], Sequence[float]]], reference: float, words: str) -> Figure:
+    """Draw distributions: share of all below a value.
+
+    Args:
+        series: name, colour's name, values, shares (0 to 1).
+        reference: a value to mark.
+        words: text of the axis.
+    """
+    canvas, axis = _canvas(2.0, width_in=3.6)
+    for _, colour, x, y in series:
+        axis.plot(x, y, color=COLOURS[colour], lw=1.5)
+    axis.axvline(reference, color=COLOURS["mark"], ls="--", lw=1.1)
+    axis.grid(color=COLOURS["line"], lw=0.6)
+    axis.set_xlabel(words, color=COLOURS["muted"])
+    axis.set_ylim(0.0, 1.0)
+    axis.set_xlim(left=0.0)
+    return canvas
+
+
+def off_on(groups: Sequence[Mapping[str, Any]], metrics: Sequence[tuple[str, str]]) -> Figure:
+    """Draw metrics of all pairings without and with the shield, side by side, with their intervals.
+
+    Args:
+        groups: summaries of pairings, as `ablation.pairings_of` gives.
+        metrics: key and title of each.
+    """
+    canvas, axes = _canvas(3.2, max(len(metrics), 2), 4.0 * max(len(metrics), 2))
+    for axis, (key, title) in zip(axes, metrics, strict=False):
+        for shift, state in ((-0.18, "off"), (0.18, "on")):
+            _columns(axis, shift, state, [pairing["metrics"][key] for pairing in groups])
+        names = [text(pairing["pairing"].replace(" vs ", "\nvs ")) for pairing in groups]
+        axis.set_xticks(np.arange(len(groups)), names, color=COLOURS["ink"])
+        axis.set_title(title, fontsize=9)
+    axes[0].legend(frameon=False)
+    return canvas
+
+
+def scatter(
+    panels: Sequence[tuple[str, Sequence[tuple[str, float, float, float]]]], words: tuple[str, str], lines: bool = False
+) -> Figure:
+    """Draw points, a panel each; a name has the same colour and mark in all of them.
+
+    Args:
+        panels: title, and points: name, x, y, upper limit of y.
+        words: texts of both axes.
+        lines: whether points of a name are joined.
+    """
+    across = min(len(panels), 3)
+    down = math.ceil(len(panels) / across)
+    canvas, axes = _canvas(3.4 * down + 0.4, across, 4.2 * across, down)
+    names = list(dict.fromkeys(name for _, points in panels for name, *_ in points))
+    looks = {name: (f"C{k % 10}", "osD^vP*"[k // 10 % 7]) for k, name in enumerate(names)}
+    for axis, (title, points) in zip(np.ravel(axes), panels, strict=False):
+        for name in names:
+            chosen = np.array([point[1:] for point in points if point[0] == name], dtype=np.float64).reshape(-1, 3)
+            if len(chosen):
+                colour, mark = looks[name]
+                above = np.maximum(np.nan_to_num(chosen[:, 2] - chosen[:, 1]), 0.0)
+                axis.errorbar(
+                    chosen[:, 0], chosen[:, 1], [np.zeros(len(above)), above], fmt=mark + "-" * lines, color=colour,
+                    ms=5, lw=0.8, capsize=3, label=text(name),
+                )  # fmt: skip
+        axis.set_title(text(title), fontsize=9)
+        axis.set_xlabel(words[0])
+        axis.set_ylabel(words[1])
+    for axis in np.ravel(axes)[len(panels) :]:
+        axis.set_visible(False)
+    handles = {h.get_label(): h for axis in np.ravel(axes)[: len(panels)] for h in axis.get_legend_handles_labels()[0]}
+    widest = max((len(name) for name in handles), default=1)
+    columns = max(1, min(4, int(4.2 * across / (0.55 + 0.06 * widest))))
+    canvas.set_figheight(canvas.get_figheight() + 0.2 * math.ceil(len(handles) / columns))
+    canvas.legend(
+        handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=8, frameon=False
+    )
+    return canvas
+
+
+def _columns(axis: Any, shift: float, state: str, figures: Sequence[Mapping[str, Any]]) -> None:
+    shown = [(x + shift, figure[state]) for x, figure in enumerate(figures) if state in figure]
+    values = np.array([(f["value"], f["low"], f["high"]) for _, f in shown], dtype=np.float64).reshape(-1, 3)
+    spread = np.nan_to_num(np.abs(values[:, [1, 2]] - values[:, [0]]).T)
+    places = [x for x, _ in shown]
+    axis.bar(places, values[:, 0], 0.34, color=COLOURS[state], label=f"shield {state}")
+    axis.errorbar(places, values[:, 0], spread, fmt="none", ecolor=COLOURS["ink"], capsize=3)
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None or value != value else float(value)
+
+
+def svg(figure: Figure, words: str) -> str:
+    """The figure as an ``svg`` element whose colours are the page's.
+
+    Args:
+        figure: what to write.
+        words: what it shows, for who cannot see it.
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    content = buffer.getvalue()
+    content = re.sub(r"<metadata>.*?</metadata>", "", content[content.index("<svg") :], flags=re.DOTALL)
+    content = re.sub(r'(<svg[^>]*?) width="[^"]*"|(<svg[^>]*?) height="[^"]*"', r"\1\2", content, count=0)
+    for name, colour in COLOURS.items():
+        content = content.replace(colour, f"var(--{name})")
+    from markupsafe import escape
+
+    return content.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1)
+
+
+def png(figure: Figure, path: Path) -> Path:
+    """Write the figure as a picture on white."""
+    figure.savefig(path, dpi=150, facecolor="white", metadata={"Software": None})
+    return path

@@ -1,1 +1,0 @@
-"""What results are shown with: tables, plots, HTML pages, replays."""

@@ -1,0 +1,365 @@
+"""95 % intervals for shares, counts and means, paired differences, and the summary of a tidy table.
+
+Wilson for shares (Wilson 1927), exact Poisson limits for counts (Garwood 1936), the percentile bootstrap
+for means and ratios (Efron 1979). A count of zero still has an upper limit: ``-ln(0.05) = 3.0`` events over
+all games, the rule of three (Hanley and Lippman-Hand 1983). Resampling games that are all alike gives the same
+number again and again, which is no interval: ratios and differences of counts then have exact limits
+(Clopper and Pearson 1934), means none. `figure` chooses by the kind of a metric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from steerclear.shield.exceptions import ConfigError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .metrics import Metric
+
+CONFIDENCE = 0.95
+RESAMPLES = 4000
+Statistic = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+DIFFERENCE = "difference"
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value and its confidence limits, in the unit of the value; limits are NaN where none can be given."""
+
+    value: float
+    low: float
+    high: float
+
+
+def share_interval(successes: int, trials: int, confidence: float = CONFIDENCE) -> Interval:
+    """Wilson score interval of a share.
+
+    Args:
+        successes: how many trials had the property.
+        trials: how many there were; with none the limits are 0 and 1 and the value is NaN.
+        confidence: probability that the interval covers the true share.
+
+    Raises:
+        ConfigError: negative numbers, more successes than trials, or a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    if not 0 <= successes <= trials:
+        raise ConfigError(f"a share needs 0 <= successes <= trials; got {successes} of {trials}")
+    if trials == 0:
+        return Interval(float("nan"), 0.0, 1.0)
+    limits = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Interval(successes / trials, float(limits.low), float(limits.high))
+
+
+def count_interval(events: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
+    """Exact Poisson interval (Garwood) of a rate: events per unit of exposure.
+
+    With zero events all of the error probability goes to the upper limit, which is then ``-ln(1 - confidence)``
+    events: the rule of three at 95 %.
+
+    Args:
+        events: how many happened, over all the exposure.
+        exposure: what they are counted over, e.g. the number of games; must be positive.
+        confidence: probability that the interval covers the true rate, at least.
+
+    Raises:
+        ConfigError: a negative count, an exposure that is not positive, or a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    if events < 0 or not exposure > 0.0:
+        raise ConfigError(f"a rate needs events >= 0 and exposure > 0; got {events} over {exposure}")
+    if events == 0:
+        return Interval(0.0, 0.0, -np.log1p(-confidence) / exposure)
+    tail = (1.0 - confidence) / 2.0
+    low = stats.chi2.ppf(tail, 2 * events) / 2.0
+    high = stats.chi2.ppf(1.0 - tail, 2 * (events + 1)) / 2.0
+    return Interval(events / exposure, float(low) / exposure, float(high) / exposure)
+
+
+def mean_interval(values: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+    """Bootstrap percentile interval of a mean; NaN values are left out, limits are NaN below two values.
+
+    Args:
+        values: one number per game, shape (n,).
+        seed: of the resampling; the same seed gives the same limits.
+        confidence: probability that the interval covers the true mean, about.
+
+    Raises:
+        ConfigError: a confidence outside (0, 1).
+    """
+    kept = np.asarray(values, dtype=np.float64).ravel()
+    kept = kept[~np.isnan(kept)]
+    return bootstrap_interval(kept[:, None], _mean_of_first, seed, confidence)
+
+
+def student_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> Interval:
+    """Student's t interval of a mean of few values, such as one per training; NaN limits below two, or of equal ones.
+
+    Args:
+        values: shape (n,).
+        confidence: probability that the interval covers the true mean, where the values are normal.
+
+    Raises:
+        ConfigError: a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    found = np.asarray(values, dtype=np.float64).ravel()
+    nan = float("nan")
+    if len(found) == 0:
+        return Interval(nan, nan, nan)
+    mean = float(found.mean())
+    if len(found) < 2 or np.ptp(found) == 0.0:
+        return Interval(mean, nan, nan)
+    reach = float(stats.t.ppf(0.5 + 0.5 * confidence, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return Interval(mean, mean - reach, mean + reach)
+
+
+def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+    """Bootstrap interval of the mean of ``on - off``, games paired by position (same seeds).
+
+    Raises:
+        ConfigError: the two differ in length, so that they cannot be pairs.
+    """
+    off_values, on_values = _pair(off, on)
+    return mean_interval(on_values - off_values, seed, confidence)
+
+
+def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+    """Interval of a ratio of counts, ``sum(on) / sum(off)``: bootstrap, pairs resampled together.
+
+    Where one of them never happened, or every resample gives the same ratio, the limits are those of
+    `count_ratio_interval`.
+
+    Raises:
+        ConfigError: the two differ in length, so that they cannot be pairs.
+    """
+    rows = np.column_stack(_pair(off, on))
+    if len(rows) == 0:
+        return Interval(float("nan"), float("nan"), float("nan"))
+    totals = rows.sum(axis=0)
+    found = bootstrap_interval(rows, _ratio_of_totals, seed, confidence) if totals.all() else None
+    if found is not None and (len(rows) < 2 or not np.isnan(found.low)):
+        return found
+    return count_ratio_interval(int(totals[0]), int(totals[1]), confidence)
+
+
+def count_ratio_interval(off: int, on: int, confidence: float = CONFIDENCE) -> Interval:
+    """Exact limits of the ratio of two rates, ``on / off``, counted over the same exposure.
+
+    Of all events, those counted ``on`` are a binomial share p, and the ratio is p / (1 - p). With no event on one side
+    all of the error probability goes to the limit on the other; with none at all the ratio may be anything.
+
+    Args:
+        off: events in the denominator.
+        on: events in the numerator.
+        confidence: probability that the interval covers the true ratio, at least.
+
+    Raises:
+        ConfigError: a negative count, or a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    if min(off, on) < 0:
+        raise ConfigError(f"a ratio of counts needs counts >= 0; got {on} over {off}")
+    infinite = float("inf")
+    if off == on == 0:
+        return Interval(float("nan"), 0.0, infinite)
+    tail = (1.0 - confidence) / (2.0 if off and on else 1.0)
+    low = float(stats.beta.ppf(tail, on, off + 1)) if on else 0.0
+    high = float(stats.beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
+    low, high = (share / (1.0 - share) if share < 1.0 else infinite for share in (low, high))
+    return Interval(on / off if off else infinite, low, high)
+
+
+def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+    """Interval of the mean of ``on - off`` of counts, games paired by position.
+
+    As `paired_difference`; where the games are all alike, the limits are those that the two rates by themselves leave.
+
+    Raises:
+        ConfigError: the two differ in length, so that they cannot be pairs.
+    """
+    off_values, on_values = _pair(off, on)
+    found = paired_difference(off_values, on_values, seed, confidence)
+    if len(off_values) < 2 or not np.isnan(found.low):
+        return found
+    before, after = (count_interval(int(v.sum()), len(v), confidence) for v in (off_values, on_values))
+    return Interval(found.value, after.low - before.high, after.high - before.low)
+
+
+def bootstrap_interval(
+    rows: NDArray[np.float64], statistic: Statistic, seed: int = 0, confidence: float = CONFIDENCE
+) -> Interval:
+    """Percentile bootstrap of any statistic of games; limits are NaN where every resample gives the same number.
+
+    Args:
+        rows: (n, k), one row per game, resampled as a whole.
+        statistic: maps (..., n, k) to (...): computed for all resamples at once.
+        seed: of the resampling.
+        confidence: probability that the interval covers the true value, about.
+
+    Raises:
+        ConfigError: a confidence outside (0, 1).
+    """
+    _check_confidence(confidence)
+    nan = float("nan")
+    if len(rows) == 0:
+        return Interval(nan, nan, nan)
+    value = float(statistic(rows))
+    if len(rows) < 2:
+        return Interval(value, nan, nan)
+    picks = np.random.default_rng(seed).integers(0, len(rows), size=(RESAMPLES, len(rows)))
+    resampled = statistic(rows[picks])
+    resampled = resampled[np.isfinite(resampled)]
+    if len(resampled) == 0 or np.ptp(resampled) == 0.0:
+        return Interval(value, nan, nan)
+    tail = (1.0 - confidence) / 2.0
+    low, high = np.quantile(resampled, [tail, 1.0 - tail])
+    return Interval(value, float(low), float(high))
+
+
+def _mean_of_first(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return rows[..., 0].mean(axis=-1)
+
+
+def _ratio_of_totals(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    totals = rows.sum(axis=-2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(totals[..., 1] / totals[..., 0])
+
+
+def _pair(off: ArrayLike, on: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    off_values = np.asarray(off, dtype=np.float64).ravel()
+    on_values = np.asarray(on, dtype=np.float64).ravel()
+    if len(off_values) != len(on_values):
+        raise ConfigError(f"paired games must be equally many; got {len(off_values)} off and {len(on_values)} on")
+    return off_values, on_values
+
+
+def _check_confidence(confidence: float) -> None:
+    if not 0.0 < confidence < 1.0:
+        raise ConfigError(f"confidence must be between 0 and 1; got {confidence}; use 0.95 for 95 % intervals")
+
+
+def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
+    """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
+    if trials == 0 or events >= trials:
+        return 1.0
+    return float(stats.beta.ppf(confidence, events + 1, trials - events))
+
+
+def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:
+    """A metric over the rows of a table, and how many rows have it (an older version's may lack it).
+
+    The interval is chosen here and nowhere else: Garwood of a count, Wilson of a share, the bootstrap of a mean and of
+    a percent (of totals), none of a least.
+    """
+    nan = float("nan")
+    values = _values(table, metric)
+    n = len(values)
+    if metric.kind == "least":
+        return Interval(float(values.min(initial=np.inf)) if n else nan, nan, nan), n
+    if n == 0:
+        return Interval(nan, nan, nan), 0
+    if metric.kind == "count":
+        return count_interval(int(values.sum()), n), n
+    if metric.kind == "share":
+        return share_interval(int(values.sum()), n), n
+    if metric.kind == "mean":
+        return mean_interval(values, seed), n
+    if metric.kind == "percent":
+        return bootstrap_interval(values, _percent_of_totals, seed), n
+    raise ConfigError(f"unknown kind of metric {metric.kind!r}; choose count, share, mean, percent or least")
+
+
+def difference(pairs: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:
+    """Second less first, rows resampled as pairs.
+
+    Args:
+        pairs: columns of both, with ``_a`` and ``_b`` at the end of their names.
+        metric: of which.
+        seed: of the resampling.
+    """
+    if metric.kind == "percent":
+        names = [name + end for end in ("_a", "_b") for name in (metric.column, metric.per)]
+        return bootstrap_interval(pairs[names].to_numpy(np.float64), _percent_difference, seed), len(pairs)
+    both = pairs[[metric.column + "_a", metric.column + "_b"]].astype(np.float64).dropna().to_numpy()
+    judge = count_difference if metric.kind == "count" else paired_difference
+    return judge(both[:, 0], both[:, 1], seed), len(both)
+
+
+def summarise(
+    table: pd.DataFrame,
+    metrics: Sequence[Metric],
+    by: Sequence[str],
+    versus: tuple[str, Any, Any] | None = None,
+    pair_on: Sequence[str] = (),
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Every metric of every group, with intervals.
+
+    Args:
+        table: one line per game, encounter, boat.
+        metrics: what to summarise; those whose column the table lacks are left out.
+        by: columns that make the groups, in the order they come.
+        versus: column, first value, second value: also the paired difference, second less first, as ``difference``.
+        pair_on: columns by which rows of the two are pairs; rows are resampled in their order.
+        seed: of the bootstrap.
+
+    Returns:
+        Columns ``by``, the column of ``versus``, ``metric``, ``value``, ``low``, ``high``, ``n``. A metric of the
+        shield has no line where no row has it.
+    """
+    import pandas as pd
+
+    lines = []
+    for key, group in table.groupby(list(by), sort=False):
+        group = group.sort_values(list(pair_on), kind="stable") if pair_on else group
+        parts = {None: group} if versus is None else {v: group[group[versus[0]] == v] for v in versus[1:]}
+        both = _pairs(parts, versus, pair_on) if versus else None
+        for metric in metrics:
+            if metric.column not in group:
+                continue
+            found = [(value, *figure(part, metric, seed)) for value, part in parts.items() if len(part)]
+            there = all(n for _, _, n in found) or not metric.of_shield
+            if both is not None and len(both) and metric.paired and there:
+                found.append((DIFFERENCE, *difference(both, metric, seed)))
+            for value, interval, n in found:
+                if n or not metric.of_shield:
+                    lines.append((*key, value, metric.key, interval.value, interval.low, interval.high, n))
+    state = versus[0] if versus else "all"
+    return pd.DataFrame(lines, columns=[*by, state, "metric", "value", "low", "high", "n"])
+
+
+def _pairs(parts: Mapping[Any, pd.DataFrame], versus: tuple[str, Any, Any], pair_on: Sequence[str]) -> pd.DataFrame:
+    first, second = (parts[value].drop_duplicates(list(pair_on), keep="last") for value in versus[1:])
+    return first.merge(second, on=list(pair_on), suffixes=("_a", "_b"))
+
+
+def _values(table: pd.DataFrame, metric: Metric) -> NDArray[np.float64]:
+    """The numbers there are, (n,), or (n, 2) part and whole."""
+    if metric.kind == "percent":
+        both = table[[metric.column, metric.per]].astype(np.float64).dropna().to_numpy()
+        return both if both[:, 1].any() else both[:0]
+    return table[metric.column].astype(np.float64).dropna().to_numpy()
+
+
+def _percent_of_totals(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    totals = rows.sum(axis=-2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(100.0 * totals[..., 0] / totals[..., 1])
+
+
+def _percent_difference(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return _percent_of_totals(rows[..., 2:]) - _percent_of_totals(rows[..., :2])
+
+
+def as_figure(interval: Interval, n: int) -> dict[str, Any]:
+    """JSON-ready: value, low, high, n."""
+    return {**asdict(interval), "n": n}

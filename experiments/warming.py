@@ -1,0 +1,75 @@
+"""Compiling before many processes start: each part once, at the same time, into the cache on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from steerclear.shield import Shield, ShieldConfig
+
+from . import oracle
+from .play.match import play_match
+from .play.spec import MatchSpec
+
+SHORT_GAME = MatchSpec(preset="aamas2024", own="medium", opponent="easy", shield={}, rules={"max_time_s": 1.0})
+
+
+def compile_shield() -> None:
+    """Compile the shield of the default settings."""
+    Shield().warm_up()
+
+
+def compile_shield_per_boat() -> None:
+    """Compile the shield that decides for each boat by itself."""
+    Shield(ShieldConfig(coordination="per_boat")).warm_up()
+
+
+def compile_game() -> None:
+    """Compile what a game needs."""
+    play_match(SHORT_GAME)
+
+
+def compile_judge() -> None:
+    """Let the post-hoc analysis judge a boat that runs into a stopped one."""
+    boat = oracle.Boat("single_integrator", 2.0, max_turn_dps=90.0)
+    states = np.zeros((40, 2, oracle.N_STATE))
+    states[:, 0, 1], states[:, 0, 3], states[:, 1, 1] = 0.2 * np.arange(40), 2.0, 5.0
+    oracle.judge(states, [boat, boat], own=0, step=13, radius_m=2.5)
+
+
+def compile_encounters() -> None:
+    """Compile what encounters with the shield need."""
+    from .encounters import measure
+
+    measure("rammer_1", n=1)
+
+
+def compile_reachability_filter() -> None:
+    """Compile what encounters with the reachability filter need."""
+    from .encounters import measure
+
+    measure("rammer_1", "reach", n=1, judge=False)
+
+
+PARTS: dict[str, Callable[[], object]] = {
+    "the shield": compile_shield,
+    "the shield, each boat by itself": compile_shield_per_boat,
+    "the game": compile_game,
+    "the judge": compile_judge,
+    "encounters": compile_encounters,
+    "the reachability filter": compile_reachability_filter,
+}
+"""Everything that commands compile; what one part compiles the next finds."""
+
+
+def compile_share(number: int, of: int) -> None:
+    """Compile everything beside ``of - 1`` other processes that do so: each begins elsewhere and waits for the others.
+
+    Args:
+        number: which of them this one is, from 0.
+        of: how many there are.
+    """
+    parts = list(PARTS.values())
+    first = number * len(parts) // of
+    for compile_it in parts[first:] + parts[:first]:
+        compile_it()

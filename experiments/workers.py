@@ -1,0 +1,316 @@
+"""Where jobs run: this process, processes of this machine, or a Ray cluster (extra ``[cluster]``)."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from typing import Any, NoReturn
+
+from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.extras import install_command
+
+from .faults import machine_words, name_of, trace_of, words_of_trace
+from .provenance import available_cores, code_digest
+
+Job = Mapping[str, Any]
+Row = dict[str, Any]
+Function = Callable[[Any], Any]
+ENGINES = ("pool", "ray")
+MOST_JOBS = 1024
+"""More processes than any machine has cores fill its memory before the first has begun."""
+TRIES = 4
+"""Times a job is begun anew on a cluster when its node or worker is lost."""
+DIED = "its worker process died, also when it ran alone (out of memory?); mend that, then --resume"
+_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+class JobFault(Exception):
+    """A job ended in what no one foresaw; the text says so, and where its traceback is."""
+
+
+def end_failed(failed: Sequence[Mapping[str, Any]], what: str, remedy: str) -> NoReturn:
+    """End a run of which jobs gave no answer.
+
+    Args:
+        failed: of each, among others, ``error`` and ``fault``.
+        what: of the jobs, with their number, such as "3 games could not be played".
+        remedy: where nothing is wrong with steerclear.
+
+    Raises:
+        JobFault: one of them is a fault of steerclear.
+        ConfigError: none is.
+    """
+    faults = [entry["error"] for entry in failed if entry["fault"]]
+    if faults:
+        raise JobFault(f"{what}: {faults[0]}")
+    raise ConfigError(f"{what}{remedy}")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one job.
+
+    Attributes:
+        job: which.
+        answer: its answer; None: it has none.
+        error: why, on one line.
+        trace: traceback of what no one foresaw, a fault of steerclear; None for bad input and the machine's doing.
+    """
+
+    job: Any
+    answer: Any
+    error: str | None = None
+    trace: str | None = None
+
+    @property
+    def why(self) -> dict[str, Any]:
+        """Why there is no answer, as results keep it and `end_failed` reads it."""
+        return {"error": self.error, "fault": self.trace is not None}
+
+
+@dataclass(frozen=True)
+class Ray:
+    """A Ray cluster; what a lost node had under way runs again elsewhere.
+
+    Attributes:
+        processes: jobs at once where Ray is started here.
+        address: of a running cluster, such as ``auto`` or ``10.0.0.1:6379``; None starts Ray on this machine.
+    """
+
+    processes: int = 1
+    address: str | None = None
+
+
+Workers = int | Ray
+"""So many processes of this machine, or a cluster."""
+
+
+def workers_of(engine: str, address: str | None, jobs: int | None) -> Workers:
+    """What ``--engine``, ``--address`` and ``--jobs`` ask for.
+
+    Raises:
+        ConfigError: an unknown engine, an address without Ray, Ray missing, or an unusable number of jobs.
+    """
+    if engine not in ENGINES:
+        raise ConfigError(f"unknown engine {engine!r}; choose one of {', '.join(ENGINES)}")
+    processes = processes_of(jobs)
+    if engine == "pool":
+        if address is not None:
+            raise ConfigError("--address is of a Ray cluster; add --engine ray")
+        return processes
+    if address is not None and jobs is not None:
+        raise ConfigError("a cluster's nodes say how many jobs they run; leave out --jobs, or --address")
+    _ray()
+    return Ray(processes, address)
+
+
+def processes_of(jobs: int | None) -> int:
+    """How many processes ``--jobs`` asks for; all cores when it is not given.
+
+    Raises:
+        ConfigError: less than one, or more than `MOST_JOBS`.
+    """
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise ConfigError(
+            f"--jobs must be at least 1 and at most {MOST_JOBS:,}; got {jobs:,}; leave it out to use all cores"
+        )
+    return jobs or available_cores()
+
+
+def outcomes(
+    function: Function, jobs: Sequence[Any], workers: Workers = 1, warm_up: Sequence[Callable[[], object]] = ()
+) -> Iterator[Outcome]:
+    """Run ``function`` on every job and yield the outcomes in the order they end.
+
+    A job that raises does not stop the others; neither does a worker that dies: the jobs under way then are run again,
+    each alone. Leaving the loop early or interrupting it drops the jobs that have not ended. Tracebacks of faults are
+    written to a file here, one for all that are alike.
+
+    Args:
+        function: importable by name (workers are spawned, not forked), as is every job's data.
+        jobs: what to run it on.
+        workers: 1 runs everything in this process.
+        warm_up: what compiles before several processes start; what goes wrong there is left to the jobs to report.
+    """
+    if isinstance(workers, Ray):
+        found = _on_cluster(function, jobs, workers)
+    elif min(workers, len(jobs)) <= 1:
+        found = (attempt(function, job) for job in jobs)
+    else:
+        for _ in _in_pool(_call, warm_up, workers):
+            pass
+        found = _in_pool(function, jobs, workers)
+    for outcome in found:
+        if outcome.trace is not None:
+            outcome = replace(outcome, error=words_of_trace(outcome.error or "", outcome.trace))
+        yield outcome
+
+
+def _call(function: Callable[[], object]) -> bool:
+    function()
+    return True
+
+
+def attempt(function: Function, job: Any) -> Outcome:
+    """Run one job; an error becomes the outcome's text instead of travelling on."""
+    try:
+        return Outcome(job, function(job))
+    except SteerclearError as error:
+        return Outcome(job, None, str(error))
+    except Exception as error:
+        words = machine_words(error)
+        return Outcome(job, None, words or name_of(error), None if words else trace_of(error))
+
+
+def _in_pool(function: Function, jobs: Sequence[Any], processes: int) -> Iterator[Outcome]:
+    """Run in processes; a job whose process dies runs again alone, so that the one that kills it is known."""
+    waiting, suspects = deque(jobs), deque[Any]()
+    while waiting:
+        with _pool(min(processes, len(waiting))) as pool:
+            yield from _until_broken(pool, function, waiting, suspects, processes)
+    while suspects:
+        alone = deque[Any]()
+        with _pool(1) as pool:
+            yield from _until_broken(pool, function, suspects, alone, 1)
+        yield from (Outcome(job, None, DIED) for job in alone)
+
+
+def _until_broken(
+    pool: ProcessPoolExecutor, function: Function, waiting: deque[Any], lost: deque[Any], at_once: int
+) -> Iterator[Outcome]:
+    """Run what waits, so many at once, until none is left or a worker died; then ``lost`` gets those under way."""
+    running = dict[Future[Outcome], Any]()
+    broken = False
+    while (waiting and not broken) or running:
+        while waiting and not broken and len(running) < at_once:
+            try:
+                running[pool.submit(attempt, function, waiting[0])] = waiting[0]
+                waiting.popleft()
+            except BrokenProcessPool:
+                broken = True
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            job = running.pop(future)
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken = True
+                lost.append(job)
+            else:
+                yield outcome
+
+
+@contextlib.contextmanager
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    others = set(multiprocessing.active_children())
+    unset = [name for name in _ONE_THREAD if name not in os.environ]
+    os.environ.update({name: _ONE_THREAD[name] for name in unset})
+    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin_worker)
+    try:
+        yield pool
+        pool.shutdown(wait=True)
+    except BaseException:  # interrupted, or the loop was left: what still runs is not wanted any more
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()
+            worker.join()
+        raise
+    finally:
+        for name in unset:
+            del os.environ[name]
+
+
+def _begin_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; only the parent answers
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that started it is gone, however it ended."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+@contextlib.contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end what is inside as Ctrl-C does: what is finished is kept, and no worker is left."""
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():  # signals are the main thread's
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _ray() -> Any:
+    if find_spec("ray") is None:
+        raise ConfigError(f"Ray is not installed; {install_command('cluster')}, or leave out --engine ray")
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # else it warns about a default to come
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    import ray  # the extra [cluster]
+
+    return ray
+
+
+def _on_node(function: Function, job: Any) -> tuple[str, Outcome]:
+    """Run a job where Ray put it; say which code ran it."""
+    return code_digest(), attempt(function, job)
+
+
+def _on_cluster(function: Function, jobs: Sequence[Any], cluster: Ray) -> Iterator[Outcome]:
+    """Hand out jobs, a few more than the cluster has cores, and yield what comes back.
+
+    Raises:
+        ConfigError: Ray is missing, no cluster answers, or a node runs other code than this machine.
+    """
+    ray = _ray()
+    here = {"num_cpus": cluster.processes, "include_dashboard": False} if cluster.address is None else {}
+    try:
+        ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR", **here)
+    except (ConnectionError, RuntimeError, ValueError, OSError) as error:
+        where = f"no Ray cluster answers at {cluster.address}" if cluster.address else "Ray does not start here"
+        why = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+        raise ConfigError(f"{where} ({why}); start one with: ray start --head, or leave out --engine") from None
+    try:
+        work = ray.remote(num_cpus=1, max_retries=TRIES, scheduling_strategy="SPREAD")(_on_node)
+        waiting, running = deque(jobs), dict[Any, Any]()
+        while waiting or running:
+            most = 2 * max(int(ray.cluster_resources().get("CPU", 1)), 1)
+            while waiting and len(running) < most:
+                job = waiting.popleft()
+                running[work.remote(function, job)] = job
+            for reference in ray.wait(list(running), num_returns=1)[0]:
+                yield _from_node(ray, reference, running.pop(reference))
+    finally:
+        ray.shutdown()
+
+
+def _from_node(ray: Any, reference: Any, job: Any) -> Outcome:
+    try:
+        code, outcome = ray.get(reference)
+    except ray.exceptions.RayTaskError as error:  # before the job began: its code or data cannot be read there
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        return Outcome(job, None, f"a node could not begin it: {lines[-1].strip()[:300]}")
+    except ray.exceptions.RayError:
+        return Outcome(job, None, DIED)
+    if code != code_digest():
+        raise ConfigError("a node of the cluster runs other code or packages; install the same on all nodes")
+    return outcome if isinstance(outcome, Outcome) else Outcome(job, None, DIED)

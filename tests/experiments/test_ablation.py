@@ -1,0 +1,323 @@
+"""Games off and on from the same seeds: what is played, how it is summed up, judged, kept and shown."""
+
+import io
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+from steerclear.experiments import ablation
+from steerclear.experiments.ablation import (
+    AblationSettings,
+    failure_warnings,
+    held_games,
+    most_instructive,
+    pairings_of,
+    quick,
+    replay_of,
+    results_of,
+    same_game,
+    spec_of,
+    write_results,
+)
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import GAME_ROW, RESULTS, undocumented
+from steerclear.experiments.markdown import goals_table as goals_lines
+from steerclear.experiments.metrics import check, game_goals, game_metrics_of
+from steerclear.experiments.play.spec import MatchSpec
+from steerclear.experiments.report import goal_rows
+from steerclear.experiments.result_files import finite
+from steerclear.experiments.runner import execute
+from steerclear.experiments.tables import goals_table, interval_text, measured_text, number_text, pairing_table
+from steerclear.shield.exceptions import GameError
+
+SETTINGS = AblationSettings(opponents=("easy", "hold"), games=2, rules={"max_time_s": 3.0})
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    return execute(SETTINGS.experiment("ablate"), tmp_path_factory.mktemp("played"))
+
+
+def test_every_pairing_is_played_off_and_on_from_the_same_seeds():
+    specs = SETTINGS.specs()
+    assert len(specs) == 8
+    for off, on in zip(specs[::2], specs[1::2], strict=True):
+        assert (off.shield, on.shield) == (None, {})
+        assert (off.pairing, off.game, off.seed, off.side) == (on.pairing, on.game, on.seed, on.side)
+    assert [spec.side for spec in specs] == ["blue"] * 4 + ["red"] * 4
+    assert {spec.seed for spec in specs} == {0, 1}
+    assert [MatchSpec.of_job(json.loads(json.dumps(spec.as_job()))) for spec in specs] == specs
+
+
+def test_the_separation_is_counted_beside_the_usual_radii():
+    assert AblationSettings(shield={"separation_m": 3.0}).radii_m == (2.5, 3.0, 4.0)
+    assert AblationSettings().radii_m == (2.5, 4.0)
+
+
+def test_a_game_of_a_policy_whose_file_changed_is_another_game(tmp_path):
+    entry = tmp_path / "entry.py"
+    entry.write_text("SPEED = 1")
+    settings = AblationSettings(own=str(entry), opponents=("easy",), games=1)
+    before = [spec.key for spec in settings.specs()]
+    entry.write_text("SPEED = 2")
+    assert not set(before) & {spec.key for spec in settings.specs()}
+
+
+def test_games_come_back_in_order_with_documented_columns(played):
+    assert not played.failed
+    assert [(row["game"], row["opponent"], row["shielded"]) for row in played.rows] == [
+        (game, opponent, shielded) for game in (0, 1) for opponent in ("easy", "hold") for shielded in (False, True)
+    ]
+    assert undocumented(played.rows[1], GAME_ROW) == []
+
+
+def explode(job):
+    if job["opponent"] == "hold":
+        raise GameError("no room; use a larger field")
+    return [{"pairing": "medium vs easy", "game": job["game"]}]
+
+
+def test_a_bad_later_pairing_loses_nothing(tmp_path, played, monkeypatch):
+    monkeypatch.setattr(ablation, "play_job", explode)
+    run = execute(SETTINGS.experiment("ablate"), tmp_path)
+    assert (run.finished, len(run.failed)) == (4, 4)
+    run.rows = played.rows[:2]
+    assert results_of(run, SETTINGS)["failed"][0] == {
+        "pairing": "medium vs hold",
+        "game": 0,
+        "shielded": False,
+        "error": "no room; use a larger field",
+        "fault": False,
+    }
+
+
+def hits(row, off, on):
+    return {**row, "breaches_opponent_2.5m": on if row["shielded"] else off}
+
+
+def test_the_most_instructive_game_has_the_most_breaches_without_shield(played):
+    rows = [hits(row, 5 if (row["game"], row["opponent"]) == (1, "hold") else 1, 9) for row in played.rows]
+    off, on = most_instructive(pd.DataFrame(rows), 2.5)
+    assert (off["game"], off["opponent"], off["shielded"], on["shielded"]) == (1, "hold", False, True)
+    assert spec_of(off, SETTINGS.specs()).shield is None
+    assert most_instructive(pd.DataFrame([row for row in rows if row["shielded"]]), 2.5) is None
+
+
+def goals(rows):
+    return check(game_goals(2.5), pd.DataFrame(rows))
+
+
+def test_goals_judge_pairs_of_all_pairings(played):
+    rows = [{**hits(row, 10, 1), "captures": 4, "breaches_teammate_2.5m": 0} for row in played.rows]
+    found = goals(rows)
+    assert [goal["met"] for goal in found] == [True, True, True, True, True]
+    assert found[1]["value"] == pytest.approx(0.1)
+    worse = [{**hits(row, 10, 2), "captures": 3 if row["shielded"] else 4, "breaches_teammate_2.5m": 1} for row in rows]
+    assert [goal["met"] for goal in goals(worse)] == [False, False, False, True, True]
+    assert goals(worse)[0]["value"] == 4
+    stuck = [{**row, "deadlocks": 1 if row["shielded"] else 0} for row in rows]
+    assert [goal["met"] for goal in goals(stuck)] == [True, True, True, False, True]
+    judged = [{**row, "avoidable": 1 if row["shielded"] else None} for row in rows]
+    assert [goal["met"] for goal in goals(judged)] == [True, True, True, True, False]
+    unjudged = [{**row, "avoidable": None} for row in rows]
+    assert len(goals(unjudged)) == 4
+    assert goals([{**row, "captures": 0} for row in rows])[2]["met"] is None
+
+
+def test_results_are_written_whole_and_documented(played, tmp_path):
+    results = results_of(played, SETTINGS)
+    entry, records = replay_of(played.table, SETTINGS.specs(), 2.5, 1)
+    results["replay"] = entry
+    write_results(played, results, records)
+    content = json.loads((played.folder / "results.json").read_text())
+    assert undocumented(content, RESULTS) == []
+    assert (content["complete"], content["replay"]["same_as_played"]) == (True, True)
+    assert content["settings"]["opponents"] == ["easy", "hold"]
+    assert content["seeds"] == [0, 1]
+    assert content["deprecated"]["bars"] == content["goals"], "the name until 0.8.0, for one release"
+    for name in content["files"].values():
+        assert (played.folder / name).stat().st_size > 0
+    assert [(s["pairing"], s["games_off"], s["games_on"]) for s in content["pairings"]] == [
+        ("medium vs easy", 2, 2),
+        ("medium vs hold", 2, 2),
+    ]
+    (page,) = (path for path in write_pages([content], tmp_path) if path.name == "ablation_aamas2024.md")
+    text = page.read_text()
+    assert f"| tags | {interval_text(content['pairings'][0]['metrics']['tags']['off'])} |" in text
+    assert "| hits with opponents at 2.5 m, on / off |" in text
+    assert (tmp_path / "ablation_aamas2024.png").read_bytes()[1:4] == b"PNG"
+
+
+def test_one_state_alone_has_neither_differences_nor_goals(played, tmp_path):
+    played.__dict__.pop("table", None)
+    rows, played.rows = played.rows, played.rows[1::2]
+    try:
+        results = results_of(played, SETTINGS)
+    finally:
+        played.rows = rows
+        played.__dict__.pop("table", None)
+    assert results["goals"] == []
+    assert all("difference" not in f and "off" not in f for f in results["pairings"][0]["metrics"].values())
+    content = {**finite(results), "command": "evaluate"}
+    (page,) = (path for path in write_pages([content], tmp_path) if path.name == "evaluation_aamas2024.md")
+    assert "shield off" not in page.read_text()
+
+
+def test_the_same_game_is_known_whatever_time_it_took(played):
+    row = played.rows[1]
+    assert same_game(row, {**row, "wall_s": 99.0})
+    assert not same_game(row, {**row, "captures": 99})
+
+
+def test_the_small_version_keeps_everything_but_size():
+    small = quick(SETTINGS, 30.0, 1)
+    assert (small.games, small.rules, small.opponents) == (1, {"max_time_s": 30.0}, SETTINGS.opponents)
+
+
+def test_settings_without_end_stay_so_in_results(tmp_path):
+    """JSON has no infinity, and None would be the profile's."""
+    settings = AblationSettings(shield={"adversary_s": math.inf}, opponents=("easy",), games=0)
+    head = execute(settings.experiment("ablate"), tmp_path).head()
+    assert json.loads(json.dumps(finite(head)))["settings"]["shield"] == {"adversary_s": "inf"}
+
+
+def row(game, shielded, **columns):
+    names = ("captures", "grabs", "tags", "breaches_opponent_2.5m", "breaches_opponent_4.0m", "tags_against")
+    base = {
+        "pairing": "medium vs easy", "game": game, "shielded": shielded, "policy_failures": 0,
+        **dict.fromkeys(names, 0), "captures_against": 1, "net_captures": 1, "breaches_teammate_2.5m": 0,
+        "breaches_teammate_4.0m": 1, "clean_games": True, "closest_m": 3.0, "collisions": 0,
+        "covered_steps": 300 if shielded else 0, "changed_steps": 30 if shielded else 0,
+        "mean_heading_change_deg": 12.0 if shielded else None, "mean_speed_change_mps": 0.25 if shielded else None,
+        "decision_p50_us": 80.0 if shielded else None, "decision_p99_us": 200.0 if shielded else None,
+        "reversals_per_boat_minute": 4.0, "deadlocks": 0, "primary": 0.5, "secondary": 2.0,
+        "reason_PASSED": 270 if shielded else 0,
+    }  # fmt: skip
+    return {**base, **columns}
+
+
+def summary_of(rows):
+    return pairings_of(pd.DataFrame(rows), (2.5, 4.0))[0]
+
+
+@pytest.fixture
+def summary():
+    off = [row(0, False, **{"breaches_opponent_2.5m": 4, "closest_m": 1.0, "clean_games": False}), row(1, False)]
+    return summary_of([*off, row(1, True, captures=1), row(0, True, closest_m=2.75)])
+
+
+def figure(summary, name, column):
+    return summary["metrics"][name][column]
+
+
+def test_figures_have_the_interval_of_their_kind(summary):
+    assert figure(summary, "breaches_opponent_2.5m", "off")["value"] == pytest.approx(2.0)
+    on = figure(summary, "breaches_opponent_2.5m", "on")
+    assert (on["value"], on["high"], on["n"]) == (0.0, pytest.approx(-math.log(0.05) / 2), 2)
+    assert figure(summary, "closest_m", "difference")["value"] == pytest.approx((2.75 - 1.0) / 2), "paired by game"
+    assert figure(summary, "closest_of_all_m", "off")["value"] == 1.0
+    assert math.isnan(figure(summary, "closest_of_all_m", "off")["low"])
+    assert figure(summary, "clean_games", "off")["value"] == pytest.approx(0.5)
+
+
+def test_what_describes_the_shield_has_no_figure_without_it(summary):
+    assert set(summary["metrics"]["changed_share"]) == {"label", "on"}
+    assert figure(summary, "changed_share", "on")["value"] == pytest.approx(10.0)
+    assert figure(summary, "mean_heading_change_deg", "on")["value"] == pytest.approx(12.0)
+    assert summary["reasons"] == {"PASSED": 540}
+
+
+def test_missing_values_are_left_out():
+    alone = summary_of([row(0, False, closest_m=None), row(0, True, closest_m=None)])
+    assert math.isnan(figure(alone, "closest_m", "off")["value"])
+    rows = [row(0, True, deadlocks=1), row(1, True, deadlocks=None)]
+    assert figure(summary_of(rows), "deadlocks", "on")["value"] == pytest.approx(1.0)
+
+
+def printed(table, width):
+    stream = io.StringIO()
+    Console(file=stream, width=width, no_color=True).print(table)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("width", [80, 100])
+def test_tables_fit_the_terminal_without_wrapping_or_cutting(width):
+    rng = np.random.default_rng(0)
+    names = ("primary", "secondary", "closest_m")
+    games = [
+        row(game, shielded, **{name: int(rng.integers(-300, 300)) / 100 for name in names})
+        for game in range(20)
+        for shielded in (False, True)
+    ]
+    text = printed(pairing_table(summary_of(games)), width)
+    lines = text.rstrip().splitlines()
+    assert max(len(line) for line in lines) <= width
+    assert "…" not in text
+    assert len([line for line in lines if line.strip()]) == 3 + len(game_metrics_of())  # title, head, rule
+
+
+def test_numbers_are_short_and_missing_ones_are_dashes():
+    assert [number_text(x) for x in (0.0, 0.123, 9.996, 12.34, 123.4, -0.5, None, float("nan"), 250000.0)] == [
+        "0.00", "0.12", "10.0", "12.3", "123", "-0.50", "-", "-", "250,000",
+    ]  # fmt: skip
+    assert interval_text(None) == interval_text({"value": None, "low": None, "high": None}) == "-"
+    assert interval_text({"value": 1.0, "low": float("nan"), "high": 2.0}) == "1.00"
+    assert interval_text({"value": 1.0, "low": 0.5, "high": 20.0}) == "1.00 [0.50, 20.0]"
+
+
+def test_a_goal_just_missed_does_not_look_as_if_it_were_met():
+    def text(value, limit):
+        return measured_text({"value": value, "limit": limit})
+
+    assert [text(1 / 300, 0.0), text(0.0, 0.0), text(0.9496, 0.95), text(250_000.4, 250_000.0), text(None, 0.0)] == [
+        "0.0033", "0.00", "0.9496", "250000.4", "-",
+    ]  # fmt: skip
+    missed = {"name": "hits", "value": 1 / 300, "sense": "<=", "limit": 0.0, "met": False, "low": 8e-5, "high": 0.0186}
+    assert "0.0033 <= 0.00 not met" in " ".join(printed(goals_table([missed]), 80).split())
+    assert "| hits | 0.0033 | <= 0.00 | **not met** |" in goals_lines([missed])
+    assert goal_rows([missed])[0]["measured"] == "0.0033 [0.00, 0.02]"
+
+
+def test_a_long_name_of_a_goal_takes_nothing_from_its_figures():
+    goal = {"name": "shield:certificate=value_table: " + "many words " * 6, "sense": "<=", "limit": 0.0}
+    shown = printed(goals_table([goal | {"value": 1234.0, "met": met} for met in (False, None)]), 80)
+    for words in ("measured", "1,234 <= 0.00 not met", "1,234 <= 0.00 no data"):
+        assert words in shown
+    assert shown.split().count("words") == 12
+
+
+def failing(own=0, other=0, text=None, usable=(7, 7), steps=10):
+    counts = dict(zip(("policy_usable_steps", "opponent_policy_usable_steps"), usable, strict=True))
+    failures = {"policy_failures": own, "opponent_policy_failures": other}
+    return {"steps": steps, **failures, "first_failure": text, **counts}
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([failing(), failing(1200, 0, "own: 'a'")], "own policy failed 1,200 times, in 1 of 2 games"),
+        ([failing(0, 3, "opponent: no"), failing(0, 4)], "opponents' policy failed 7 times, in 2 of 2 games"),
+        ([failing(1, 0, "own: no")], "own policy failed 1 time, in 1 of 1 games"),
+    ],
+)
+def test_failures_are_counted_and_the_first_is_quoted(rows, words):
+    (text,) = failure_warnings(rows)
+    assert words in text
+    first = next(row["first_failure"] for row in rows if row["first_failure"])
+    assert text.endswith(f"First failure: {first.partition(': ')[2]}")
+
+
+def test_policies_that_did_not_play_are_named_and_others_not():
+    held = [failing(30, 0, "own: raised", usable=(0, 7)), failing(9)]
+    assert "the own policy gave no usable answer throughout 1 of 2 games" in held_games(held)[0]
+    assert "(raised)" in held_games(held)[0]
+    late = [failing(0, 15, "opponent: late", usable=(5, 0))]
+    assert "the opponents' policy gave no usable answer throughout 1 of 1" in held_games(late)[0]
+    assert held_games([failing(29, 10, usable=(1, 10)), failing(usable=(0, 0), steps=0)]) == []
+    assert failure_warnings([failing(), failing()]) == failure_warnings([]) == []
+    own, opponents = failure_warnings([failing(2, 3, "own: lost")])
+    assert own.endswith("First failure: lost")
+    assert "lost" not in opponents

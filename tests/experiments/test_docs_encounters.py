@@ -1,0 +1,207 @@
+"""The comparison of guards: who met the same encounters, figures over families, the page."""
+
+import pytest
+from steerclear.experiments.docs import price_page, write_pages
+from steerclear.experiments.docs_encounters import cells_of, comparison_page, contests_of
+from steerclear.shield.exceptions import ConfigError
+
+SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}
+
+
+def cell(guard, family, breached=0, avoidable=0, changed=5.0, n=100, own="heron", **more):
+    return {
+        "guard": guard, "family": family, "own": own, "other": "heron", "encounters": n, "breached": breached,
+        "avoidable": avoidable, "unavoidable": breached - avoidable, "not_judged": 0, "deadlocked": 0,
+        "changed_percent": changed, "goal_time_ratio": 1.1, "reversals_per_min": 2.0, "decision_us": 9.0, **more,
+    }  # fmt: skip
+
+
+def content(*cells, **settings):
+    return {
+        "command": "encounters", "settings": SETTINGS | settings, "versions": {"steerclear": "9.9"}, "cells": [*cells],
+    }  # fmt: skip
+
+
+def both(first="head_on", second="rammer_1"):
+    """A cautious guard that changes much, a bold one that fails once, none."""
+    return content(
+        *(cell("none", family, breached=60, changed=0.0, goal_time_ratio=1.0) for family in (first, second)),
+        cell("cautious", first, changed=40.0), cell("cautious", second, changed=60.0, n=100),
+        cell("bold", first, changed=1.0), cell("bold", second, breached=1, avoidable=1, changed=3.0),
+    )  # fmt: skip
+
+
+def one_contest(*contents):
+    (contest,) = contests_of(each for one in contents for each in cells_of(one))
+    return contest
+
+
+def test_counts_add_up_and_means_are_weighted():
+    contest = one_contest(
+        content(
+            cell("a", "head_on", breached=3, avoidable=1, changed=10.0, n=100),
+            cell("a", "rammer_1", breached=2, changed=40.0, n=300, goal_time_ratio=None),
+        )
+    )
+    figures = contest.totals["a"]
+    assert (figures["encounters"], figures["breached"], figures["avoidable"]) == (400, 5, 1)
+    assert figures["changed_percent"] == pytest.approx((10 * 100 + 40 * 300) / 400)
+    assert figures["goal_time_ratio"] == pytest.approx(1.1)
+    assert figures["breached_upper"] > 5 / 400
+
+
+def test_a_total_of_results_that_do_not_all_tell_who_never_arrived_is_unknown():
+    told = (
+        cell("a", "circle_3", n=100, never_arrived_percent=40.0),
+        cell("a", "head_on", n=300, never_arrived_percent=0),
+    )
+    figures = one_contest(content(*told)).totals["a"]
+    assert figures["never_arrived_percent"] == pytest.approx(10.0)
+    older = one_contest(content(*told, cell("a", "rammer_1"))).totals["a"]
+    assert older["never_arrived_percent"] is None
+    assert older["encounters"] == 500
+
+
+def test_the_page_is_made_of_older_results_beside_newer_ones(tmp_path):
+    newer = content(
+        cell("new", "head_on", never_arrived_percent=40.0), cell("new", "rammer_1", never_arrived_percent=0.0)
+    )
+    (page,) = (path for path in write_pages([both(), newer], tmp_path) if path.name == "comparison.md")
+    lines = page.read_text().splitlines()
+    heads, *rows = [[part.strip() for part in line.split("|")] for line in lines if line.count("|") == 14]
+    column = heads.index("never arrived")
+    assert {row[1].strip("*"): row[column] for row in rows[1:]} == {
+        "none": "",
+        "cautious": "",
+        "bold": "",
+        "new": "20.0 %",
+    }
+
+
+def test_best_is_safe_first_then_gentle():
+    assert one_contest(both()).winner == "cautious"
+    gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "rammer_1", changed=50.0))
+    assert one_contest(both(), gentle).winner == "gentle"
+    assert one_contest(content(cell("none", "head_on"))).winner is None
+
+
+def test_breaches_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
+    unjudged = cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0)
+    asked = content(unjudged, cell("open", "head_on", changed=90.0))
+    contest = one_contest(asked)
+    assert contest.winner == "open"
+    assert contest.totals["hidden"]["avoidable_upper"] == contest.totals["hidden"]["breached_upper"]
+    assert "| hidden | 100 | 0 to 1 [" in comparison_page([asked], tmp_path)[1]
+
+
+def test_only_families_that_all_met_count():
+    extra = content(cell("bold", "crossing_left", breached=50), cell("late", "head_on", changed=2.0))
+    contest = one_contest(both(), extra)
+    assert contest.families == ("head_on",)
+    assert set(contest.left_out) == {"rammer_1", "crossing_left"}
+    assert contest.totals["bold"]["encounters"] == 100
+    fewer = content(cell("late", "head_on", n=50))
+    assert one_contest(both(), fewer).families == ()
+
+
+def test_other_scenes_are_another_section():
+    titles = [
+        contest.title
+        for contest in contests_of(
+            each
+            for one in (both(), content(cell("a", "head_on"), seed=8), content(cell("a", "head_on"), delay_s=0.3))
+            for each in cells_of(one)
+        )
+    ]
+    assert titles == ["heron meets heron, 2.5 m"] * 2 + ["heron meets heron, 2.5 m, 0.3 s delay"]
+
+
+def test_conditions_and_figures_may_stand_in_their_own_mappings():
+    flat = cell("a", "head_on")
+    figures = {key: flat.pop(key) for key in list(flat) if key not in ("guard", "family", "own", "other")}
+    nested = {**flat, "summary": figures, "conditions": {"radius_m": 4.0}}
+    assert one_contest(content(nested)).title == "heron meets heron, 4 m"
+
+
+def test_the_page_shows_what_the_results_say(tmp_path):
+    page, picture = (
+        path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")
+    )
+    text = page.read_text()
+    assert (
+        "Best (fewest avoidable or unjudged, then fewest breached, then fewest commands changed): **cautious**" in text
+    )
+    assert "| **cautious** | 200 | 0 [1.5 %] | 0 | 0 | 0 [1.5 %] | 50.0 % |" in text
+    assert "| rammer_1 | 60, 0 % | 0, 60 % | 1, 3 % |" in text
+    assert "steerclear 9.9" in text
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_of_one_guard_every_family_has_its_figures(tmp_path):
+    outside = {"started_outside": 1000, "breaches_outside": 0}
+    cells = [
+        cell("shield", "head_on", n=1000, never_arrived_percent=0.0, **outside),
+        cell("shield", "at_rest", breached=99, avoidable=90, changed=60.0, never_arrived_percent=2.0),
+    ]
+    lines = comparison_page([content(*cells)], tmp_path)[1].splitlines()
+    assert "| head_on | 0 [0.3 %] | 0 [0.3 %] | 0 | 1,000 | 0 [0.3 %] | 5.0 % | 1.10 | 0.00 % |" in lines
+    assert "| at_rest | 99 [100 %] | 90 [94 %] | 9 |  |  | 60.0 % | 1.10 | 2.00 % |" in lines
+    assert not any(line.startswith("Encounters breached, and") for line in lines)
+    assert lines[0] == "# Encounters with shield"
+    assert not any("Best" in line or "**shield**" in line for line in lines)
+
+
+def test_bad_results_are_refused(tmp_path):
+    broken = cell("a", "head_on")
+    del broken["avoidable"]
+    with pytest.raises(ConfigError, match="has no avoidable; run `encounters` again"):
+        write_pages([content(broken)], tmp_path)
+    with pytest.raises(ConfigError, match="no family that all guards met"):
+        write_pages([content()], tmp_path)
+
+
+def figure(value):
+    return {"value": value, "low": value - 1.0, "high": value + 1.0}
+
+
+def ablation(shield, changed, hits, radius="2.5"):
+    one = {"on": figure(1.0), "off": figure(1.0), "difference": figure(0.25)}
+    names = ("captures", "captures_against", "net_captures", "tags", "primary")
+    metrics = {name: {"label": name, **one} for name in names}
+    metrics["changed_share"] = {"label": "changed", "on": figure(changed)}
+    for kind in ("teammate", "opponent"):
+        metrics[f"breaches_{kind}_{radius}m"] = {"label": kind, **one, "on": figure(hits)}
+    return {
+        "command": "ablate",
+        "settings": {"preset": "mctf2025", "shield": shield},
+        "versions": {"steerclear": "1.2.3"},
+        "pairings": [{"pairing": "medium vs easy", "games_on": 6, "games_off": 6, "metrics": metrics}],
+    }
+
+
+def test_ablations_of_several_horizons_make_the_page_of_the_price(tmp_path):
+    results = [
+        ablation({"profile": "rammers"}, 21.5, 0.0),
+        ablation({"adversary_s": 6.0}, 4.25, 0.5),
+        ablation({}, 7.75, 0.25),
+        ablation({"adversary_s": 9.0, "separation_m": 4.0}, 12.5, 0.0, "4.0"),
+    ]
+    pages = write_pages(results, tmp_path)
+    assert [page.name for page in pages] == ["json_keys.md", "price.md", "price.png"]
+    near, far = (tmp_path / "price.md").read_text().split("## mctf2025, 4 m: medium vs easy")
+    rows = [row.split("|")[1:3] for row in near.splitlines() if row.startswith("| ") and "[" in row]
+    assert [[cell.strip().split(" ")[0] for cell in row] for row in rows] == [
+        ["6", "4.25"],
+        ["12", "7.75"],
+        ["inf", "21.5"],
+    ]
+    assert "12.5" in far
+    assert "| 1.2.3 |" in far, "a row is of the version that measured it"
+    assert price_page(results, tmp_path)[2][0].stat().st_size > 10_000
+
+
+def test_bad_ablations_are_refused_in_one_line(tmp_path):
+    with pytest.raises(ConfigError, match="no page can be made of results of 'nothing'"):
+        write_pages([{"command": "nothing"}], tmp_path)
+    with pytest.raises(ConfigError, match="make them again"):
+        write_pages([ablation({}, 1.0, 0.0)], tmp_path)

@@ -1,0 +1,83 @@
+"""Adding to the experiments: a metric in one line, an experiment in one file, as CONTRIBUTING shows."""
+
+import json
+
+import pytest
+from steerclear.experiments import docs_keys, metrics
+from steerclear.experiments.ablation import pairings_of
+from steerclear.experiments.metrics import Goal, Metric, check, game_metrics_of, meanings_of
+from steerclear.experiments.report import Report, Section, Table, write_report
+from steerclear.experiments.runner import Experiment, execute
+from steerclear.experiments.statistics import as_figure, count_interval, summarise
+from steerclear.experiments.tables import interval_text, pairing_table
+from steerclear.shield.decision import Reason
+from steerclear.shield.exceptions import ConfigError
+from test_ablation import printed, row
+
+
+def test_a_metric_of_one_line_reaches_table_report_and_keys(monkeypatch, tmp_path):
+    """Its column is in the rows; tables, report and the page of keys follow."""
+    import pandas as pd
+
+    near = Metric("near_misses", "count", "near misses", "", "entries into 1.5 times the radius")
+    known = metrics.game_metrics_of
+    monkeypatch.setattr("steerclear.experiments.ablation.game_metrics_of", lambda radii: [*known(radii), near])
+    monkeypatch.setattr("steerclear.experiments.report.game_metrics_of", lambda: [*known(), near])
+    rows = [row(game, state, near_misses=3 - 2 * state, seed=game) for game in range(4) for state in (False, True)]
+    (summary,) = pairings_of(pd.DataFrame(rows), (2.5, 4.0))
+    limits = count_interval(12, 4)
+    figures = summary["metrics"]["near_misses"]
+    assert figures["off"] == {"value": limits.value, "low": limits.low, "high": limits.high, "n": 4}
+    assert figures["difference"]["value"] == -2.0
+    assert "near misses" in printed(pairing_table(summary), 80)
+    results = {"settings": {}, "versions": {}, "pairings": [summary], "games": rows}
+    page = write_report(results, tmp_path / "report.html").read_text()
+    assert "entries into 1.5 times the radius" in page
+    assert interval_text(figures["off"]) in page
+    content = {"pairings": [{"metrics": {"near_misses": figures}}]}
+    assert docs_keys.undocumented(json.loads(json.dumps(content)), docs_keys.RESULTS) == []
+
+
+THROWS = [Metric("hit", "share", "hits", "", "whether it hit"), Metric("off_m", "mean", "off by", "m", "distance")]
+
+
+def throw(job):
+    """An experiment's ``run``: from a job to its rows."""
+    return [{"hand": job["hand"], "number": n, "hit": n % 2 == 0, "off_m": n * job["scale"]} for n in range(6)]
+
+
+def test_an_experiment_is_jobs_a_function_metrics_and_goals(tmp_path):
+    jobs = [{"hand": hand, "scale": scale} for hand, scale in (("left", 0.5), ("right", 0.2))]
+    run = execute(Experiment("throw", {"scales": [0.5, 0.2]}, jobs, throw, unit="hands"), tmp_path)
+    figures = summarise(run.table.assign(all="all"), THROWS, ["all"], ("hand", "left", "right"), ["number"])
+    told = {(line.hand, line.metric): line for line in figures.itertuples()}
+    assert told["difference", "off_m"].value == pytest.approx(-0.75)
+    assert told["difference", "off_m"].high < 0.0
+    assert (told["left", "hit"].value, told["left", "hit"].n) == (0.5, 6)
+    goals = check(
+        [Goal("hits", lambda table: count_interval(int(table["hit"].sum()), len(table)), ">=", 0.4)], run.table
+    )
+    assert goals[0]["met"] is True
+    run.write({**run.head(), "goals": goals})
+    rows = [[line.hand, line.metric, f"{line.value:.2f}"] for line in figures.itertuples()]
+    page = Report("Throws", "two hands", goals=goals, sections=[Section("", [Table("", ["", "", "value"], rows)])])
+    assert "-0.75" in page.write(tmp_path / "report.html").read_text()
+    assert json.loads((tmp_path / "results.json").read_text())["complete"] is True
+
+
+def test_a_kind_of_metric_that_there_is_not_is_refused(tmp_path):
+    run = execute(Experiment("throw", {}, [{"hand": "left", "scale": 1.0}], throw), tmp_path)
+    with pytest.raises(ConfigError, match="unknown kind of metric 'median'; choose count, share, mean, percent or"):
+        summarise(run.table, [Metric("off_m", "median", "", "", "")], ["hand"])
+    assert as_figure(count_interval(0, 2), 2)["n"] == 2
+
+
+def test_every_metric_says_what_it_is_and_keys_are_no_two_alike():
+    keys = [metric.key for metric in game_metrics_of()]
+    assert len(set(keys)) == len(keys)
+    assert all(len(words.split()) >= 2 and not words.endswith(".") for words in meanings_of(game_metrics_of()).values())
+
+
+def test_every_reason_for_which_a_command_is_changed_has_a_meaning():
+    assert {name.lower() for name in Reason.__members__} - {"passed", "not_covered"} <= set(metrics.REASONS)
+    assert Reason["ESCAPE"] is Reason.BACKUP, "the name in results of 0.2.0 and before"

@@ -1,0 +1,235 @@
+import base64
+import json
+import shutil
+import subprocess
+import zlib
+from html.parser import HTMLParser
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from steerclear.env.record import make_record, read_meta
+from steerclear.experiments.page import as_json, fill
+from steerclear.experiments.replay_data import pack
+from steerclear.experiments.replay_html import SCRIPTS, write_replay
+from steerclear.shield.exceptions import ConfigError, TraceError
+
+NODE = shutil.which("node")
+
+
+class Page(HTMLParser):
+    """Collects the elements of a page, whatever it refers to, and the text of its scripts."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.links, self.scripts = [], set(), [], {}
+        self._script = None
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        if tag not in ("meta", "input", "link", "img", "br"):
+            self.open.append(tag)
+        self.ids.add(attrs.get("id"))
+        self.links += [attrs[name] for name in ("src", "href") if name in attrs]
+        if tag == "script":
+            self._script = attrs.get("id", "code")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+        self._script = None
+
+    def handle_data(self, data):
+        if self._script is not None:
+            self.scripts[self._script] = self.scripts.get(self._script, "") + data
+
+
+def games_in(path):
+    return json.loads(Page(path.read_text()).scripts["data"])["games"]
+
+
+def decode(game):
+    """Read the embedded numbers as replay_data.py describes them, independently of the page's own reader."""
+    content = base64.b64decode(game["data"])
+    content = zlib.decompress(content) if game["deflated"] else content
+    codes, values = {}, {}
+    for column in game["columns"]:
+        kind = np.dtype(f"<u{column['bits'] // 8}")
+        series = column["length"] // max(column["rows"], 1)
+        rows = np.frombuffer(content, kind, column["length"], column["start"]).reshape(series, column["rows"])
+        if column["against"] == "previous":
+            rows = np.cumsum(rows, axis=1, dtype=kind)
+        elif column["against"]:
+            rows = rows + codes[column["against"]]
+        codes[column["name"]] = rows
+        numbers = rows * column.get("scale", 1) + column.get("offset", 0)
+        values[column["name"]] = np.where(rows == column.get("nan", -1), np.nan, numbers)
+    return values
+
+
+def angle_error(a, b):
+    return np.abs((a - b + 180.0) % 360.0 - 180.0)
+
+
+@pytest.mark.parametrize("compress", [True, False])
+def test_the_page_holds_the_record(game_record, tmp_path, compress):
+    (game,) = games_in(write_replay(game_record, tmp_path / "a.html", compress=compress))
+    values = decode(game)
+    record = game_record
+    np.testing.assert_allclose(values["position"].T.reshape(61, 4, 2), record["position"], atol=1e-3)
+    np.testing.assert_allclose(values["flag_position"].T.reshape(61, 2, 2), record["flag_position"], atol=1e-3)
+    np.testing.assert_allclose(values["speed"].T, record["speed_mps"], atol=1e-4)
+    assert angle_error(values["heading"].T, record["heading_deg"]).max() < 0.003
+    bits = values["bits"].T.astype(int)
+    for mask, name in ((1, "has_flag"), (2, "is_tagged"), (4, "oob")):
+        np.testing.assert_array_equal(bits & mask != 0, record[name])
+    np.testing.assert_array_equal(values["reason"].T, record["reason"])
+    np.testing.assert_array_equal(values["intervened"].T != 0, record["intervened"])
+    np.testing.assert_allclose(values["certificate"].T, record["certificate_m"], atol=1e-3)
+    for name in ("wanted", "sent"):
+        usable = np.isfinite(record[name]).all(axis=-1)
+        np.testing.assert_array_equal(np.isfinite(values[f"{name}_speed"].T), usable)
+        np.testing.assert_allclose(values[f"{name}_speed"].T[usable], record[name][usable][:, 0], atol=1e-4)
+        assert angle_error(values[f"{name}_heading"].T[usable], record[name][usable][:, 1]).max() < 0.003
+    assert game["captures"] == [[0, 0, 0], [40, 1, 0]]
+    np.testing.assert_allclose(game["breaches"], record["breaches"], atol=1e-3)
+    assert game["meta"]["reason_names"] == read_meta(record)["reason_names"]
+    assert game["meta"]["obstacles"]["circle"] == [[3.0, [40.0, 8.0]]]
+
+
+def test_an_unchanged_command_has_equal_codes(game_record):
+    values = decode(pack(game_record, "a game"))
+    passed = ~game_record["intervened"].T
+    np.testing.assert_array_equal(values["sent_speed"][passed], values["wanted_speed"][passed])
+    np.testing.assert_array_equal(values["sent_heading"][passed], values["wanted_heading"][passed])
+
+
+def test_the_page_is_whole_and_loads_nothing(game_record, tmp_path):
+    text = write_replay(game_record, tmp_path / "deep" / "a.html").read_text()
+    page = Page(text)
+    assert page.open == []
+    assert page.links == []
+    assert "@@" not in text
+    assert "http://" not in text
+    assert "https://" not in text
+    for wanted in ("play", "panes", "clock", "speed", "trail", "keys"):
+        assert wanted in page.ids
+    for part in SCRIPTS:
+        assert (files("steerclear.experiments") / "templates" / part).read_text() in text
+
+
+def test_every_element_that_the_script_asks_for_is_there(game_record, tmp_path):
+    page = Page(write_replay(game_record, tmp_path / "a.html").read_text())
+    asked = {piece.split('"')[0] for piece in page.scripts["code"].split('byId("')[1:]}
+    asked |= {piece.split('"')[0] for piece in page.scripts["code"].split('click("')[1:]}
+    assert len(asked) > 12
+    assert asked <= page.ids
+
+
+def test_texts_from_a_record_cannot_break_out_of_the_page(game_record, tmp_path):
+    evil = "</script><script>alert(1)</script>"
+    meta = {**read_meta(game_record), "policies": {"blue": evil, "red": "@@STYLE@@"}}
+    record = {**game_record, "meta": np.array(json.dumps(meta))}
+    page = Page(write_replay(record, tmp_path / "a.html", title=evil).read_text())
+    assert set(page.scripts) == {"data", "code"}
+    assert page.open == []
+    assert json.loads(page.scripts["data"])["games"][0]["meta"]["policies"]["blue"] == evil
+
+
+def test_several_games_are_named_apart_and_share_one_own_team(game_record, tmp_path):
+    off = {**game_record, "meta": np.array(json.dumps({**read_meta(game_record), "shielded": []}))}
+    red = {**game_record, "meta": np.array(json.dumps({**read_meta(game_record), "shielded": ["agent_2"]}))}
+    games = games_in(write_replay([off, game_record, game_record], tmp_path / "a.html"))
+    assert [game["title"] for game in games] == [
+        "medium – easy, shield off",
+        "2. medium – easy, shield on",
+        "3. medium – easy, shield on",
+    ]
+    assert {game["own_team"] for game in games} == {0}
+    assert {game["own_team"] for game in games_in(write_replay([off, red], tmp_path / "b.html"))} == {1}
+
+
+def test_a_full_game_stays_small(game_meta, game_record, tmp_path):
+    """600 s of boats that never go straight and commands that jump at every step, changed half the time."""
+    random, steps, n = np.random.default_rng(0), 6000, 4
+    turn = np.cumsum(random.normal(0, 3, (steps + 1, n)), axis=0)
+    way = 0.2 * np.stack([np.sin(np.radians(turn)), np.cos(np.radians(turn))], axis=-1)
+    position = np.array([20.0, 20.0]) + np.cumsum(way, axis=0) % 30.0
+    arrays = {name: np.resize(game_record[name], (steps + 1, *game_record[name].shape[1:])) for name in game_record}
+    arrays |= {"position": position, "heading_deg": turn, "breaches": np.zeros((0, 4))}
+    for name in ("reason", "intervened", "certificate_m"):
+        arrays[name] = arrays[name][:-1]
+    for name in ("wanted", "sent"):
+        arrays[name] = np.stack([random.uniform(0, 2, (steps, n)), random.uniform(-180, 180, (steps, n))], axis=-1)
+    arrays.pop("meta")
+    path = write_replay(make_record(game_meta, **arrays), tmp_path / "a.html")
+    assert path.stat().st_size < 2_000_000 * 4 / 6
+
+
+def test_a_game_without_a_step_can_be_replayed(game_record, tmp_path):
+    commands = ("wanted", "sent", "reason", "intervened", "certificate_m")
+    empty = {name: values[:0] if name in commands else values for name, values in game_record.items()}
+    states = (
+        "position",
+        "heading_deg",
+        "speed_mps",
+        "has_flag",
+        "is_tagged",
+        "oob",
+        "is_disabled",
+        "flag_position",
+        "captures",
+    )
+    empty |= {name: game_record[name][:1] for name in states} | {"breaches": np.zeros((0, 4))}
+    (game,) = games_in(write_replay(empty, tmp_path / "a.html"))
+    assert game["steps"] == 0
+    assert decode(game)["position"].shape == (8, 1)
+
+
+def test_bad_input_is_one_clear_error(game_record, tmp_path):
+    with pytest.raises(ConfigError, match="pass at least one"):
+        write_replay([], tmp_path / "a.html")
+    with pytest.raises(TraceError, match="lacks sent"):
+        write_replay({name: v for name, v in game_record.items() if name != "sent"}, tmp_path / "a.html")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="Choose a folder you may write to"):
+        write_replay(game_record, tmp_path / "file" / "a.html")
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_filling_and_quoting():
+    assert fill("a @@X@@ b @@Y@@", {"X": "@@Y@@", "Y": "2"}) == "a @@Y@@ b 2"
+    assert json.loads(as_json({"a": "</x>\u2028"})) == {"a": "</x>\u2028"}
+    assert "<" not in as_json("</script>")
+    with pytest.raises(ValueError, match="JSON"):
+        as_json(float("nan"))
+
+
+READER = """
+const { readFileSync } = require("fs");
+const game = JSON.parse(readFileSync(0, "utf8"));
+Game.open(game).then((opened) => {
+  const series = {};
+  for (const [name, values] of Object.entries(opened.values)) series[name] = Array.from(values);
+  const { breaches, changes } = opened.marks;
+  console.log(JSON.stringify({ series, breaches, changes, score: opened.score(50), half: opened.pose(0, 3, 0.5) }));
+});
+"""
+
+
+@pytest.mark.skipif(NODE is None, reason="the page's own reader runs in node where there is one")
+@pytest.mark.parametrize("compress", [True, False])
+def test_the_pages_own_reader_agrees(game_record, compress):
+    game = {**pack(game_record, "a game", compress), "own_team": 0}
+    reader = (files("steerclear.experiments") / "templates" / "replay_data.js").read_text() + READER
+    answer = subprocess.run([NODE, "-e", reader], input=json.dumps(game), capture_output=True, text=True, check=True)
+    read = json.loads(answer.stdout)
+    for name, values in decode(game).items():
+        numbers = np.array([np.nan if value is None else value for value in read["series"][name]])
+        np.testing.assert_allclose(numbers, values.ravel(), rtol=1e-6, atol=1e-5)
+    assert read["breaches"] == pytest.approx(0.1 * np.unique(game_record["breaches"][:, 0]))
+    assert read["changes"] == pytest.approx([1.0, 3.0])
+    assert read["score"] == [1, 0]
+    middle = game_record["position"][3:5, 0].mean(axis=0)
+    assert [read["half"]["x"], read["half"]["y"]] == pytest.approx(middle, abs=1e-3)

@@ -1,0 +1,194 @@
+import copy
+import math
+import re
+from xml.etree import ElementTree
+
+import pytest
+from steerclear.experiments import plots
+from steerclear.experiments.metrics import REASONS
+from steerclear.experiments.report import write_report
+from steerclear.shield.exceptions import ConfigError
+
+NAMES = ("captures", "closest_m", "changed_share", "breaches_teammate_2.5m", "breaches_opponent_2.5m", "tags")
+
+
+def figure(value):
+    return {"value": value, "low": 0.8 * value, "high": 1.2 * value}
+
+
+def pairing(name, off, on):
+    metrics = {
+        key: {"label": key.replace("_", " "), "off": figure(off), "on": figure(on), "difference": figure(on - off)}
+        for key in NAMES
+    }
+    del metrics["changed_share"]["off"], metrics["changed_share"]["difference"]
+    reasons = {"PASSED": 960, "QP": 30, "BEST_EFFORT": 10}
+    return {"pairing": name, "games_off": 3, "games_on": 1, "metrics": metrics, "reasons": reasons}
+
+
+def game(pairing, number, shielded, closest_m):
+    return {"pairing": pairing, "game": number, "shielded": shielded, "seed": number, "closest_m": closest_m}
+
+
+@pytest.fixture
+def results():
+    return {
+        "settings": {"preset": "aamas2024", "own": "medium", "opponents": ["easy", "<b>"], "seed": 4, "shield": {}},
+        "versions": {"python": "3.11", "steerclear": "0.1.0", "torch": None},
+        "pairings": [pairing("medium vs easy", 9.0, 0.5), pairing("medium vs <b>", 4.0, 0.25)],
+        "games": [game("medium vs easy", k, on, 1.5 + on) for k in range(3) for on in (False, True)]
+        + [game("medium vs <b>", 0, False, None)],
+        "goals": [
+            {"name": "hits", "value": 0.05, "low": None, "high": None, "sense": "<=", "limit": 0.1, "met": True},
+            {"name": "captures", "value": 0.5, "low": 0.4, "high": 0.6, "sense": ">=", "limit": 0.9, "met": False},
+            {"name": "nothing", "value": math.nan, "low": None, "high": None, "sense": "<=", "limit": 1, "met": None},
+        ],
+        "replays": [{"label": "game 3", "path": "replay.html"}],
+        "machine": {"cores": 2},
+        "something new": object(),
+    }
+
+
+def plots_in(text):
+    return [ElementTree.fromstring(plot) for plot in re.findall(r"<svg.*?</svg>", text, re.DOTALL)]
+
+
+def painted(plot, name):
+    """How many shapes of a plot are filled with a colour of the page."""
+    shapes = (part.get("style") or "" for part in plot.iter())
+    return sum(f"fill: var(--{name})" in style for style in shapes)
+
+
+@pytest.mark.parametrize(
+    ("states", "title", "played"),
+    [
+        ([False, True], "What the shield changes", "each start played without and with the shield"),
+        ([True], "Games with the shield", "played with the shield"),
+        ([False], "Games without the shield", "played without the shield"),
+    ],
+)
+def test_the_report_says_which_states_were_played(states, title, played, results, tmp_path):
+    results["settings"]["states"] = states
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert title in text
+    assert f"7 games, {played} ·" in text
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_the_small_version_is_called_so(quick, results, tmp_path):
+    results["quick"] = quick
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert ("small version (--quick)" in text) is quick
+
+
+def test_the_report_shows_what_it_was_given(results, tmp_path):
+    text = write_report(results, tmp_path / "deep" / "report.html").read_text()
+    hits, teammates, captures, closest, changed, reasons = plots_in(text)
+    for plot in (hits, teammates, captures):
+        assert (painted(plot, "off"), painted(plot, "on")) == (2, 2)
+    assert (painted(closest, "off"), painted(closest, "on")) == (3, 3)
+    assert "var(--mark)" in ElementTree.tostring(closest, encoding="unicode"), "the separation is marked"
+    assert (painted(changed, "off"), painted(changed, "on")) == (0, 2)
+    assert (painted(reasons, "on"), painted(reasons, "r1")) == (2, 2)
+    assert "#" not in "".join(re.findall(r"(?:fill|stroke): ?#\w+", text.split("</style>", 1)[1])), "colours follow"
+    for wanted in (
+        "9.00 [7.20, 10.8]",
+        "0.50 [0.40, 0.60]",
+        "aamas2024",
+        "3.11",
+        'href="replay.html"',
+        "separation 2.5 m",
+    ):
+        assert wanted in text
+    for verdict in ("good", "bad", "muted"):
+        assert f'<span class="verdict {verdict}">' in text
+    assert "<b>" not in text
+    assert "@@" not in text
+    assert "<script" not in text
+    assert "nan" not in text.lower().replace("-nan", "")
+
+
+def test_headlines_are_means_over_all_games(results, tmp_path):
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert '<span class="off">6.50</span>' in text  # (9 + 4) / 2, three games each
+    assert '<span class="on">0.38</span>' in text
+
+
+def test_the_report_is_small_however_many_games(results, tmp_path):
+    many = [game("medium vs easy", k, on, 1.5 + 1e-3 * k) for k in range(20_000) for on in (False, True)]
+    path = write_report({**results, "games": many}, tmp_path / "report.html")
+    assert path.stat().st_size < 5e6
+    assert "one of 34 shown" in path.read_text()
+    assert "39400 more in the table of games" in path.read_text()
+
+
+@pytest.mark.parametrize("reason", ["BACKUP", "ESCAPE", "HELD", "BEST_EFFORT"])
+def test_the_report_says_what_a_reason_means_beside_its_plot(reason, results, tmp_path):
+    results["pairings"][0]["reasons"][reason] = 5
+    text = write_report(results, tmp_path / "a.html").read_text(encoding="utf-8")
+    plot = text[text.index("Why commands were changed") :]
+    assert REASONS[reason.lower()] in plot[: plot.index("</figure>")]
+
+
+def test_only_shielded_games_are_a_report_too(results, tmp_path):
+    for entry in results["pairings"]:
+        entry["games_off"] = 0
+        for figures in entry["metrics"].values():
+            figures.pop("off", None)
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert painted(plots_in(text)[0], "off") == 0
+    assert 'class="arrow"' not in text
+
+
+def test_what_is_not_needed_may_be_left_out(results, tmp_path):
+    for name in ("goals", "replays", "machine", "something new"):
+        del results[name]
+    text = write_report(results, tmp_path / "report.html").read_text()
+    assert "verdict" not in text.split("</style>")[1]
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (("settings",), "lack settings;"),
+        (("games",), "lack games;"),
+        (("pairings", 1, "reasons"), r"lack pairings\[1\]\.reasons"),
+        (("pairings", 0, "metrics", "captures"), r"pairings\[0\]\.metrics\.captures"),
+        (("pairings", 0, "metrics", "breaches_opponent_2.5m"), r"metrics\.breaches_opponent_2\.5m"),
+        (("games", 2, "closest_m"), r"games\[2\]\.closest_m"),
+    ],
+)
+def test_what_is_missing_is_named(results, tmp_path, place, words):
+    broken = copy.deepcopy({name: value for name, value in results.items() if name != "something new"})
+    inside = broken
+    for key in place[:-1]:
+        inside = inside[key]
+    del inside[place[-1]]
+    with pytest.raises(ConfigError, match=rf"{words}.*pass what `steerclear ablate` writes"):
+        write_report(broken, tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_long_lists_of_what_is_missing_are_cut(results, tmp_path):
+    for row in results["games"]:
+        row.clear()
+    with pytest.raises(ConfigError, match="and 27 more;"):
+        write_report(results, tmp_path / "report.html")
+
+
+def test_nothing_to_report(results, tmp_path):
+    with pytest.raises(ConfigError, match="lack any pairing"):
+        write_report({**results, "pairings": []}, tmp_path / "report.html")
+
+
+def test_another_separation_needs_its_own_figures(results, tmp_path):
+    with pytest.raises(ConfigError, match=r"breaches_teammate_4\.0m"):
+        write_report({**results, "settings": {"shield": {"separation_m": 4.0}}}, tmp_path / "report.html")
+
+
+def test_plots_without_data_and_with_long_labels_are_still_plots():
+    figures = [plots.bars([], "m"), plots.dots([("a", [])], "m"), plots.shares([], "%")]
+    figures += [plots.bars([("a", [("on", {"value": None})])], "m"), plots.scatter([("<", [])], ("$x$", "y_{z}"))]
+    for figure in figures:
+        ElementTree.fromstring(plots.svg(figure, 'a "b" <c>'))
+    assert len(plots.label("x" * 80)) == plots.LABEL_LETTERS

@@ -1,0 +1,367 @@
+"""The runner: what is kept on disk, by whom, of which code; where jobs run; how a run ends and is gone on with."""
+
+import errno
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.experiments import provenance, result_files, runner, workers
+from steerclear.experiments.result_files import finite, write_json, write_table
+from steerclear.experiments.runner import Experiment, Interrupted, execute, job_id
+from steerclear.experiments.workers import JobFault, Ray, attempt, outcomes, processes_of, workers_of
+from steerclear.shield.exceptions import ConfigError, GameError
+
+
+def work(job):
+    """Importable by spawned workers; ``do`` says what a job does."""
+    do = job["do"]
+    if do == "bad":
+        raise GameError("a game setting is wrong; change it")
+    if do == "fault":
+        raise RuntimeError("went wrong")
+    if do == "die":
+        os._exit(3)
+    if do == "stop":
+        raise KeyboardInterrupt
+    if do == "wait":
+        time.sleep(600.0)
+    if do == "slow":
+        time.sleep(0.3)
+    return [{"number": job["number"], "square": job["number"] ** 2, "process": os.getpid(), "empty": None}]
+
+
+def jobs(*does):
+    return [{"do": do, "number": number} for number, do in enumerate(does)]
+
+
+def experiment(*does, command="test"):
+    return Experiment(command, {"does": list(does)}, jobs(*does), work)
+
+
+def test_every_job_gives_its_rows_in_order_and_a_table(tmp_path):
+    noticed = []
+    run = execute(experiment("", "", ""), tmp_path / "deep" / "out", notice=lambda done, of: noticed.append((done, of)))
+    assert [row["square"] for row in run.rows] == [0, 1, 4] == list(run.table["square"])
+    assert noticed == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert (run.finished, run.resumed, run.failed, run.interrupted) == (3, 0, [], False)
+    head = json.loads((run.folder / "experiment.json").read_text())
+    assert (head["command"], head["settings"], head["jobs"]) == ("test", {"does": ["", "", ""]}, 3)
+    assert (run.folder / result_files.table_name()).stat().st_size > 0
+    assert run.head()["complete"]
+    run.end()
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_job_that_fails_stops_no_other_and_ends_the_command(tmp_path, processes):
+    run = execute(experiment("", "bad", "fault", ""), tmp_path, processes)
+    assert [row["number"] for row in run.rows] == [0, 3]
+    words = {failure["number"]: (failure["error"], failure["fault"]) for failure in run.failed}
+    assert words[1] == ("a game setting is wrong; change it", False)
+    assert "a fault of steerclear, not of yours (RuntimeError: went wrong)" in words[2][0]
+    trace = Path(re.search(r"its traceback is in (.*): please report it", words[2][0])[1]).read_text()
+    assert 'raise RuntimeError("went wrong")' in trace
+    assert not run.head()["complete"]
+    with pytest.raises(JobFault, match="2 games could not be played"):
+        run.end()
+    with pytest.raises(ConfigError, match=r"1 games could not be played.*put that right, then add --resume"):
+        execute(experiment("bad"), tmp_path / "other").end()
+
+
+def test_a_job_that_kills_its_worker_costs_no_other_job(tmp_path):
+    run = execute(experiment("", "die", "slow", "slow", ""), tmp_path, 2)
+    assert [row["number"] for row in run.rows] == [0, 2, 3, 4]
+    assert os.getpid() not in {row["process"] for row in run.rows}
+    assert [(failure["number"], failure["fault"]) for failure in run.failed] == [(1, False)]
+    assert "--resume" in run.failed[0]["error"]
+
+
+def test_an_interrupted_run_is_gone_on_with(tmp_path, caplog):
+    stopped = execute(experiment("", "", "stop", ""), tmp_path)
+    assert (stopped.interrupted, stopped.finished) == (True, 2)
+    with pytest.raises(Interrupted, match=r"2 of 4 games kept in .*rows\.jsonl; the same command .* --resume"):
+        stopped.end()
+    with pytest.raises(ConfigError, match="already holds results; add --resume"):
+        execute(experiment("", "", "", ""), tmp_path)
+    whole = execute(experiment("", "", "", ""), tmp_path, resume=True)
+    assert "2 of 4 games are in" in caplog.text
+    assert (whole.resumed, whole.finished, whole.interrupted) == (2, 4, False)
+    assert [row["number"] for row in whole.rows] == [0, 1, 2, 3]
+
+
+def test_jobs_of_other_settings_stay_and_count_for_nothing(tmp_path, caplog):
+    execute(experiment("", ""), tmp_path)
+    other = execute(experiment("slow"), tmp_path, resume=True)
+    assert (other.resumed, len(other.rows)) == (0, 1)
+    assert "0 of 1 games are in" in caplog.text
+    assert "2 there are of other settings" in caplog.text
+    more = execute(experiment("", "", ""), tmp_path, resume=True)
+    assert (more.resumed, len(more.rows)) == (2, 3)
+
+
+def lines_of(folder):
+    return folder / "rows.jsonl"
+
+
+@pytest.mark.parametrize("cut", [1, 30])
+def test_a_line_cut_by_a_kill_is_run_again_and_the_next_one_is_not_lost(tmp_path, cut):
+    execute(experiment("", ""), tmp_path)
+    lines_of(tmp_path).write_bytes(lines_of(tmp_path).read_bytes()[:-cut])
+    again = execute(experiment("", "", ""), tmp_path, resume=True)
+    assert [row["number"] for row in again.rows] == [0, 1, 2]
+    assert again.resumed == (2 if cut == 1 else 1), "a whole last line without its end counts"
+    assert len(runner.read_rows(lines_of(tmp_path))) == 3
+
+
+@pytest.mark.parametrize(
+    "line", ["3", "null", "[]", "{}", '{"job": 3}', '{"job": "a", "rows": []}', "[" * 100_000, "9" * 5000, "NaN"]
+)
+def test_a_line_of_a_wrong_form_is_left_out_by_name_and_nothing_is_lost(tmp_path, caplog, line):
+    execute(experiment(""), tmp_path)
+    with lines_of(tmp_path).open("a") as file:
+        file.write(line + "\n")
+    assert len(runner.read_rows(lines_of(tmp_path))) == 1
+    assert "line 2 is not complete, or not as it was written" in caplog.text
+
+
+def test_a_line_that_was_altered_does_not_count(tmp_path):
+    execute(experiment("", ""), tmp_path)
+    text = lines_of(tmp_path).read_text().replace('"square": 1', '"square": 2')
+    lines_of(tmp_path).write_text(text)
+    assert [rows[0]["number"] for rows in runner.read_rows(lines_of(tmp_path)).values()] == [0]
+
+
+def test_rows_of_other_code_are_left_out_told_and_kept(tmp_path, monkeypatch, caplog):
+    execute(experiment("", ""), tmp_path)
+    monkeypatch.setattr(runner, "code_digest", lambda: "newer")
+    again = execute(experiment("", ""), tmp_path, resume=True)
+    assert again.resumed == 0
+    assert "2 results are of other code or versions" in caplog.text
+    assert len(lines_of(tmp_path).read_text().splitlines()) == 4
+
+
+def test_a_folder_of_something_else_is_refused_and_left_as_it_was(tmp_path):
+    (tmp_path / "results.json").write_text('{"my": "results"}')
+    for resume, words in ((False, "already holds results"), (True, "holds results of 'unknown', not of 'test'")):
+        with pytest.raises(ConfigError, match=words):
+            execute(experiment(""), tmp_path, resume=resume)
+    (tmp_path / "results.json").write_text('{"command": "ablate"}')
+    with pytest.raises(ConfigError, match="holds results of 'ablate', not of 'test'; choose another --out"):
+        execute(experiment(""), tmp_path, resume=True)
+    assert os.listdir(tmp_path) == ["results.json"]
+    (tmp_path / "results.json").unlink()
+    (tmp_path / "report.html").touch()
+    with pytest.raises(ConfigError, match=r"report\.html would be written over"):
+        execute(experiment(""), tmp_path)
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_results_of_an_earlier_version_are_refused_by_its_name(tmp_path, resume):
+    (tmp_path / "games.jsonl").write_text("{}\n")
+    (tmp_path / "results.json").write_text('{"command": "test", "versions": {"steerclear": "0.7.3"}}')
+    with pytest.raises(ConfigError, match=r"steerclear 0\.7\.3, which this version reads \(compare, docs\)"):
+        execute(experiment(""), tmp_path, resume=resume)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX files")
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_what_is_no_plain_file_is_refused_at_once(tmp_path, make):
+    make(tmp_path / "rows.jsonl")
+    with pytest.raises(ConfigError, match="is no plain file; move it away or choose another --out"):
+        execute(experiment(""), tmp_path, resume=True)
+
+
+def test_a_folder_that_cannot_be_written_to_is_one_clear_error(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ConfigError, match="choose another --out"):
+        execute(experiment(""), tmp_path / "file" / "out")
+    (tmp_path / "rows.jsonl").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match=r"cannot read .*rows.jsonl .*is no text.*move it away"):
+        execute(experiment(""), tmp_path, resume=True)
+
+
+def test_a_full_disk_keeps_what_is_there(tmp_path, monkeypatch):
+    execute(experiment(""), tmp_path)
+    before = lines_of(tmp_path).read_bytes()
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(runner.os, "fsync", full)
+    with pytest.raises(ConfigError, match="what it holds is kept: make room, then --resume"):
+        execute(experiment("", ""), tmp_path, resume=True)
+    assert lines_of(tmp_path).read_bytes() == before
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from steerclear.experiments.runner import execute
+from steerclear.experiments.workers import interrupted_by_sigterm
+from steerclear.shield.exceptions import ConfigError
+from test_runner import experiment
+if __name__ == "__main__":
+    try:
+        with interrupted_by_sigterm():
+            tell = lambda done, of: done and print("ready", flush=True)
+            run = execute(experiment("", "wait", "wait"), Path(sys.argv[1]), 2, notice=tell)
+        print(run.rows[0]["process"], flush=True)
+        sys.exit(130 if run.interrupted else 0)
+    except ConfigError as error:
+        sys.exit(str(error))
+"""
+
+
+def start(folder):
+    script = folder.parent / "run.py"
+    script.write_text(textwrap.dedent(SCRIPT))
+    env = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.abspath(__file__))}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen([sys.executable, str(script), str(folder)], env=env, text=True, **streams)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends POSIX signals")
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 130), (signal.SIGKILL, -9)])
+def test_however_a_run_ends_rows_are_kept_the_lock_is_free_and_no_worker_is_left(tmp_path, number, status):
+    folder = tmp_path / "out"
+    run = start(folder)
+    try:
+        assert run.stdout.readline() == "ready\n"
+        with pytest.raises(ConfigError, match="is being written to by another process; wait until it is done"):
+            execute(experiment(""), folder, resume=True)
+        worker = int(next(iter(runner.read_rows(lines_of(folder)).values()))[0]["process"])
+        run.send_signal(number)
+        assert run.wait(60) == status
+        end_s = time.monotonic() + 30.0
+        while is_running(worker):
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+    finally:
+        run.kill()
+        run.communicate()
+    again = execute(experiment("", "", ""), folder, resume=True)
+    assert (again.resumed, again.finished) == (1, 3)
+
+
+def is_running(pid):
+    try:
+        os.kill(pid, 0)
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+
+
+def lack(job):
+    raise OSError(28, "No space left on device", "/a") if job else MemoryError
+
+
+@pytest.mark.parametrize(("job", "words"), [(0, "not enough memory"), (1, "free some space")])
+def test_what_the_machine_refuses_a_job_is_no_fault(job, words):
+    outcome = attempt(lack, job)
+    assert words in outcome.error
+    assert outcome.why == {"error": outcome.error, "fault": False}
+
+
+def test_a_job_is_known_by_its_content_and_not_by_its_order():
+    assert job_id({"a": 1, "b": [2]}) == job_id({"b": [2], "a": 1})
+    assert job_id({"a": 1}) != job_id({"a": 2})
+
+
+def test_json_has_no_numbers_that_other_readers_refuse(tmp_path):
+    write_json(tmp_path / "sub" / "x.json", {"a": [float("nan"), np.inf, np.int64(3)], "p": tmp_path})
+    assert json.loads((tmp_path / "sub" / "x.json").read_text()) == {"a": [None, None, 3], "p": str(tmp_path)}
+    assert finite({"a": (1.0, float("-inf"))}) == {"a": [1.0, None]}
+    with pytest.raises(TypeError, match="set"):
+        write_json(tmp_path / "x.json", {"a": {1}})
+    with pytest.raises(ConfigError, match="choose another place"):
+        write_json(tmp_path / "sub" / "x.json" / "y.json", {})
+
+
+def test_rows_with_different_columns_make_one_table(tmp_path, monkeypatch):
+    rows = [{"a": 1, "b": "x", "d": True}, {"a": 2, "c": 0.5}]
+    monkeypatch.setattr(result_files, "find_spec", lambda name: None)
+    assert write_table(tmp_path, rows).read_text().splitlines() == ["a,b,d,c", "1,x,True,", "2,,,0.5"]
+
+
+def test_the_digest_of_the_code_changes_with_sources_tables_and_versions(tmp_path, monkeypatch):
+    def write(name, text):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+
+    made = ("shield/a.py", "env/b.py", "policies/c.py", "experiments/runner.py", "shield/tables/d.npz")
+    for name in made:
+        write(name, "1")
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "experiments" / "provenance.py"))
+    digest = provenance.code_digest.__wrapped__
+    seen = [digest()]
+    for name in (*made, "shield/platforms/shipped/heron.yaml", "experiments/deploy/worker.py"):
+        write(name, "2")
+        seen.append(digest())
+    assert len(set(seen)) == 8
+    for name in ("experiments/commands/words.py", "experiments/report.py", "shield/bridge/loop.py"):
+        write(name, "3")
+        assert digest() == seen[-1], "what only shows results changes none"
+    monkeypatch.setattr(provenance, "versions", lambda: {"numpy": "0"})
+    assert digest() != seen[-1]
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (("slurm", None, None), "unknown engine 'slurm'; choose one of pool, ray"),
+        (("pool", "auto", None), "--address is of a Ray cluster; add --engine ray"),
+        (("ray", "auto", 3), "leave out --jobs, or --address"),
+        (("pool", None, 0), "--jobs must be at least 1"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(given, text):
+    with pytest.raises(ConfigError, match=text):
+        workers_of(*given)
+
+
+def test_number_of_processes_and_the_extra_of_clusters(monkeypatch):
+    assert processes_of(None) == provenance.available_cores() >= 1
+    assert processes_of(3) == workers_of("pool", None, 3) == 3
+    monkeypatch.setattr(workers, "find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match=r"steerclear\[cluster\]|\.\[cluster\]"):
+        workers_of("ray", None, 2)
+
+
+@pytest.mark.study
+@pytest.mark.filterwarnings("default")
+def test_ray_here_gives_what_the_pool_gives(monkeypatch):
+    pytest.importorskip("ray")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))  # its workers import what a job calls
+    asked = jobs("", "bad", "", "")
+    found = {o.job["number"]: (o.error, o.answer and o.answer[0]["square"]) for o in outcomes(work, asked, Ray(2))}
+    here = {o.job["number"]: (o.error, o.answer and o.answer[0]["square"]) for o in outcomes(work, asked, 2)}
+    assert found == here
+
+
+@pytest.mark.study
+@pytest.mark.filterwarnings("default")
+def test_a_node_killed_in_the_middle_costs_no_job(monkeypatch):
+    pytest.importorskip("ray")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    other = cluster.add_node(num_cpus=1)
+    try:
+        answers = []
+        for outcome in outcomes(work, jobs(*["slow"] * 12), Ray(address=cluster.address)):
+            answers.append(outcome)
+            if len(answers) == 3:
+                cluster.remove_node(other, allow_graceful=False)
+        assert sorted(outcome.job["number"] for outcome in answers) == list(range(12))
+        assert all(outcome.error is None for outcome in answers)
+    finally:
+        cluster.shutdown()

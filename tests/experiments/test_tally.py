@@ -1,0 +1,143 @@
+import json
+
+import numpy as np
+import pytest
+from steerclear.env.config import GameConfig
+from steerclear.env.record import make_record
+from steerclear.env.record_meta import meta_of
+from steerclear.experiments.game_metrics import check_penalty, reason_counts, scores, tally
+from steerclear.shield.exceptions import ConfigError
+
+REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
+
+
+def record_of(position, shielded=True, **arrays):
+    """A record of two boats per team whose track is given; nothing else happens in it."""
+    position = np.asarray(position, dtype=float)
+    steps = len(position) - 1
+    config = GameConfig.preset("aamas2024", team_size=2)
+    meta = meta_of(config, reason_names=REASONS, shielded=["agent_0", "agent_1"] if shielded else [])
+    still = {name: np.zeros((steps + 1, 4)) for name in ("heading_deg", "speed_mps", "has_flag", "is_tagged", "oob")}
+    reason = np.full((steps, 4), 6)
+    if shielded:
+        reason[:, :2] = 0
+    base = {
+        "position": position,
+        **still,
+        "flag_position": np.zeros((steps + 1, 2, 2)),
+        "captures": np.zeros((steps + 1, 2)),
+        "wanted": np.zeros((steps, 4, 2)),
+        "sent": np.zeros((steps, 4, 2)),
+        "reason": reason,
+        "intervened": np.zeros((steps, 4)),
+        "certificate_m": np.full((steps, 4), np.nan),
+        "breaches": np.zeros((0, 4)),
+    }
+    return make_record(meta, **{**base, **arrays})
+
+
+@pytest.fixture
+def crossing():
+    """Boats 0 and 1 (blue) touch once; boat 2 (red) passes boat 0 at 3 m; boat 3 stays far away."""
+    track = np.zeros((5, 4, 2))
+    track[:, 1] = [[9, 0], [2, 0], [9, 0], [9, 0], [9, 0]]
+    track[:, 2] = [[0, 30], [0, 30], [0, 3], [0, 30], [0, 30]]
+    track[:, 3] = [70, 30]
+    return track
+
+
+def test_breaches_are_split_by_team_and_radius(crossing):
+    counts = tally(record_of(crossing), 0)
+    assert counts["breaches_teammate_2.5m"] == 1
+    assert counts["breaches_teammate_4.0m"] == 1
+    assert counts["breaches_opponent_2.5m"] == 0
+    assert counts["breaches_opponent_4.0m"] == 1
+    assert counts["closest_teammate_m"] == counts["closest_m"] == 2.0
+    assert counts["closest_opponent_m"] == 3.0
+
+
+def test_the_score_counts_a_collision_for_each_boat_in_it(crossing):
+    assert tally(record_of(crossing), 0)["collisions"] == 2  # two of ours: the game's radius is 2.5 m
+    assert tally(record_of(crossing), 1)["collisions"] == 0
+    crossing[2, 2] = [0, 2]
+    assert tally(record_of(crossing), 0)["collisions"] == 3
+    assert tally(record_of(crossing), 1)["collisions"] == 1
+
+
+def test_other_radii_get_columns_of_their_own(crossing):
+    counts = tally(record_of(crossing), 0, (1.0, 3.25))
+    assert counts["breaches_teammate_1.0m"] == 0
+    assert counts["breaches_opponent_3.25m"] == 1
+    assert "breaches_opponent_4.0m" not in counts
+
+
+def test_changes_are_counted_per_boat_and_step_over_covered_ones(crossing):
+    wanted, sent = np.zeros((4, 4, 2)), np.zeros((4, 4, 2))
+    intervened = np.zeros((4, 4))
+    wanted[1, 0], sent[1, 0], intervened[1, 0] = [2.0, 170.0], [1.5, -170.0], 1
+    wanted[2, 1], sent[2, 1], intervened[2, 1] = [1.0, 0.0], [2.0, -40.0], 1
+    counts = tally(record_of(crossing, wanted=wanted, sent=sent, intervened=intervened), 0)
+    assert counts["covered_steps"] == 8
+    assert counts["changed_steps"] == 2
+    assert counts["changed_share"] == pytest.approx(0.25)
+    assert counts["mean_heading_change_deg"] == pytest.approx((20.0 + 40.0) / 2)
+    assert counts["mean_speed_change_mps"] == pytest.approx((0.5 + 1.0) / 2)
+
+
+def test_without_a_shield_there_is_nothing_to_say_about_it(crossing):
+    counts = tally(record_of(crossing, shielded=False), 0)
+    assert counts["covered_steps"] == counts["changed_steps"] == 0
+    assert counts["changed_share"] is None
+    assert counts["mean_heading_change_deg"] is None
+
+
+def test_reversals_are_per_boat_and_minute(crossing):
+    sent = np.zeros((4, 4, 2))
+    sent[:, 0, 1] = [30, -30, 30, 30]
+    counts = tally(record_of(crossing, sent=sent), 0)
+    assert counts["reversals_per_boat_minute"] == pytest.approx(2 / (2 * 4 * 0.1 / 60))
+
+
+def test_deadlocks_are_those_of_the_own_team(crossing):
+    record = record_of(np.repeat(crossing[:1], 102, axis=0))
+    record["wanted"][..., 0], record["speed_mps"][:] = 1.0, 0.1
+    assert tally(record, 0)["deadlocks"] == tally(record, 1)["deadlocks"] == 1
+    record["speed_mps"][50, 0] = 1.0
+    assert (tally(record, 0)["deadlocks"], tally(record, 1)["deadlocks"]) == (0, 1)
+
+
+def test_reasons_are_counted_for_covered_boats_only(crossing):
+    reason = np.full((4, 4), 6)
+    reason[:, 0], reason[:, 1] = [0, 0, 1, 3], 0
+    counts = reason_counts(record_of(crossing, reason=reason), 0)
+    assert (counts["PASSED"], counts["QP"], counts["BACKUP"], counts["HELD"]) == (6, 1, 1, 0)
+    assert "NOT_COVERED" not in counts
+    assert reason_counts(record_of(crossing, shielded=False), 0)["PASSED"] == 0
+
+
+def test_a_single_boat_has_no_team_mate_to_be_close_to():
+    config = GameConfig.preset("aamas2024", team_size=1)
+    record = record_of(np.zeros((3, 4, 2)))
+    alone = {name: array[:, :2] if array.ndim > 1 and array.shape[1] == 4 else array for name, array in record.items()}
+    alone["flag_position"], alone["breaches"] = record["flag_position"], record["breaches"]
+    alone["meta"] = np.array(json.dumps(json.loads(str(make_meta(config)))))
+    counts = tally(alone, 0)
+    assert counts["closest_teammate_m"] is None
+    assert counts["closest_m"] == counts["closest_opponent_m"] == 0.0
+
+
+def make_meta(config):
+    arrays = {"meta": meta_of(config, reason_names=REASONS)}
+    return json.dumps(arrays["meta"], default=lambda value: np.asarray(value).tolist())
+
+
+def test_scores():
+    counts = {"captures": 3, "captures_against": 1, "grabs": 5, "grabs_against": 2, "tags": 4, "tags_against": 6}
+    assert scores({**counts, "collisions": 4}, 0.25) == {"primary": 1.0, "secondary": 1.0}
+    assert scores({**counts, "collisions": 4}, 0.0)["primary"] == 2.0
+
+
+@pytest.mark.parametrize("penalty", [-0.1, float("nan"), float("inf")])
+def test_a_penalty_is_a_number_from_zero_on(penalty):
+    with pytest.raises(ConfigError, match="--penalty must be"):
+        check_penalty(penalty)

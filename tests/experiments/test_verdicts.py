@@ -1,0 +1,230 @@
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steerclear.experiments.ablation import AblationSettings, results_of, write_results
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import GAME_ROW, RESULTS, undocumented
+from steerclear.experiments.oracle import Outcome, Verdict
+from steerclear.experiments.play.match import Match, play_match
+from steerclear.experiments.play.spec import MatchSpec
+from steerclear.experiments.runner import execute
+from steerclear.experiments.verdicts import (
+    NOT_JUDGED,
+    StateLog,
+    all_breaches,
+    helpless,
+    judge_game,
+    summarise_verdicts,
+    verdict_columns,
+    verdict_rows,
+)
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import get_platform
+
+RULES = {"max_time_s": 60.0}
+
+
+def spec_of(**settings):
+    return MatchSpec("aamas2024", "medium", "medium", **{"rules": RULES, "judge": "all", "seed": 1, **settings})
+
+
+@pytest.fixture(scope="module")
+def judged():
+    """A game of wild boats without a shield, every breach judged."""
+    return play_match(spec_of(radii_m=(2.5, 4.0)))
+
+
+def test_every_breach_of_the_own_team_has_a_verdict(judged):
+    row, record = judged.row, judged.record
+    own = [breach for breach in record["breaches"] if min(breach[1:3]) < 3]
+    assert len(row["breaches"]) == len(own) > 0
+    for entry, breach in zip(row["breaches"], own, strict=True):
+        assert (entry["step"], entry["closest_m"]) == (breach[0], breach[3])
+        assert entry["boats"] == [f"agent_{int(boat)}" for boat in breach[1:3]]
+        assert entry["kind"] == ("teammate" if max(breach[1:3]) < 3 else "opponent")
+        assert entry["verdict"] in ("avoidable", "unavoidable", "started_inside")
+        assert (entry["last_preventable_s"] is None) == (entry["verdict"] != "avoidable")
+        assert set(entry["responsible_boats"]) <= set(entry["boats"])
+    assert undocumented(row, GAME_ROW) == []
+
+
+def test_columns_add_up_to_the_breaches(judged):
+    row = judged.row
+    for kind in ("teammate", "opponent"):
+        counts = [
+            row[f"{verdict}_{kind}_2.5m"] for verdict in ("avoidable", "unavoidable", "started_inside", NOT_JUDGED)
+        ]
+        assert sum(counts) == row[f"breaches_{kind}_2.5m"]
+    assert sum(row[f"breaches_{kind}_2.5m"] for kind in ("teammate", "opponent")) > 0
+
+
+@pytest.mark.parametrize(
+    ("judge", "shield", "expected"),
+    [("none", {}, None), ("shielded", None, None), ("shielded", {}, []), ("all", None, []), ("none", None, None)],
+)
+def test_whose_breaches_are_judged(judge, shield, expected):
+    row = play_match(spec_of(judge=judge, shield=shield, rules={"max_time_s": 1.0}, fixed_start=True)).row
+    assert row["breaches"] == expected
+    assert row["avoidable_opponent_2.5m"] == (None if expected is None else 0)
+
+
+def test_judging_changes_nothing_in_the_game(judged):
+    plain = play_match(spec_of(judge="none"))
+    np.testing.assert_array_equal(plain.record["position"], judged.record["position"])
+
+
+def test_an_unknown_choice_is_refused():
+    with pytest.raises(ConfigError, match="choose one of all, shielded, none"):
+        spec_of(judge="some")
+
+
+def test_the_log_keeps_the_states_the_record_shows():
+    match = Match(spec_of(rules={"max_time_s": 3.0}))
+    record = match.play().record
+    match.close()
+    np.testing.assert_array_equal(match._log.states[:, :, :2], record["position"])
+    assert match._log.driven.shape == record["reason"].shape
+
+
+class FakeCore:
+    """One moment of a game."""
+
+    def __init__(self, state, driven):
+        self.state, self.driven, self.is_disabled = state[None], driven[None], np.zeros_like(driven)[None]
+
+
+def head_on(game_meta, driven=False):
+    """Boats 0 and 2 meet head-on at full speed; boats 1 and 3 lie far away."""
+    state = np.zeros((4, 11))
+    state[:, :2] = [[0, 0], [50, 50], [0, 30], [50, 90]]
+    state[2, 2] = 180.0
+    state[[0, 2], 3:5] = 2.0, 100.0
+    log, position = StateLog(), []
+    for k in range(90):
+        moved = state.copy()
+        moved[0, 1], moved[2, 1] = 0.2 * k, 30.0 - 0.2 * k
+        core = FakeCore(moved, np.full(4, driven))
+        log.step(core) if k else log.start(core)
+        position.append(moved[:, :2])
+    first = int(np.flatnonzero(np.abs(30.0 - 0.4 * np.arange(90)) <= 2.5)[0])
+    meta = {**game_meta, "separation_m": 2.5, "team": [0, 0, 1, 1], "dt_s": 0.1}
+    record = {"meta": np.array(json.dumps(meta)), "breaches": np.array([[first, 0.0, 2.0, 0.0]])}
+    return log, np.array([get_platform("heron").pack()] * 4), record
+
+
+def test_a_made_up_meeting_is_judged_as_seen_by_the_team(game_meta):
+    log, params, record = head_on(game_meta)
+    entry = judge_game(log, params, record, side=0)[0]
+    assert (entry["verdict"], entry["kind"], entry["responsible"]) == ("avoidable", "opponent", "both")
+    assert entry["last_preventable_s"] == pytest.approx(entry["other_last_preventable_s"], abs=0.11)
+    assert entry["responsible_boats"] == entry["boats"] == ["agent_0", "agent_2"]
+
+
+def test_what_the_game_drove_is_the_games(game_meta):
+    log, params, record = head_on(game_meta, driven=True)
+    assert judge_game(log, params, record, side=1)[0]["responsible"] == "game"
+
+
+def test_beyond_the_most_breaches_nothing_is_judged(game_meta, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.verdicts.MOST_JUDGED", 0)
+    log, params, record = head_on(game_meta)
+    entry = judge_game(log, params, record, side=0)[0]
+    assert (entry["verdict"], entry["responsible"], entry["last_preventable_s"]) == (NOT_JUDGED, None, None)
+    assert entry["closest_m"] == 0.0
+
+
+def breach(kind, verdict, responsible="own"):
+    return {"kind": kind, "verdict": verdict, "responsible": responsible}
+
+
+def test_counts_per_kind():
+    found = [breach("teammate", "avoidable"), breach("opponent", "unavoidable"), breach("opponent", "avoidable")]
+    columns = verdict_columns(found, 2.5)
+    assert {name: count for name, count in columns.items() if count} == {
+        "avoidable": 2, "avoidable_teammate_2.5m": 1, "unavoidable_opponent_2.5m": 1, "avoidable_opponent_2.5m": 1,
+    }  # fmt: skip
+    assert set(verdict_columns(None, 4.0).values()) == {None}
+    assert "avoidable_opponent_4.0m" in verdict_columns(None, 4.0)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A small ablation."""
+    settings = AblationSettings(opponents=("easy",), games=1, rules={"max_time_s": 3.0}, judge="all")
+    folder = tmp_path_factory.mktemp("judged")
+    return settings, execute(settings.experiment("ablate"), folder)
+
+
+def with_verdicts(rows, count):
+    """Give every game so many avoidable breaches."""
+    entry = {
+        **breach("opponent", "avoidable"), "step": 9, "time_s": 0.9, "boats": ["agent_0", "agent_3"], "radius_m": 2.5,
+        "closest_m": 1.5, "last_preventable_s": 1.25, "other_last_preventable_s": None, "exhausted": True,
+        "responsible_boats": ["agent_0"],
+    }  # fmt: skip
+    return [{**row, "breaches": [entry] * count, "avoidable": count} for row in rows]
+
+
+def test_verdicts_reach_results_tables_and_report(stored, tmp_path):
+    settings, played = stored
+    run = replace(played, rows=with_verdicts(played.rows, 2), folder=tmp_path)
+    write_results(run, results_of(run, settings))
+    content = json.loads((tmp_path / "results.json").read_text())
+    assert undocumented(content, RESULTS) == []
+    part = content["pairings"][0]["verdicts"]["on"]
+    assert (part["games_judged"], part["opponent"]["avoidable"], part["teammate"]["avoidable"]) == (1, 2, 0)
+    assert part["opponent"]["responsible"]["own"] == 2
+    assert len(content["breaches"]) == 4
+    assert [goal["met"] for goal in content["goals"] if "avoidable" in goal["name"]] == [False]
+    page = (tmp_path / "report.html").read_text()
+    assert "agent_0, agent_3" in page
+    assert "own (agent_0)" in page
+    write_pages([content], tmp_path / "docs")
+    text = (tmp_path / "docs/ablation_aamas2024.md").read_text()
+    assert "| opponent, on | 2 | 2 | 0 | 0 | 0 | 2.00 [0.24, 7.22] |" in text
+
+
+def test_games_that_nobody_judged_tell_no_verdicts(stored, tmp_path):
+    settings, played = stored
+    run = replace(played, rows=[{**row, "breaches": None, "avoidable": None} for row in played.rows], folder=tmp_path)
+    results = results_of(run, settings)
+    assert verdict_rows(results["pairings"][0]["verdicts"], str) == []
+    assert all("avoidable" not in goal["name"] for goal in results["goals"])
+    assert all_breaches(run.rows) == []
+    write_results(run, results)
+    assert "Not judged" in (tmp_path / "report.html").read_text()
+
+
+def test_the_longest_list_is_cut(monkeypatch, stored, tmp_path):
+    monkeypatch.setattr("steerclear.experiments.report.MOST_BREACHES", 1)
+    settings, played = stored
+    rows = [{**row, "pairing": "a vs <b>"} for row in with_verdicts(played.rows, 3)]
+    run = replace(played, rows=rows, folder=tmp_path)
+    write_results(run, results_of(run, settings))
+    text = (tmp_path / "report.html").read_text()
+    assert text.count("a vs &lt;b&gt;, 0") == 1
+    assert "5 more in results.json" in text
+
+
+def test_games_of_one_kind_only_have_one_kind_of_line(stored):
+    verdicts = summarise_verdicts([row for row in with_verdicts(stored[1].rows, 1) if row["shielded"]])
+    assert [line[0] for line in verdict_rows(verdicts, str)] == ["team-mate, on", "opponent, on"]
+    assert math.isclose(verdicts["on"]["opponent"]["avoidable_per_game"]["value"], 1.0)
+    assert verdicts["off"]["games"] == 0
+
+
+@pytest.mark.parametrize(
+    ("begins", "expected"), [(0, True), (5, True), (6, False), (None, False)], ids=["all", "in time", "late", "untold"]
+)
+def test_a_boat_that_was_disabled_when_it_had_to_act_could_not(begins, expected):
+    facts = {"own": 1, "other": 0, "step": 9, "radius_m": 4.0, "looked_back_s": 0.9, "end_step": 9}
+    facts |= {"plan": None, "exhausted": True, "searches": 1, "last_preventable_s": 0.4}
+    verdict = Verdict(**facts, outcome=Outcome.AVOIDABLE, last_step=5)
+    disabled = None
+    if begins is not None:
+        disabled = np.zeros((12, 2), np.bool_)
+        disabled[begins:, 1] = True
+    assert helpless(verdict, disabled) is expected
