@@ -28,6 +28,8 @@ from .workers import Row, Workers, outcomes
 
 STATES = {False: "off", True: "on", DIFFERENCE: DIFFERENCE}
 """What the states of the shield, and their difference, are called in results."""
+RETIRED = ("qp_relaxed", "escape")
+"""Reasons that only rows of earlier versions name."""
 TIMED = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
 """Columns that differ when a game is played again."""
 
@@ -183,7 +185,8 @@ def _states(lines: pd.DataFrame, key: str) -> dict[str, Any]:
 
 def _reasons(games: pd.DataFrame) -> dict[str, int]:
     totals = games[[name for name in games if name.startswith("reason_")]].sum()
-    return {name.removeprefix("reason_"): int(count) for name, count in totals.items()}
+    counts = {name.removeprefix("reason_"): int(count) for name, count in totals.items()}
+    return {name: count for name, count in counts.items() if count or name.lower() not in RETIRED}
 
 
 def _policy_files(rows: Sequence[Row]) -> dict[str, str]:
@@ -240,10 +243,15 @@ def replay_of(
 
 
 def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row] | None:
-    """Choose the pair of games, off and on, with the most breaches when unshielded; None without a pair."""
+    """Choose the pair of games, off and on, with the most breaches when unshielded; None without a pair.
+
+    Of those with the own team in blue, where there are any.
+    """
     pairs = pairs_of(table)
     if pairs.empty:
         return None
+    blue = pairs["side_on"] == "blue"  # the replay opens on a game whose shielded team is blue
+    pairs = pairs[blue] if blue.any() else pairs
     hits = sum(pairs[breach_column(kind, separation_m) + "_off"] for kind in ("teammate", "opponent"))
     chosen = pairs.iloc[int(hits.to_numpy().argmax())]
     rows = table.to_dict("records")
