@@ -182,7 +182,7 @@ def test_a_team_that_examines_others_too_is_scored_by_its_own_games_alone(tmp_pa
 
     monkeypatch.setattr(played, "play_game", played_game)
     chosen = settings(teams=("ohto", "meo", "medium", "easy"), qualifying=True, finalists=2)
-    run = Tournament(chosen, ResultStore(tmp_path / "run"))
+    run = Tournament(chosen, tmp_path / "run", False)
     run.run()
     table = {line["team"]: line for line in _qualifying(run.rows(), chosen)}
     assert {line["games"] for line in table.values()} == {10}
