@@ -210,9 +210,10 @@ def _radii_m(first: PlayedRun, second: PlayedRun) -> tuple[float, ...]:
 def _figures(lines: pd.DataFrame, metrics: Sequence[Metric]) -> dict[str, Any]:
     """Per metric its label, both figures over the pairs, and the paired difference."""
     found = {}
+    none = {"value": float("nan"), "low": float("nan"), "high": float("nan"), "n": 0}
     for metric in metrics:
-        chosen = lines[lines["metric"] == metric.key].set_index("run")[["value", "low", "high", "n"]]
-        if {"first", "second", DIFFERENCE} <= set(chosen.index) and chosen["value"][["first", "second"]].notna().any():
-            parts = {part: chosen.loc[part].to_dict() for part in ("first", "second", DIFFERENCE)}
-            found[metric.key] = {"label": metric.label, **{k: {**v, "n": int(v["n"])} for k, v in parts.items()}}
+        chosen = lines[lines["metric"] == metric.key].set_index("run")[["value", "low", "high", "n"]].to_dict("index")
+        parts = {part: chosen.get(part, none) for part in ("first", "second", DIFFERENCE)}
+        if any(parts[part]["value"] == parts[part]["value"] for part in ("first", "second")):
+            found[metric.key] = {"label": metric.label, **parts}
     return found
