@@ -30,6 +30,8 @@ COLOURS = {
 """By name of the variable in ``report.css`` (its light page's values)."""
 SERIES = ("on", "r1", "r2", "mark", "r4", "r5")
 """Colours of parts and curves, in turn."""
+HUES = tuple(f"tab:{name}" for name in ("blue", "orange", "green", "red", "purple", "brown", "pink", "olive", "cyan"))
+"""Colours of names in a scatter, in turn."""
 LABEL_LETTERS = 22
 MOST_DOTS = 600
 Labelled = Sequence[tuple[str, Sequence[tuple[str, Mapping[str, Any]]]]]
@@ -242,7 +244,7 @@ def scatter(
     down = math.ceil(len(panels) / across)
     canvas, axes = _canvas(3.4 * down + 0.4, across, 4.2 * across, down)
     names = list(dict.fromkeys(name for _, points in panels for name, *_ in points))
-    looks = {name: (f"C{k % 10}", "osD^vP*"[k // 10 % 7]) for k, name in enumerate(names)}
+    looks = {name: (HUES[k % len(HUES)], "osD^vP*"[k // len(HUES) % 7]) for k, name in enumerate(names)}
     for axis, (title, points) in zip(np.ravel(axes), panels, strict=False):
         for name in names:
             chosen = np.array([point[1:] for point in points if point[0] == name], dtype=np.float64).reshape(-1, 3)
@@ -293,6 +295,7 @@ def svg(figure: Figure, words: str) -> str:
     content = buffer.getvalue()
     content = re.sub(r"<metadata>.*?</metadata>", "", content[content.index("<svg") :], flags=re.DOTALL)
     content = re.sub(r'(<svg[^>]*?) width="[^"]*"|(<svg[^>]*?) height="[^"]*"', r"\1\2", content, count=0)
+    content = content.replace("#1f77b4", COLOURS["ink"])  # of marks that were given no fill: they have no area
     for name, colour in COLOURS.items():
         content = content.replace(colour, f"var(--{name})")
     from markupsafe import escape
