@@ -11,8 +11,8 @@ from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.encounters import Conditions, campaign, draw, play
-from steerclear.experiments.encounters.cdf import MOST_M, distribution_plot
 from steerclear.experiments.encounters.replays import record_of, records_of
+from steerclear.experiments.encounters.report import MOST_M, _cut
 from steerclear.experiments.encounters.results import cells_table, goals_of
 from steerclear.experiments.encounters.scene_file import write_scene
 from steerclear.experiments.encounters.worst import worst_encounters
@@ -200,7 +200,8 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
 
 
 def test_a_distribution_ends_at_the_edge_and_never_falls():
-    svg = distribution_plot([("on", "shield", [2.0, 3.0, 40.0])], "m", 2.5)
-    points = [tuple(map(float, p.split(","))) for p in svg.split('points="')[1].split('"')[0].split()]
-    assert all(a[0] <= b[0] and a[1] >= b[1] for a, b in pairwise(points))
-    assert f">{MOST_M:g}<" in svg
+    values, shares = _cut([2.0, 3.0, 40.0])
+    assert all(a <= b for a, b in pairwise(values))
+    assert all(a <= b for a, b in pairwise(shares))
+    assert (values[0], shares[0], values[-1], shares[-1]) == (2.0, 0.0, MOST_M, 0.5)
+    assert _cut([40.0, 50.0]) == ([MOST_M, MOST_M], [0.0, 0.0])
