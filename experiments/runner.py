@@ -161,6 +161,7 @@ def execute(
     workers: Workers = 1,
     resume: bool = False,
     notice: Notice = lambda done, of: None,
+    tell: Callable[[str], None] = logger.warning,
 ) -> Run:
     """Run the jobs that are missing in a folder.
 
@@ -170,6 +171,7 @@ def execute(
         workers: processes on this machine (1: this one), or a Ray cluster.
         resume: go on with what is there instead of refusing.
         notice: told how many jobs are done, first of those found there.
+        tell: told in words, once, what is gone on with.
 
     Raises:
         ConfigError: the folder holds results and ``resume`` is off, or another experiment's; another process writes
@@ -181,7 +183,7 @@ def execute(
     before = read_rows(folder / ROWS_FILE)
     kept = {name: before[name] for name in ids if name in before}
     if resume:
-        _tell_of_before(folder / ROWS_FILE, len(kept), len(ids), len(before) - len(kept), experiment.unit)
+        tell(_words_of_before(folder / ROWS_FILE, len(kept), len(ids), len(before) - len(kept), experiment.unit))
     _write_head(folder, experiment)
     failed, resumed = list[Row](), sum(len(rows) for rows in kept.values())
     missing = [job for name, job in dict(zip(ids, experiment.jobs, strict=True)).items() if name not in kept]
@@ -268,12 +270,12 @@ def _write_head(folder: Path, experiment: Experiment) -> None:
     write_json(folder / EXPERIMENT_FILE, {**head, "versions": versions(), "code": code_digest()})
 
 
-def _tell_of_before(path: Path, kept: int, of: int, others: int, unit: str) -> None:
+def _words_of_before(path: Path, kept: int, of: int, others: int, unit: str) -> str:
     words = f"{kept} of {of} {unit} are in {path} and are taken from there"
     if others:
         words += f"; {others} there are of other settings, or of a policy's files before they changed, and count for "
         words += "nothing here"
-    logger.warning("%s", words)
+    return words
 
 
 def append_row(path: Path, name: str, rows: Sequence[Row]) -> None:

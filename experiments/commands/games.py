@@ -116,7 +116,7 @@ def run_games(
     folder = results_folder(command, folder, resume)
     experiment = settings.experiment(command)
     with progress("games", len(experiment.jobs)) as notice:
-        run = execute(experiment, folder, workers, resume, lambda done, of: notice(done))
+        run = execute(experiment, folder, workers, resume, lambda done, of: notice(done), warn)
     replay = None
     if not run.interrupted:
         try:
