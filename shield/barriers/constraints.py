@@ -1,7 +1,7 @@
 """Static constraints and registered barriers by number, each a margin and a slope by place and time.
 
 First come those that stop a boat: circles, walls, registered barriers; then those kept by rule: keep-out circles, and
-the sides of the field.
+the sides of the field. The number after the last stands for the field as one, which a boat outside comes back into.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from ..jit import lean_kernel
 from ..scene import Registered, Static
 from .circles import to_circle
-from .edge import to_side
+from .edge import to_rectangle, to_side
 from .registered import margin_of
 from .walls import to_wall
 
@@ -67,4 +67,6 @@ def margin_at(
     rule = o - count_obstacles(static, registered)
     if rule < static.keep_out.shape[0]:
         return to_circle(x, y, static.keep_out[rule])
+    if rule == static.keep_out.shape[0] + SIDES:
+        return to_rectangle(x, y, static.field)
     return to_side(x, y, rule - static.keep_out.shape[0], static.field)

@@ -162,7 +162,8 @@ def clear_of_constraints(
 ) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
-    A boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told. Of a
+    A boat that is beyond something kept by rule has to come back: what a path is worth as a way back is told. Of the
+    field that is the way to all of it: of each side alone, a boat beyond a corner of it would turn to and fro. Of a
     keep-out circle that is less what the path would break of the rest, which else counted for nothing beside how deep
     the boat is in it. Paths say nothing of a barrier of which nothing is known where the boat is, see
     `registered.unknown_at`.
@@ -172,17 +173,22 @@ def clear_of_constraints(
     """
     binds, beyond, back_m = -1, -1, 0.0
     obstacles, total = count_obstacles(static, registered), count_all(static, registered)
-    for o in range(obstacles if near_only else total):
+    for o in range(obstacles if near_only else total + 1):
         now_m = margin_at(o, here[0], here[1], 0.0, static, registered)[0]
         barrier = registered_number(o, static, registered)
         if barrier >= 0 and now_m <= LOST_M:
             continue
+        side = total - SIDES <= o < total
+        if o == total and now_m >= 0.0:
+            continue
         if o >= obstacles and now_m < 0.0:
+            if side:
+                continue
             worth_m = _way_back(o, now_m, path, sampling, static, registered)
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only else (sampling.side if o >= total - SIDES else sampling.last)
+        last = sampling.near if near_only else (sampling.side if side else sampling.last)
         if _clearance(o, now_m, last, here, path, sampling, static, registered, out):
             binds = barrier
     if beyond >= 0:

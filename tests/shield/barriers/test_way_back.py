@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shield_loops import sail_games
+from shield_loops import sail_games, scattered
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -68,3 +68,27 @@ def test_in_an_obstacle_nobody_goes_deeper_and_who_wants_out_may(kind, wanted_sh
     assert np.linalg.norm(inwards, axis=-1).min() > 4.9
     outwards = sailed("heron", state[np.abs(BOWS_DEG - 90.0) < 80.0], 1.0, 90.0, **{kind: [(0.0, 0.0, RADIUS_M)]})
     assert (np.linalg.norm(outwards[-1], axis=-1) > RADIUS_M).all()
+
+
+def test_a_boat_chased_out_over_a_corner_goes_round_its_pursuer_and_comes_back():
+    """One at 0.7 of its speed: by each side alone it turned to and fro between the two, farther and farther out (88 m)."""
+    kinds, team, field = ("heron",) * 2, (0, 1), (0.0, 0.0, 80.0, 40.0)
+    config = ShieldConfig(profile="rammers")
+    state = scattered(np.random.default_rng(0), 4, kinds, 10.0, gap_m=4.0)
+    state[:, :, L.X] = [[81.0, 78.0], [82.0, 80.0], [-1.0, 2.0], [82.0, 78.0]]
+    state[:, :, L.Y] = [[41.0, 38.0], [42.0, 38.0], [-1.0, 2.0], [-2.0, 2.0]]
+    state[:, :, L.HEADING] = np.array([45.0, 45.0, -135.0, 135.0])[:, None]
+    state[:, :, L.SPEED] = 2.0, 1.4
+
+    def chase(step, now):
+        to = now[:, 0, :2] - now[:, 1, :2]
+        home = np.array([40.0, 20.0]) - now[:, 0, :2]
+        way = np.degrees(np.stack([np.arctan2(*home.T), np.arctan2(*to.T)], axis=1)) - now[..., L.HEADING]
+        return np.stack([np.tile([2.0, 1.4], (4, 1)), (way + 180.0) % 360.0 - 180.0], axis=-1)
+
+    run = sail_games(config, state, kinds, team, chase, 600, surroundings=Surroundings(field=field))
+    x, y = run.position[:, :, 0, 0], run.position[:, :, 0, 1]
+    outside_m = np.hypot(np.maximum(0.0, np.maximum(-x, x - 80.0)), np.maximum(0.0, np.maximum(-y, y - 40.0)))
+    assert outside_m.max() <= 25.0
+    assert (outside_m[-100:].min(axis=0) <= 0.2).all()
+    assert run.closest(np.array([True, False])).min() >= 2.5
