@@ -9,7 +9,7 @@ from difflib import get_close_matches
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 
-from . import duels, groups
+from . import duels, groups, pursuits
 from .cast import Cast
 from .field import Box, field_of
 from .scenes import Conditions, Scenes
@@ -63,6 +63,11 @@ FAMILIES: dict[str, Family] = {
         Family("crowd_12", groups.crowd_12, 6, field_for=12),
         Family("crowd_40", groups.crowd_40, 20, field_for=40),
         Family("crowd_40_own", groups.crowd_40_own, 0, field_for=40),
+        Family("pursued_along_edge", pursuits.pursued_along_edge, 1, field_for=2, lasts=pursuits.LASTS),
+        Family("pursued_into_corner", pursuits.pursued_into_corner, 1, field_for=2, lasts=pursuits.LASTS),
+        Family("chased_in_box", pursuits.chased_in_box, 1, field_for=2, lasts=pursuits.LASTS),
+        Family("chased_in_box_2", pursuits.chased_in_box_2, 2, field_for=3, lasts=pursuits.LASTS),
+        Family("chased_in_box_3", pursuits.chased_in_box_3, 3, field_for=4, lasts=pursuits.LASTS),
     )
 }
 MOST_DRAWS = 200

@@ -71,7 +71,7 @@ def test_in_an_obstacle_nobody_goes_deeper_and_who_wants_out_may(kind, wanted_sh
 
 
 def test_a_boat_chased_out_over_a_corner_goes_round_its_pursuer_and_comes_back():
-    """One at 0.7 of its speed: by each side alone it turned to and fro between the two, farther and farther out (88 m)."""
+    """One at 0.7 of its speed: by each side alone it turned to and fro between the two, 88 m out."""
     kinds, team, field = ("heron",) * 2, (0, 1), (0.0, 0.0, 80.0, 40.0)
     config = ShieldConfig(profile="rammers")
     state = scattered(np.random.default_rng(0), 4, kinds, 10.0, gap_m=4.0)
