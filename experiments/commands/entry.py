@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..ablation import AblationSettings, spec_of
 from ..ablation import quick as small_version
+from ..ablation import spec_of
 from ..entries.check import always_late, check_entry, headline
-from ..entries.report_page import games_to_look_at, write_entry_page
+from ..entries.report_page import EntryGames, games_to_look_at, shielded_zip, write_entry_page
 from ..entries.team import is_entry
 from ..entries.wrap import wrap_entry
 from ..play.match import play_match
@@ -36,7 +37,7 @@ app = App(
 
 Entry = Annotated[str, typer.Argument(metavar="ENTRY", help="Folder or zip with solution.py, as it is handed in.")]
 Also = Annotated[str | None, typer.Option(metavar="A.zip,B.zip", help="Further opponents: entries or policies.")]
-Games = Annotated[int, typer.Option(metavar="N", help="Games against each opponent, without the shield and with it.")]
+Games = Annotated[int, typer.Option(metavar="N", help="Games against each opponent, in each of the ways it is played.")]
 Looks = Annotated[int, typer.Option(metavar="N", help="Pairs of games to keep as replays, 0 to 3.")]
 CheckTime = Annotated[float | None, typer.Option(metavar="S", help="Length of the game it is tried in, s. [whole]")]
 QUICK_GAMES, QUICK_TIME_S = 2, 200.0
@@ -134,7 +135,7 @@ def report(
     answer_time: o.AnswerTime = ANSWER_S,
     json_file: o.JsonFile = None,
 ) -> None:
-    """Play an entry against opponents without the shield and with it, and write one page to show a team: entry.html.
+    """Play an entry bare, as the zip that `entry wrap` writes, and with the shield round the game; write entry.html.
 
     Exit status: 0 done, 2 bad input or an entry that never played, 130 interrupted.
     """
@@ -144,22 +145,29 @@ def report(
     names = o.split_names(opponents + (f",{also}" if also else ""), "--opponents")
     played = o.game_settings(max_time, None, rules)
     asked = o.shield_settings(separation, None, profile, None, shield_set)
-    settings = AblationSettings(
+    processes = processes_of(jobs)
+    for name in names:
+        policies.check(name)
+    folder = results_folder("entry-report", out_folder, resume)
+    shield = o.with_distance(asked, preset, played)
+    zip_file, why_none = shielded_zip(entry, folder, preset, shield, resume)
+    settings = EntryGames(
         preset=preset,
         own=entry,
+        zip_file=zip_file,
         opponents=names,
         games=games,
         seed=seed,
-        shield=o.with_distance(asked, preset, played),
+        shield=shield,
         rules=played,
         judge=judge,
         answer_s=answer_time,
     )
     if quick:
         settings = small_version(settings, QUICK_TIME_S if max_time is None else max_time, QUICK_GAMES)
-    processes = processes_of(jobs)
-    folder = results_folder("entry-report", out_folder, resume)
+    err().print(settings.how_many(), markup=False, soft_wrap=True)
     results, run = run_games("entry report", settings, folder, processes, resume, quick)
+    results["warnings"] += why_none
     if not run.interrupted:
         _show(settings, run, results, looks, processes)
     end_run(results, run, False, json_file)
@@ -196,7 +204,7 @@ def wrap(
         write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})
 
 
-def _show(settings: AblationSettings, run: Run, results: dict[str, Any], looks: int, processes: int) -> None:
+def _show(settings: EntryGames, run: Run, results: dict[str, Any], looks: int, processes: int) -> None:
     """Write the page and the replays of the games to look at, and say where they are."""
     specs, rows, folder = settings.specs(), run.rows, run.folder
     if not rows:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.commands.entry import time_text
 from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.imports import imports_of
-from steerclear.experiments.entries.report_page import games_to_look_at, net_change, write_entry_page
+from steerclear.experiments.entries.report_page import EntryGames, games_to_look_at, net_change, write_entry_page
 from steerclear.experiments.provenance import available_cores
+from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 from typer.testing import CliRunner
 
@@ -77,7 +77,7 @@ def test_one_boat_that_fails_is_said_first_and_named(write_entry):
 def test_an_entry_that_is_late_in_every_decision_is_said_and_no_success(write_entry):
     entry = write_entry("time.sleep(0.5); return 4")
     done = run("check", entry, "--max-time", "2")
-    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     assert "but all 2 decisions took longer than the game gives" in done.stdout.splitlines()[0]
     wrapped = run("wrap", entry, "--out", "late.zip")
     assert wrapped.exit_code == ExitCode.OK
@@ -89,7 +89,7 @@ def test_a_check_plays_a_whole_game_unless_told_otherwise(write_entry, monkeypat
     """What goes wrong late is found: here after a minute."""
     entry = write_entry("self.n += 1\nif self.n > 3 * 70: raise ValueError('worn out')\nreturn 4", start="self.n = 0")
     done = run("check", entry, "--json", "a.json")
-    assert done.exit_code == ExitCode.BAR_FAILED, done.output
+    assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     assert "tried in 600 of the 600 decisions of a game" in done.stdout
     assert "agent_0 failed in 530 of 600 steps" in done.stdout.splitlines()[0]
     short = run("check", entry, "--max-time", "3")
@@ -144,7 +144,29 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
     links = [name for name in ("look_1.html", "report.html") if f'href="{name}"' in page]
     assert "report.html" in links
     assert all(Path("out", name).exists() for name in links)
-    assert undocumented(json.loads(Path("out/results.json").read_text()), KEYS["entry report"]) == []
+    results = json.loads(Path("out/results.json").read_text())
+    assert undocumented(results, KEYS["entry report"]) == []
+    assert (
+        "1 game against hold, bare, as the zip that is handed in, with the shield round the game: 3 games in all"
+        in (done.stderr.replace("\n", " "))
+    )
+    assert results["games_played"] == 3
+    assert made_for("out/shielded.zip").shielded
+    again = run("report", entry, *settings)
+    assert again.exit_code == ExitCode.BAD_INPUT
+    assert "already holds results" in again.stderr
+    go_on = run("report", entry, *settings, "--resume")
+    assert go_on.exit_code == ExitCode.OK, go_on.output
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 3
+
+
+def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(write_entry, monkeypatch):
+    def played(command, settings, folder, workers, resume, quick):
+        raise PolicyError(f"zip {settings.zip_file!r}, {settings.how_many()}")
+
+    monkeypatch.setattr("steerclear.experiments.commands.entry.run_games", played)
+    told = run("report", write_entry("return 4"), "--preset", "mctf2025", "--opponents", "hold", "--games", "2").stderr
+    assert "zip '', 2 games against hold, without the shield, with it: 4 games in all" in told.replace("\n", " ")
 
 
 @pytest.mark.parametrize(("jobs", "processes"), [([], available_cores()), (["--jobs", "3"], 3)])
@@ -167,9 +189,9 @@ def test_a_report_by_no_process_is_refused_before_anything_is_played(write_entry
     assert not Path("results").exists()
 
 
-def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0):
+def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0, own="us"):
     hits = {"breaches_opponent_4.0m": opponents, "breaches_teammate_4.0m": mates, "collisions": counted}
-    names = {"pairing": "us vs <them>", "opponent": "<them>", "game": game, "shielded": shielded}
+    names = {"own": own, "pairing": f"{own} vs <them>", "opponent": "<them>", "game": game, "shielded": shielded}
     return {**names, **hits, "captures": captures, "captures_against": against}
 
 
@@ -182,9 +204,7 @@ ROWS = [
 
 
 def test_figures_of_the_page_are_of_pairs_and_names_are_text(tmp_path):
-    settings = AblationSettings(
-        preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
-    )
+    settings = EntryGames(preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0})
     change = net_change([ROWS[0], ROWS[2], ROWS[4]], [ROWS[1], ROWS[3], ROWS[5]])
     assert change.value == pytest.approx((-2 + 0 + 3) / 3)
     page = write_entry_page(ROWS, settings, tmp_path, [("a <look>", "x.html")], ["mind <this>"]).read_text()
@@ -193,10 +213,22 @@ def test_figures_of_the_page_are_of_pairs_and_names_are_text(tmp_path):
     assert "<them>" not in page
 
 
-def test_games_to_look_at_are_chosen_once_each():
-    settings = AblationSettings(
-        preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
+def test_the_zip_stands_between_bare_and_the_shield_round_the_game(tmp_path):
+    """Only games that were played in every way count."""
+    settings = EntryGames(
+        preset="mctf2026", own="us", zip_file="s.zip", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
     )
+    rows = [*ROWS, row(0, False, 4, opponents=2, own="s.zip"), row(1, False, 0, mates=2, own="s.zip")]
+    page = write_entry_page(rows, settings, tmp_path, [], []).read_text()
+    assert (
+        "4 games against &lt;them&gt;, bare, as the zip that is handed in, with the shield round the game: 12" in page
+    )
+    for words in ("3 → 4 → 2", "6 → 2 → 0", "0 → 2 → 1", "bare → the zip → shield round the game"):
+        assert words in page, words
+
+
+def test_games_to_look_at_are_chosen_once_each():
+    settings = EntryGames(preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0})
     chosen = games_to_look_at(ROWS, settings, 3)
     assert [(words, off["game"]) for words, off, _ in chosen] == [
         ("most hits without the shield", 0),
