@@ -62,7 +62,7 @@ def mission_faults(mission: Mission, port: int, warp: float, platform: Platform,
         faults.append(f"pHelmIvP writes DESIRED_* itself: set helm_prefix = {prefix}")
     if helm is not None and helm.get("allow_override", "true").lower() == "false":
         faults.append("pHelmIvP has allow_override = false, so nobody can take the boat by hand: set it to true")
-    pids = [name for name in ("pMarinePID", "pMarinePIDV22") if name in mission]
+    pids: list[str] = [name for name in ("pMarinePID", "pMarinePIDV22") if name in mission]
     if len(pids) != 1:
         faults.append(f"{len(pids)} PIDs are configured: have one of pMarinePID and pMarinePIDV22")
     for name in pids:
