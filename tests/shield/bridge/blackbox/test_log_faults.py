@@ -236,7 +236,7 @@ def test_a_disk_that_falls_behind_is_told(tmp_path, ticks, caplog):
 SUSPENDED = """
 import logging, sys, threading, time
 from pathlib import Path
-from steerclear.shield.bridge.blackbox.spool import Spool
+from steerclear.shield.bridge.blackbox.disk import AsyncWriter
 logging.basicConfig()
 
 class Slow:
@@ -245,7 +245,7 @@ class Slow:
     def finish(self): pass
     abandon = finish
 
-spool = Spool("run", Slow(), flush_s=0.02, give_up_s=1.5)
+spool = AsyncWriter("run", Slow(), flush_s=0.02, give_up_s=1.5)
 print("begun", flush=True)
 for number in range(60):
     spool.put(number)
