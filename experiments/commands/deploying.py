@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.text import Text
-from steerclear.shield.bridge.preflight.result import CheckResult, not_passed
+from steerclear.shield.bridge.preflight_checks import CheckResult, not_passed
 
 from ..deploy.orders import Outcome
 from ..provenance import machine, versions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steerclear.shield.bridge.blackbox import McapWriter, header_of_fleet, log_path
-from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import VehicleSession
 
 

@@ -6,21 +6,18 @@ import math
 from collections.abc import Sequence
 from functools import cached_property, partial
 
+from steerclear.shield.bridge.autopilot_fence import check_fence
 from steerclear.shield.bridge.blackbox import check_disk
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
+from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
+from steerclear.shield.bridge.link_checks import link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight.drill import Drill
-from steerclear.shield.bridge.preflight.fence import check_fence
-from steerclear.shield.bridge.preflight.link_checks import link_checks
-from steerclear.shield.bridge.preflight.missed import Missed
-from steerclear.shield.bridge.preflight.response import drill_checks
-from steerclear.shield.bridge.preflight.result import Check
+from steerclear.shield.bridge.preflight_checks import SITUATION, Check, check_situation
 from steerclear.shield.bridge.session import VehicleSession
-from steerclear.shield.bridge.situation import SITUATION, check_situation
 from steerclear.shield.bridge.tracker import Tracker
 
 from .grounds import grounds_of

@@ -12,7 +12,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile, load_with_text
 from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight.result import Check, CheckResult, not_passed, run_checks, validate_accepted
+from steerclear.shield.bridge.preflight_checks import Check, CheckResult, not_passed, run_checks, validate_accepted
 from steerclear.shield.bridge.session import CONNECT_S
 from steerclear.shield.exceptions import ConfigError, FleetFileError
 

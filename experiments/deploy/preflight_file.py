@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from steerclear.shield.bridge.drill import counted_words
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.preflight.response import counted_words
-from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.exceptions import BridgeError
 
 LOG = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ import contextlib
 
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight.result import not_passed, run_checks
+from steerclear.shield.bridge.preflight_checks import not_passed, run_checks
 from steerclear.shield.bridge.session import VehicleSession
 
 from .boxes import open_box

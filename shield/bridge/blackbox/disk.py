@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from ...exceptions import BridgeError
-from ..preflight.result import CheckResult
+from ..preflight_checks import CheckResult
 
 LOG = logging.getLogger(__name__)
 

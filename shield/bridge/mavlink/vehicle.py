@@ -13,10 +13,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
+from ..autopilot_parameters import ASKED, FENCE_ASKED
 from ..clock import Clock
 from ..frame import FieldFrame
 from ..messages import NEVER_S, BoatReading, Sent, never
-from ..preflight.parameters import ASKED, FENCE_ASKED
 from .autopilot import Autopilot
 from .commands import (
     GUIDED,

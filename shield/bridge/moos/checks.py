@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 
 from ..fleet_file import FleetFile
 from ..fleet_settings import MoosLinkSettings
+from ..link_checks import check_spread
 from ..messages import BoatReading
-from ..preflight.link_checks import check_spread
-from ..preflight.result import Check, CheckResult
+from ..preflight_checks import Check, CheckResult
 from .mission import mission_faults, read_mission
 from .vehicle import MoosLink, client_name
 

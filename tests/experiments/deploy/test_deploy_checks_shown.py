@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 from steerclear.experiments.commands.deploying import show_check
-from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.preflight_checks import CheckResult
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight.result import CheckResult
+from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
 from typer.testing import CliRunner
 

@@ -7,9 +7,8 @@ from bridge_fakes import World, fleet_text
 from steerclear.env.config import GameConfig
 from steerclear.experiments.boats.places import start_places
 from steerclear.experiments.boats.settings import SimBoat
+from steerclear.shield.bridge.drill import EACH_S, Drill, check_response
 from steerclear.shield.bridge.fleet_file import parse_fleet
-from steerclear.shield.bridge.preflight.drill import EACH_S, Drill
-from steerclear.shield.bridge.preflight.response import check_response
 
 
 def drilled(platform, preset):

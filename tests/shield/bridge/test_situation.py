@@ -5,7 +5,7 @@ import math
 import pytest
 from bridge_fakes import fleet_of
 from steerclear.shield.bridge.messages import BoatReading, Contact
-from steerclear.shield.bridge.situation import SITUATION, check_situation
+from steerclear.shield.bridge.preflight_checks import SITUATION, check_situation
 from steerclear.shield.bridge.tracker import Tracker
 
 

@@ -9,7 +9,7 @@ from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
-from steerclear.shield.bridge.preflight.result import run_checks
+from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, LinkRefused
 from steerclear.shield.platforms import layout as L
 

@@ -6,13 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from steerclear.shield.bridge.drill import (
+    EACH_S,
+    Drill,
+    DrillSample,
+    Missed,
+    check_course,
+    check_model,
+    check_response,
+    counted_words,
+    drill_checks,
+)
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import BoatReading, Sent, Snapshot, Tick
 from steerclear.shield.bridge.model_error import ModelErrorMonitor
-from steerclear.shield.bridge.preflight.drill import EACH_S, Drill, DrillSample
-from steerclear.shield.bridge.preflight.missed import Missed, check_model
-from steerclear.shield.bridge.preflight.response import check_course, check_response, counted_words, drill_checks
-from steerclear.shield.bridge.preflight.result import run_checks
+from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.proving import reference_models

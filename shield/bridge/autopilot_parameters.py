@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ...platforms import Platform
+from ..platforms import Platform
 
 STANDARD_TIMEOUT_S = 3.0
 TOP_SPEED_TOLERANCE = 1.02

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from steerclear.shield.bridge.preflight.result import (
+from steerclear.shield.bridge.preflight_checks import (
     Check,
     CheckResult,
     not_passed,

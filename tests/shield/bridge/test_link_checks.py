@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from steerclear.shield.bridge.autopilot_parameters import ASKED
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.mavlink.vehicle import LinkHealth
-from steerclear.shield.bridge.messages import BoatReading
-from steerclear.shield.bridge.preflight.link_checks import (
+from steerclear.shield.bridge.link_checks import (
     check_autopilot,
     check_clock,
     check_commanders,
@@ -17,8 +16,9 @@ from steerclear.shield.bridge.preflight.link_checks import (
     check_spread,
     link_checks,
 )
-from steerclear.shield.bridge.preflight.parameters import ASKED
-from steerclear.shield.bridge.preflight.result import run_checks
+from steerclear.shield.bridge.mavlink.vehicle import LinkHealth
+from steerclear.shield.bridge.messages import BoatReading
+from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.platforms import get_platform
 
 HERON = get_platform("heron")

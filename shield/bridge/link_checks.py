@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
-from ...platforms import Platform
-from ..clock import Clock
-from ..mavlink.telemetry import ENOUGH_FIX
-from ..mavlink.vehicle import LinkHealth
-from ..messages import BoatReading
-from .parameters import STANDARD_TIMEOUT_S, parameter_faults
-from .result import Check, CheckResult
-from .watch import WATCH_S, Watch, Watched
+from ..platforms import Platform
+from .autopilot_parameters import STANDARD_TIMEOUT_S, parameter_faults
+from .clock import Clock
+from .mavlink.telemetry import ENOUGH_FIX
+from .mavlink.vehicle import LinkHealth
+from .messages import BoatReading
+from .preflight_checks import Check, CheckResult
 
 LONGEST_TRIP_S = 0.2
 OLDEST_S = 0.5
@@ -31,6 +31,64 @@ _REFUSED = (
 )  # fmt: skip
 
 
+WATCH_S = 5.0
+LOOK_EVERY_S = 0.05
+
+
+class Watched(Protocol):
+    """A link as checks see it."""
+
+    def read(self) -> BoatReading:
+        """See `messages.Link`."""
+
+    def learn(self, timeout_s: float) -> None:
+        """Ask for what is not known yet."""
+
+    def health(self) -> LinkHealth:
+        """What it knows of itself."""
+
+
+class Watch:
+    """Readings and health of all links; taken when first asked for.
+
+    Args:
+        links: connected, by boat's name.
+        clock: the loop's.
+        seconds: how long.
+    """
+
+    def __init__(self, links: Mapping[str, Watched], clock: Clock, seconds: float = WATCH_S) -> None:
+        self._links, self._clock, self._seconds = links, clock, seconds
+        self._readings: dict[str, list[BoatReading]] = {}
+        self._health: dict[str, LinkHealth] = {}
+
+    def readings(self, boat: str) -> list[BoatReading]:
+        """What that boat said, in order."""
+        self._look()
+        return self._readings[boat]
+
+    def health(self, boat: str) -> LinkHealth:
+        """Health of its link at the end."""
+        self._look()
+        return self._health[boat]
+
+    def _look(self) -> None:
+        if self._readings:
+            return
+        for link in self._links.values():
+            link.learn(LOOK_EVERY_S * 60.0)
+            link.read()  # what was refused before, while the boat came up, is not of this watch
+        readings: dict[str, list[BoatReading]] = {name: [] for name in self._links}
+        due = self._clock.now_s()
+        for _ in range(round(self._seconds / LOOK_EVERY_S)):
+            due += LOOK_EVERY_S
+            self._clock.sleep_until(due)
+            for name, link in self._links.items():
+                readings[name].append(link.read())
+        self._health = {name: link.health() for name, link in self._links.items()}
+        self._readings = readings
+
+
 def link_checks(
     links: Mapping[str, Watched], platforms: Mapping[str, Platform], clock: Clock, seconds: float = WATCH_S
 ) -> list[Check]:
@@ -44,41 +102,24 @@ def link_checks(
     """
     watch = Watch(links, clock, seconds)
     checks: list[Check] = []
-    for boat in links:
-        checks += [
-            Check(f"rates:{boat}", partial(_rates, watch, boat)),
-            Check(f"latency:{boat}", partial(_latency, watch, boat)),
-            Check(f"clock:{boat}", partial(_clock, watch, boat)),
-            Check(f"spread:{boat}", partial(_spread, watch, boat)),
-            Check(f"autopilot:{boat}", partial(_autopilot, watch, boat, platforms[boat])),
-            Check(f"commanders:{boat}", partial(_commanders, watch, boat, clock)),
-        ]
+    for boat, platform in ((name, platforms[name]) for name in links):
+        by_health: dict[str, Callable[[str, list[BoatReading], LinkHealth], CheckResult]] = {
+            "rates": check_rates,
+            "latency": lambda boat, readings, health: check_latency(boat, health),
+            "clock": lambda boat, readings, health: check_clock(boat, health),
+            "spread": lambda boat, readings, health: check_spread(boat, readings),
+            "autopilot": lambda boat, readings, health, platform=platform: check_autopilot(boat, health, platform),
+            "commanders": lambda boat, readings, health: check_commanders(boat, health, clock.now_s()),
+        }
+        for name, check in by_health.items():
+            checks.append(Check(f"{name}:{boat}", partial(_run_link_check, check, watch, boat)))
     return checks
 
 
-def _rates(watch: Watch, boat: str) -> CheckResult:
-    return check_rates(boat, watch.readings(boat), watch.health(boat))
-
-
-def _latency(watch: Watch, boat: str) -> CheckResult:
-    return check_latency(boat, watch.health(boat))
-
-
-def _clock(watch: Watch, boat: str) -> CheckResult:
-    return check_clock(boat, watch.health(boat))
-
-
-def _spread(watch: Watch, boat: str) -> CheckResult:
-    return check_spread(boat, watch.readings(boat))
-
-
-def _autopilot(watch: Watch, boat: str, platform: Platform) -> CheckResult:
-    return check_autopilot(boat, watch.health(boat), platform)
-
-
-def _commanders(watch: Watch, boat: str, clock: Clock) -> CheckResult:
-    watch.readings(boat)
-    return check_commanders(boat, watch.health(boat), clock.now_s())
+def _run_link_check(
+    check: Callable[[str, list[BoatReading], LinkHealth], CheckResult], watch: Watch, boat: str
+) -> CheckResult:
+    return check(boat, watch.readings(boat), watch.health(boat))
 
 
 def check_rates(boat: str, readings: list[BoatReading], health: LinkHealth) -> CheckResult:

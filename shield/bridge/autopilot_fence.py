@@ -13,13 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ...platforms import Platform, step_boat
-from ...platforms import layout as L
-from ...platforms.limits import cruise
-from ..fleet_file import FleetFile
-from ..mavlink.fence import FenceZone, Point
-from ..mavlink.vehicle import LinkHealth
-from .result import CheckResult
+from ..platforms import Platform, step_boat
+from ..platforms import layout as L
+from ..platforms.limits import cruise
+from .fleet_file import FleetFile
+from .mavlink.fence import FenceZone, Point
+from .mavlink.vehicle import LinkHealth
+from .preflight_checks import CheckResult
 
 CIRCLE_TYPE, POLYGON_TYPE = 2, 4
 """Bits of FENCE_TYPE; the first bit is altitude."""

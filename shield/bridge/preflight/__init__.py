@@ -1,1 +1,0 @@
-"""Checks before boats move: each a function that answers with a `CheckResult`."""
