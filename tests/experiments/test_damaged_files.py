@@ -15,10 +15,10 @@ from steerclear.experiments.reach.played_sets import PlayedSet
 from steerclear.experiments.reach.played_sets_page import content_of as played_content
 from steerclear.experiments.reach.unsafe_sets import SetPair
 from steerclear.experiments.reach.unsafe_sets_page import content_of as sets_content
-from test_ablation_html import results as _report_results
+from test_report import results as _report_results
 from typer.testing import CliRunner
 
-DATA = Path(__file__).parents[2] / "data"
+DATA = Path(__file__).parents[1] / "data"
 LONGEST_S = 5.0
 MOST_MIB = 300
 

@@ -9,7 +9,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from steerclear.env.record import make_record, read_meta
-from steerclear.experiments.page import as_json, fill
+from steerclear.experiments.page import as_json
 from steerclear.experiments.replay_data import pack
 from steerclear.experiments.replay_html import SCRIPTS, write_replay
 from steerclear.shield.exceptions import ConfigError, TraceError
@@ -198,8 +198,7 @@ def test_bad_input_is_one_clear_error(game_record, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
 
 
-def test_filling_and_quoting():
-    assert fill("a @@X@@ b @@Y@@", {"X": "@@Y@@", "Y": "2"}) == "a @@Y@@ b 2"
+def test_quoting():
     assert json.loads(as_json({"a": "</x>\u2028"})) == {"a": "</x>\u2028"}
     assert "<" not in as_json("</script>")
     with pytest.raises(ValueError, match="JSON"):
