@@ -99,7 +99,7 @@ class LinkSettings(Section):
     rate of the telemetry asked for. ``route``: name of the command message, "auto" chooses by what the boat can.
     """
 
-    kind: Literal["mavlink"] = Field(description="the kind of link: mavlink")
+    kind: Literal["mavlink", "moos"] = Field(description="the kind of link: mavlink or moos")
     address: Annotated[str, Field(min_length=4, max_length=200, description='give e.g. "udpin:127.0.0.1:14550"')]
     system_id: Annotated[int, Field(ge=1, le=255, description="give the autopilot's MAVLink system id, 1 to 255")]
     rate_hz: Annotated[float, Field(gt=0.0, le=40.0, description="give the telemetry rate, Hz, at most 40")] = 20.0
@@ -114,7 +114,7 @@ class MoosLinkSettings(LinkSettings):
     ``mission``: the boat's .moos file, which checks before a start read.
     """
 
-    kind: Literal["moos"] = Field(description="the kind of link: moos")  # type: ignore[assignment]
+    kind: Literal["moos"] = Field(description="the kind of link: moos")
     address: Annotated[str, Field(pattern=r"^moos://", max_length=200, description='give "moos://HOST:PORT"')]
     system_id: Annotated[int, Field(ge=1, le=1, description="leave system_id out: MOOS has none")] = 1
     gate: Literal["helm", "pid"] = Field("helm", description="give helm or pid")

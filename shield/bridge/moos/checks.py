@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from ..fleet_file import FleetFile
 from ..fleet_settings import MoosLinkSettings
@@ -19,6 +20,9 @@ OLDEST_S = 0.5
 LONGEST_TRIP_S = 0.2
 APART_M = 5.0
 """NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this."""
+
+
+_Kind = Callable[[MoosLink, list[BoatReading], FleetFile], CheckResult]
 
 
 class _Watch:
@@ -48,7 +52,7 @@ def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float 
         seconds: how long links are watched, real s.
     """
     watch = _Watch(links, seconds)
-    kinds: dict[str, Callable[[MoosLink, list[BoatReading], FleetFile], CheckResult]] = {
+    kinds: dict[str, _Kind] = {
         "moosdb": check_moosdb,
         "rates": check_rates,
         "spread": lambda link, readings, fleet: check_spread(link.boat, readings),
@@ -57,10 +61,14 @@ def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float 
         "mission": check_mission,
     }
     return [
-        Check(f"{kind}:{boat}", lambda link=link, check=check: check(link, watch.readings(link.boat), fleet))
+        Check(f"{kind}:{boat}", partial(_run, check, link, watch, fleet))
         for boat, link in links.items()
         for kind, check in kinds.items()
     ]
+
+
+def _run(check: _Kind, link: MoosLink, watch: _Watch, fleet: FleetFile) -> CheckResult:
+    return check(link, watch.readings(link.boat), fleet)
 
 
 def check_moosdb(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:

@@ -103,10 +103,10 @@ class HelmGate:
         prefix: what the helm puts before its own.
     """
 
-    outputs = ("DESIRED_HEADING", "DESIRED_SPEED")
+    outputs: tuple[str, ...] = ("DESIRED_HEADING", "DESIRED_SPEED")
 
     def __init__(self, frame: FieldFrame, prefix: str = "RAW_") -> None:
-        self.inputs = (f"{prefix}{self.outputs[0]}", f"{prefix}{self.outputs[1]}")
+        self.inputs: tuple[str, ...] = tuple(f"{prefix}{name}" for name in self.outputs)
         self._frame, self._inputs = frame, Inputs(self.inputs)
 
     def hear(self, message: Message, now_s: float) -> None:

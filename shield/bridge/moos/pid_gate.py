@@ -33,10 +33,10 @@ class PidGate:
         dt_s: between two commands, s.
     """
 
-    outputs = ("DESIRED_RUDDER", "DESIRED_THRUST")
+    outputs: tuple[str, ...] = ("DESIRED_RUDDER", "DESIRED_THRUST")
 
     def __init__(self, platform: Platform, dt_s: float) -> None:
-        self.inputs = (f"{self.outputs[0]}{SUFFIX}", f"{self.outputs[1]}{SUFFIX}")
+        self.inputs: tuple[str, ...] = tuple(f"{name}{SUFFIX}" for name in self.outputs)
         self._inputs = Inputs(self.inputs)
         self._platform, self._params, self._dt_s = platform, platform.pack(), dt_s
         self.forget()
