@@ -229,7 +229,7 @@ class LogLimit(Section):
 
 
 class ModelLimit(Section):
-    """What a boat's model may miss, see `foresight`.
+    """What a boat's model may miss, see `model_error`.
 
     ``widest_m``: bound on the margin that measured errors give a boat. A boat more than ``outside_m`` from where it was
     foreseen 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.

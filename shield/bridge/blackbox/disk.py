@@ -312,7 +312,7 @@ class TlogWriter:
     ) -> None:
         self.path = path
         file = _TlogFile(open_disk(path))
-        self._spool = AsyncWriter(path.name, file, capacity=capacity, flush_s=flush_s)
+        self._writer = AsyncWriter(path.name, file, capacity=capacity, flush_s=flush_s)
 
     def on_bytes(self, direction: str, raw: bytes, unix_us: int) -> None:
         """Take a whole frame as it came or went; never waits, never raises.
@@ -323,23 +323,23 @@ class TlogWriter:
             unix_us: time, microseconds since 1970.
         """
         try:
-            self._spool.put((direction, bytes(raw), unix_us))
+            self._writer.put((direction, bytes(raw), unix_us))
         except BridgeError:
-            return  # said once in the log by the spool; the black box is the one that makes the loop fall back
+            return  # said once in the log by the writer; the black box is the one that makes the loop fall back
 
     @property
     def fault(self) -> str:
         """Why nothing is written any more; empty while all is well."""
-        return self._spool.fault
+        return self._writer.fault
 
     @property
     def dropped(self) -> int:
         """Packets dropped because the disk was too slow."""
-        return self._spool.dropped
+        return self._writer.dropped
 
     def close(self) -> None:
         """Complete the file."""
-        self._spool.close()
+        self._writer.close()
 
 
 def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = "disk") -> CheckResult:
