@@ -86,11 +86,12 @@ class CommandPipeline:
             so_far = Steered(fleet)
             if fleet is None or not commanded:
                 return self._finish(so_far, verdict)
-            so_far = Steered(fleet, self._nominal(fleet, commanded, answer, verdict), surroundings)
+            nominal = self._nominal(fleet, commanded, answer, verdict)
+            so_far = Steered(fleet, nominal, surroundings)
             reset, self._fresh = self._fresh, False
             if reset:  # at the start and after a failure: half-made memory is not to be trusted
                 self._shield.reset()
-            decisions = self._shield.decide(fleet, so_far.wanted, surroundings)
+            decisions = self._shield.decide(fleet, nominal, surroundings)
         except Exception as error:  # whatever broke, no boat may go on with an old command
             return self._finish(self._failed(so_far, commanded, error), verdict)
         actions: list[Action] = []

@@ -108,12 +108,16 @@ def link_checks(
             "latency": lambda boat, readings, health: check_latency(boat, health),
             "clock": lambda boat, readings, health: check_clock(boat, health),
             "spread": lambda boat, readings, health: check_spread(boat, readings),
-            "autopilot": lambda boat, readings, health, platform=platform: check_autopilot(boat, health, platform),
+            "autopilot": partial(_check_autopilot, platform),
             "commanders": lambda boat, readings, health: check_commanders(boat, health, clock.now_s()),
         }
         for name, check in by_health.items():
             checks.append(Check(f"{name}:{boat}", partial(_run_link_check, check, watch, boat)))
     return checks
+
+
+def _check_autopilot(platform: Platform, boat: str, readings: list[BoatReading], health: LinkHealth) -> CheckResult:
+    return check_autopilot(boat, health, platform)
 
 
 def _run_link_check(

@@ -210,7 +210,7 @@ def _surroundings(fixed: Surroundings) -> dict[str, Any]:
 
 
 def _floats(entry: Contact | Sent | BoatReading) -> dict[str, Any]:
-    row = {name: float(value) if isinstance(value, float) else value for name, value in vars(entry).items()}
+    row: dict[str, Any] = {n: float(value) if isinstance(value, float) else value for n, value in vars(entry).items()}
     if "position_m" in row:
         row["position_m"] = [float(value) for value in row["position_m"]]
     return row
@@ -264,19 +264,23 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
         )
     wanted = Commands(_table(rows, "wanted", 2), record.wanted_relative) if record.has_wanted else None
     if record.has_decisions and fleet is not None and wanted is not None:
-        columns = {name: _column(rows, name, np.float64) for name in ("certificate_m", "slack_m")}
-        columns |= {name: _column(rows, name, np.int64) for name in ("reason", "bound")}
-        if rows and any(column is None for column in columns.values()):
+        floats = [_column(rows, name, np.float64) for name in ("certificate_m", "slack_m")]
+        whole = [_column(rows, name, np.int64) for name in ("reason", "bound")]
+        if any(column is None for column in (*floats, *whole)) and rows:
             raise LogError("a decision lacks a value; it is damaged or of another version")
+        certificate_m, slack_m, reason, bound = (np.array([]) if c is None else c for c in (*floats, *whole))
         decisions = Decisions(
             fleet=fleet,
             wanted=wanted,
             sent=Commands(_table(rows, "sent", 2), record.sent_relative),
             intervened=np.array([row.intervened is True for row in rows], dtype=np.bool_),
+            reason=reason,
+            certificate_m=certificate_m,
+            slack_m=slack_m,
+            bound=bound,
             cut_short=_column(rows, "cut_short", np.bool_),
             solve_time_s=record.solve_time_s,
             area=None if around is None else around.field,
-            **{name: np.array([]) if column is None else column for name, column in columns.items()},
         )
     return Tick(
         number=record.number,

@@ -13,6 +13,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -357,14 +358,15 @@ class Dialogue:
                 )  # fmt: skip
             for name in (*unknown, needed):
                 self.ask_parameter(name)
-            self.wait(
-                lambda answers=answers: self.version is not None and self._answers[needed] > answers,
-                patience.part(LEARN_AGAIN_S),
-            )
+            self.wait(partial(self._is_told, needed, answers), patience.part(LEARN_AGAIN_S))
             self.wait(
                 lambda: self.version is not None and all(name in self.parameters for name in (needed, *others)),
                 patience.part(_ROUND_S),
             )
+
+    def _is_told(self, needed: str, answers: int) -> bool:
+        """Whether the version is known, and a parameter was answered more often than that."""
+        return self.version is not None and self._answers[needed] > answers
 
     def ask_parameter(self, name: str) -> None:
         """Ask for one parameter."""
