@@ -16,6 +16,7 @@ from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .game_facts import facts_of_games, warn_of_distances
 from .jit import Array, BoolArray
 from .kept_barriers import KeptBarriers
+from .masks import BatchedMasks
 from .platforms import Platform
 from .platforms import layout as L
 from .same_games import check_same_games
@@ -64,7 +65,7 @@ class BatchedShield:
             raise ConfigError("a batch decides for whole teams at once: set coordination='team'")
         if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
             raise ConfigError(f"games is {games!r}; give a whole number >= 1")
-        self.config, self.flag_of = config, flag_of
+        self.config, self.flag_of, self.surroundings = config, flag_of, surroundings
         self.platforms, self.team = _kinds(platforms), _teams(team)
         if len(self.platforms) != len(self.team) or not self.platforms:
             raise ConfigError(
@@ -181,6 +182,7 @@ class GamesFilter:
     def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
         self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
         self._checked: Any = None
+        self._masks: BatchedMasks | None = None
 
     def __call__(self, core: Any, commands: Array) -> Array:
         """Safe commands (B, n, 2) for games that the shield was built for.
@@ -194,9 +196,20 @@ class GamesFilter:
         if self.shield.serves not in (None, self.team):
             raise ConfigError("this shield has begun to serve the other team; build one for each, or reset() it")
         self.shield.serves = self.team
+        return self.shield.decide(core.state, commands, *self._about(core))
+
+    def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array]:
+        """Boats to decide for, boats on the other side, and what drives those that the games drive."""
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
-        return self.shield.decide(core.state, commands, ours, ~core.on_side, driven_boats(core))
+        return ours, ~core.on_side, driven_boats(core)
+
+    def safe_actions(self, core: Any, actions: Array) -> BoolArray:
+        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `masks`."""
+        if self._masks is None or self._masks.candidates != actions.shape[2]:
+            self._masks = BatchedMasks(self.shield, actions.shape[2])
+        ours, visiting, driven = self._about(core)
+        return self._masks.safe(core.state, actions, ours, visiting, driven)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from .filter.program import Solver, solver_of
 from .fleet import Fleet
 from .jit import Array, BoolArray
 from .kept_barriers import KeptBarriers
+from .masks import safe_of_fleet
 from .memory import part_of
 from .ordering import as_given, order_of, ordered
 from .platforms import layout as L
@@ -193,6 +194,31 @@ class Shield:
             barriers=self.config.barriers,
             area=(self.surroundings if surroundings is None else surroundings).field,
         )
+
+    @property
+    def remembered(self) -> dict[str, np.ndarray]:
+        """What goes on from decision to decision, by name: live arrays; empty before the first one."""
+        if self._deciders is None:
+            return {}
+        return {**self._deciders.memory._asdict(), "pending": self._deciders.pending}
+
+    def safe_actions(
+        self, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
+    ) -> BoolArray:
+        """Which of k candidate commands would pass as they are in this step, (n, k); see `masks`.
+
+        Each boat's candidate is judged beside its team-mates' candidates of the same number. It is for this step alone,
+        and the shield stays behind it. What the shield remembers is left alone.
+
+        Args:
+            fleet: all boats seen now.
+            actions: k candidates, each a command of every boat, such as one for each action of a game.
+            surroundings: as of `decide`.
+
+        Raises:
+            FleetError: no candidates, or as `decide`.
+        """
+        return safe_of_fleet(self, fleet, actions, surroundings)
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
         """Put this shield around a policy.

@@ -19,6 +19,7 @@ SAYS = {
     "batched_training": "24 learners",
     "count_collisions": "judged in hindsight: ",
     "first_decision": "BACKUP 111.1 deg",
+    "masked_ppo": "12 learners, 17 actions each, ",
     "own_barrier": "nearest: 0.",
     "own_encounter": "without a shield 0.03 m",
     "own_platform": "launch turns to",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 
+from ..actions import DISCRETE
 from ..commands import Commands
 from ..decision import Decisions
 from ..game_facts import GameFacts
 from ..jit import Array
+from ..platforms import get_platform
 from ..shield import Shield
 from .checks import check_unchanged, facts_now, refuse_second, shield_for, words_of
 from .readers import reader_of
@@ -35,6 +38,8 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         shield_autopilot: also decide for boats the game drives (our env only).
         keep_out: keep clear of the own flag's circle, in which the game stops boats.
         reader: what reads the game, such as sensors that err; None: the env's own state, exact.
+        masks: also leave ``infos[agent]["action_mask"]``: (17,) int8, 1 for each discrete action that the shield would
+            let pass in the next step, beside team-mates that choose the same; all 1 where none does.
 
     Attributes:
         shield: the shield at work: the one given, or, if the game's boats collide farther apart than it keeps them and
@@ -54,6 +59,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         shield_autopilot: bool = True,
         keep_out: bool = True,
         reader: GameReader | None = None,
+        masks: bool = False,
     ) -> None:
         super().__init__(parallel_game(env))
         self.team = team_number(team)
@@ -63,6 +69,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self._facts: GameFacts = facts_now(self._reader)
         self.shield_autopilot = shield_autopilot
         self.keep_out = keep_out
+        self.masks = masks
         self.decisions: Decisions | None = None
         self._holder: object = None
 
@@ -79,7 +86,9 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         self._facts = facts_now(self._reader)
         self._holder = begin_serving(self.shield)
         self.decisions = None
-        return self.env.reset(seed=seed, options=options)
+        observations, infos = self.env.reset(seed=seed, options=options)
+        self._mask(infos)
+        return observations, infos
 
     def step(self, actions: dict[str, Any]) -> Any:
         """One step; commands of the shielded team that are not safe are changed before the boats move.
@@ -92,6 +101,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         with self._reader.filtering(self._safe):
             outcome = self.env.step(actions)
         self._tell(outcome[-1])
+        self._mask(outcome[-1])
         return outcome
 
     def __getattr__(self, name: str) -> Any:
@@ -120,6 +130,20 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
             if team[i] == self.team and agent in infos:
                 infos[agent]["shield"] = self.decisions[i]
 
+    def _mask(self, infos: dict[str, dict[str, Any]]) -> None:
+        """Leave in each covered boat's info which of the discrete actions would pass."""
+        if not self.masks:
+            return
+        fleet = self._reader.fleet(self.team, self.shield_autopilot)
+        top_mps = np.array([[get_platform(kind).max_speed_mps] for kind in fleet.platforms])
+        pairs = DISCRETE[:, None] * np.concatenate([top_mps, np.ones_like(top_mps)], axis=1)
+        around = self._reader.surroundings(self.team, self.keep_out)
+        passes = self.shield.safe_actions(fleet, [Commands.game_deg(pair) for pair in pairs], around)
+        passes[~passes.any(axis=1)] = True
+        for i, agent in enumerate(self._reader.agent_ids):
+            if fleet.team[i] == self.team and agent in infos:
+                infos[agent]["action_mask"] = passes[i].astype(np.int8)
 
-_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "decisions", "_reader", "_facts", "_holder")
+
+_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "masks", "decisions", "_reader", "_facts", "_holder")
 """Attributes of the wrapper itself."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actions import Seat, read_flat
+from ..actions import DISCRETE, Seat, read_flat
 from ..arrays import NoNumbersError, numbers
 from ..batch import BatchedShield
 from ..exceptions import ConfigError, GameError, PolicyError
@@ -93,6 +93,7 @@ class TeamBatch:
         self.others = np.flatnonzero(core.team != self.team)
         self.learners = core.n_games * len(self.boats)
         self._filter = None if shield is None else _filter_of(shield, core, self.team)
+        self._games_filter = self._filter
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
         self._begun = False
@@ -171,6 +172,27 @@ class TeamBatch:
         outcome = (self._spread(terminated), self._spread(truncated))
         seen = self._begin_anew(anew, final)
         return Stepped(seen, rewards.reshape(-1), *outcome, final, self.tallies.flat_step(), episodes)
+
+    def action_masks(self) -> BoolArray:
+        """(L, 17) which discrete actions the shield would let pass as they are, in the next game step.
+
+        Each is judged beside team-mates that choose the same; without a shield all pass, and so they do for a boat of
+        which none does: then the shield decides.
+
+        Raises:
+            ConfigError: actions are not discrete.
+        """
+        if self.actions != "discrete":
+            raise ConfigError(f"actions are {self.actions}, and masks are of numbers; give actions='discrete'")
+        core, boats = self.core, self.boats
+        if self.shield is None:
+            return np.ones((self.learners, len(DISCRETE)), np.bool_)
+        wanted = np.zeros((core.n_games, core.n_boats, len(DISCRETE), 2))
+        wanted[:, boats] = DISCRETE
+        wanted[..., 0] *= core.max_speed_mps[:, None]
+        passes = self._games_filter.safe_actions(core, wanted)[:, boats].reshape(self.learners, -1)
+        passes[~passes.any(axis=1)] = True
+        return passes
 
     def _move(self, own: Array, going: BoolArray) -> tuple[Any, Array]:
         """One game step; observations of all games and the learners' rewards (B, n)."""

@@ -88,6 +88,10 @@ class MctfVectorEnv(VectorEnv[Any, Any, Any]):
         self._ended &= ~started.reshape(self._ended.size, -1)[:, 0]
         return observations, {}
 
+    def action_masks(self) -> Any:
+        """(num_envs, 17) actions the shield would let pass in the next game step, see `TeamBatch.action_masks`."""
+        return self.batch.action_masks()
+
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all games.
 

@@ -67,6 +67,10 @@ class MctfVecEnv(VecEnv):
             }
         return infos
 
+    def action_masks(self) -> Any:
+        """(L, 17) actions the shield would let pass, as sb3-contrib's MaskablePPO asks for them; see `TeamBatch`."""
+        return self.batch.action_masks()
+
     def close(self) -> None:
         """Nothing to give back."""
 
@@ -79,7 +83,9 @@ class MctfVecEnv(VecEnv):
         setattr(self, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the batch, with one answer per sub-environment asked for."""
+        """Call a method of the batch, with one answer per sub-environment asked for; of masks each has its own."""
+        if method_name == "action_masks":
+            return list(self.action_masks()[self._chosen(indices)])
         answer = getattr(self.batch, method_name)(*args, **kwargs)
         return [answer] * len(self._chosen(indices))
 
