@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,21 +18,14 @@ from .exceptions import ConfigError, FleetError
 from .fleet import Fleet
 from .jit import Array, BoolArray
 
-if TYPE_CHECKING:
-    from .batch import BatchedShield
-    from .shield import Shield
-    from .surroundings import Surroundings
-
 UNCHANGED = (int(Reason.PASSED), int(Reason.NOT_COVERED))
 
 
-def safe_of_fleet(
-    shield: Shield, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
-) -> BoolArray:
+def safe_of_fleet(shield: Any, fleet: Fleet, actions: Sequence[Commands], surroundings: Any = None) -> BoolArray:
     """Which of k candidate commands pass (n, k); the shield's memory is left alone.
 
     Args:
-        shield: whose decisions.
+        shield: the `Shield` whose decisions.
         fleet: all boats seen now, n of them.
         actions: k candidates, each a command of every boat.
         surroundings: as of `Shield.decide`.
@@ -52,7 +45,7 @@ def safe_of_fleet(
     return found
 
 
-def _put_back(shield: Shield, kept: dict[str, Array]) -> bool:
+def _put_back(shield: Any, kept: dict[str, Array]) -> bool:
     """Let a shield remember what it did; False where it has other boats now, or follows autopilots nobody tells of."""
     live = shield.remembered
     if getattr(shield, "_autopilots", None) is not None or live.keys() != kept.keys():
@@ -68,21 +61,19 @@ class BatchedMasks:
     """The same for B games at once: a copy of their shield decides k games for each.
 
     Args:
-        shield: of the games.
+        shield: the `BatchedShield` of the games.
         candidates: k, also an attribute.
 
     Raises:
         ConfigError: no candidates.
     """
 
-    def __init__(self, shield: BatchedShield, candidates: int) -> None:
-        from .batch import BatchedShield
-
+    def __init__(self, shield: Any, candidates: int) -> None:
         if candidates < 1:
             raise ConfigError(f"candidates is {candidates}; give one at least")
         self._shield, self.candidates = shield, candidates
         games = len(shield.reason) * candidates
-        self._trial = BatchedShield(
+        self._trial = type(shield)(
             shield.config, games, shield.platforms, shield.team, shield.surroundings, shield.flag_of
         )
 
