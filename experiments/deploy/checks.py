@@ -8,14 +8,10 @@ from functools import cached_property, partial
 
 from steerclear.shield.bridge.autopilot_fence import check_fence
 from steerclear.shield.bridge.blackbox import check_disk
-from steerclear.shield.bridge.control_loop import ControlLoop, Parts
-from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
 from steerclear.shield.bridge.link_checks import link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
-from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.vehicle import MoosLink
-from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import SITUATION, Check, check_situation
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.tracker import Tracker
@@ -70,28 +66,3 @@ def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
 def drilled_check(station: VehicleSession, text: str, boat: str | None, accept: Sequence[str]) -> Check:
     """The check that these boats were drilled lately, and did well but for what is accepted."""
     return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links), accept))
-
-
-def drive_drill(station: VehicleSession, operator: Operator, sinks: Sequence[TickSink] = ()) -> list[Check]:
-    """Drive one boat after the other a short way, all of them behind the shield; the checks of what was seen.
-
-    Args:
-        station: prepared.
-        operator: whose STOP ALL counts.
-        sinks: get every tick.
-    """
-    fleet = station.fleet
-    drill = Drill(fleet, tuple(station.links))
-    missed = Missed(drill)
-    parts = Parts(
-        links=station.links,
-        policy=drill,
-        ears=station.ears,
-        contacts=station.sources(),
-        grounds=grounds_of(fleet),
-        sinks=(drill, missed, *sinks),
-    )
-    loop = ControlLoop(fleet, parts, operator, station.clock)
-    missed.model_error = loop.model_error
-    loop.run(drill.seconds + 2.0 * fleet.dt_s)
-    return drill_checks(drill, missed, fleet)

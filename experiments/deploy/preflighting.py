@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-
-from steerclear.shield.bridge.clock import MonotonicClock
+from steerclear.shield.bridge.control_loop import ControlLoop
+from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import not_passed, run_checks
-from steerclear.shield.bridge.session import VehicleSession
 
-from .boxes import open_box
-from .checks import checks_of, drive_drill
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet
+from .begin import Begun, run_boats
+from .orders import Orders, Outcome, Surface, read_fleet
 from .preflight_file import DRILLED, keep
-from .quiet import ended_by_signals, undisturbed, warm_up
+from .quiet import warm_up
 from .rehearsal import refuse_early
 
 
@@ -36,33 +33,22 @@ def preflight(
     fleet, text = read_fleet(orders)
     refuse_early(fleet)
     warm_up(fleet)
-    outcome = Outcome()
-    clock = MonotonicClock(orders.speed)
-    station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
-    try:
-        with station, ended_by_signals(operator):
-            checks = checks_of(station, LONGEST_MINUTES)
-            check_accepted(checks, orders.accept, (*DRILLED, "drill"))
-            station.connect(orders.connect_s)
-            if may_start(checks, orders.accept, surface, outcome) and drill and not operator.ended:
-                _drill(station, text, orders, surface, operator, outcome)
-    finally:
-        outcome.left = station.left
+    drive = _drill if drill else None
+    outcome = run_boats(orders, surface, operator, (fleet, text), "drill", drive, elsewhere=(*DRILLED, "drill"))
     outcome.ended = operator.ended
     outcome.log = keep(fleet, text, orders.boat, outcome.checks, [result.name for result in outcome.refused])
     return outcome
 
 
-def _drill(
-    station: VehicleSession, text: str, orders: Orders, surface: Surface, operator: Operator, outcome: Outcome
-) -> None:
-    with contextlib.ExitStack() as stack:
-        box = stack.enter_context(contextlib.closing(open_box(station, text, "drill", outcome.checks)))
-        station.prepare()
-        sinks = [box, *surface.sinks(station.fleet, operator, station.clock)]
-        for sink in sinks[1:]:
-            stack.callback(sink.close)
-        with undisturbed():
-            checks = drive_drill(station, operator, sinks)
-    outcome.checks += run_checks(checks, surface.shown)
-    outcome.refused = not_passed(outcome.checks, orders.accept)
+def _drill(begun: Begun) -> None:
+    """Drive one boat after the other a short way, and judge what was seen."""
+    fleet, outcome = begun.session.fleet, begun.outcome
+    drill = Drill(fleet, tuple(begun.session.links))
+    missed = Missed(drill)
+
+    def begins(loop: ControlLoop) -> None:
+        missed.model_error = loop.model_error
+
+    begun.sail(drill, drill.seconds + 2.0 * fleet.dt_s, (drill, missed), begins=begins)
+    outcome.checks += run_checks(drill_checks(drill, missed, fleet), begun.surface.shown)
+    outcome.refused = not_passed(outcome.checks, begun.orders.accept)

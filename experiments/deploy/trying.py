@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
-from typing import Any
 
-from steerclear.shield.bridge.clock import MonotonicClock
-from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.session import VehicleSession
 
-from .boxes import open_box
-from .checks import checks_of
-from .grounds import grounds_of
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet
-from .quiet import ended_by_signals, undisturbed, warm_up
+from .begin import Begun, run_boats
+from .orders import Orders, Outcome, Surface, read_fleet
+from .quiet import warm_up
 from .rehearsal import refuse_early
 from .sea_trial import SeaTrial, longest_s
 
@@ -50,23 +43,15 @@ def sea_trial(
     driven = names if only is None else (fleet.boat(only).name,)
     refuse_early(fleet)
     warm_up(fleet)
-    outcome, trial = Outcome(), None
-    clock = MonotonicClock(orders.speed)
-    station = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
-    try:
-        with station, ended_by_signals(operator):
-            checks = checks_of(station, LONGEST_MINUTES)
-            check_accepted(checks, orders.accept)
-            station.connect(orders.connect_s)
-            if may_start(checks, orders.accept, surface, outcome) and not operator.ended:
-                trial = SeaTrial(fleet, driven, speed_mps, tell)
-                with contextlib.closing(open_box(station, text, "sea-trial", outcome.checks)) as box:
-                    outcome.log = box.path
-                    station.prepare()
-                    outcome.ended = _run(station, trial, box, surface, operator)
-    finally:
-        outcome.left = station.left
-    return outcome, trial
+    trial = SeaTrial(fleet, driven, speed_mps, tell)
+    begun: list[Begun] = []
+
+    def drive(run: Begun) -> None:
+        begun.append(run)
+        run.sail(trial, longest_s(len(run.session.links)), (trial, _End(trial, operator)))
+
+    outcome = run_boats(orders, surface, operator, (fleet, text), "sea-trial", drive)
+    return outcome, trial if begun else None
 
 
 class _End:
@@ -81,21 +66,3 @@ class _End:
 
     def close(self) -> None:
         """Nothing is held."""
-
-
-def _run(station: VehicleSession, trial: SeaTrial, box: Any, surface: Surface, operator: Operator) -> str:
-    fleet = station.fleet
-    with contextlib.ExitStack() as stack:
-        shown = surface.sinks(fleet, operator, station.clock)
-        for sink in shown:
-            stack.callback(sink.close)
-        parts = Parts(
-            links=station.links,
-            policy=trial,
-            ears=station.ears,
-            contacts=station.sources(),
-            grounds=grounds_of(fleet),
-            sinks=(box, trial, _End(trial, operator), *shown),
-        )
-        with undisturbed():
-            return ControlLoop(fleet, parts, operator, station.clock).run(longest_s(len(station.links)))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 
 from ..compat import Self
+from ..surroundings import OPEN_WATER, Surroundings
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
+from .control_loop import Parts
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
 from .links import LINK_MAKERS, BoatLink, LinkMaker, key_of
-from .messages import Contact, ContactSource, contact_of
+from .messages import Contact, ContactSource, TickSink, WantedSource, contact_of
 
 LOG = logging.getLogger(__name__)
 
@@ -103,6 +105,32 @@ class VehicleSession:
         told = [contact_of(link.read(), error) for link in self.ears.values()]
         heard = [contact for source in self.sources() for contact in source.read()]
         return (*heard, *(contact for contact in told if contact is not None))
+
+    def parts(
+        self,
+        nominal: WantedSource,
+        sinks: Sequence[TickSink],
+        grounds: Surroundings = OPEN_WATER,
+        *,
+        plays: bool = False,
+    ) -> Parts:
+        """What a control loop on these boats works with.
+
+        Args:
+            nominal: where nominal commands come from.
+            sinks: get every tick.
+            grounds: static constraints of the game.
+            plays: whether the referee's state of the game counts.
+        """
+        return Parts(
+            links=self.links,
+            policy=nominal,
+            ears=self.ears,
+            contacts=self.sources(),
+            game=self.feed if plays else None,
+            grounds=grounds,
+            sinks=tuple(sinks),
+        )
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
