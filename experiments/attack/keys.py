@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 ATTACK = {
+    "complete": "false when interrupted or a search could not be run",
     "searches[].restart": "number of the search",
     "searches[].closest_m": "least distance that any of its opponents came to an own boat, m",
     "searches[].history[]": "the least distance after each generation, m",

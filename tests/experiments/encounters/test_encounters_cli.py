@@ -65,7 +65,7 @@ def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(campaign, "play_job", stop_at_the_second)
     done = run(*SMALL, "--guard", "none", "--no-judge", "--out", "out")
     assert done.exit_code == ExitCode.INTERRUPTED
-    assert "3 of 6 encounters kept" in done.output
+    assert "1 of 2 chunks of encounters kept" in done.output
     content = json.loads(Path("out/results.json").read_text())
     assert not content["complete"]
     monkeypatch.setattr(campaign, "play_job", whole)
