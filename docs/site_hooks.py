@@ -1,6 +1,6 @@
-"""Hooks of the site (`mkdocs build`): formulas become MathML, so that no page needs the network; API pages find code.
+"""Hooks of the site (`mkdocs build`): generated pages, formulas as MathML (no page needs the network), code for API pages.
 
-mkdocs calls ``on_config`` and ``on_page_content``.
+mkdocs calls ``on_config``, ``on_files`` and ``on_page_content``.
 """
 
 from __future__ import annotations
@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
+from mkdocs.structure.files import File
+from steerclear.experiments.docs_keys import keys_page
+from steerclear.experiments.reach.show import tables_page
+from steerclear.shield.tables.files import read_table
 
 ROOT = Path(__file__).parent.parent
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
@@ -20,6 +24,15 @@ def on_config(config: Any) -> Any:
     """Let mkdocstrings read the packages under their import names."""
     config.plugins["mkdocstrings"].config.handlers["python"]["paths"] = [str(ROOT / ".typing")]
     return config
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """Add the pages that are made of the code itself, so that they are always of this version."""
+    tables = sorted((ROOT / "shield" / "tables" / "shipped").glob("*.npz"))
+    files.append(File.generated(config, "studies/json_keys.md", content=keys_page()))
+    cards = tables_page([read_table(table).card.to_json() for table in tables])
+    files.append(File.generated(config, "studies/table_cards.md", content=cards))
+    return files
 
 
 def on_page_content(content: str, **_: Any) -> str:

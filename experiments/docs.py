@@ -238,7 +238,7 @@ PRICE_WORDS = (
 ADVICE = (
     "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats "
     "often lie still, and on boats, as `FLEET.yaml` does; `hold-course` where opponents are traffic and not a team. "
-    "Any two other settings are compared, paired, by `steerclear compare` ([settings](settings.md))."
+    "Any two other settings are compared, paired, by `steerclear compare` ([settings](../settings.md))."
 )
 _PRICE_COLUMNS = (
     ("changed, %", "changed_share", "on"), ("captures", "captures", "on"), ("against", "captures_against", "on"),

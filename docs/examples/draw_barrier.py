@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from steerclear.shield import Commands, Fleet, Shield
 
-STEP_M, LEVELS_M = 0.5, (0.0, 1.0, 2.0)
+PICTURE = sys.argv[1] if len(sys.argv) > 1 and sys.argv[1].endswith((".png", ".svg")) else None
+STEP_M, LEVELS_M = (0.5 if PICTURE else 1.0), (0.0, 1.0, 2.0)  # coarse where only the areas are printed
 NORTH = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])
 
 
@@ -46,5 +47,5 @@ for plan, (profile, title) in zip(
     plan.plot(0.0, 0.0, "v", color="tab:orange", ms=9)
     plan.set(xlabel="east, m", aspect="equal", title=title)
     plan.set_ylabel("north, m; our boat sails north" if profile == "hold-course" else "")
-if len(sys.argv) > 1 and sys.argv[1].endswith((".png", ".svg")):
-    figure.savefig(sys.argv[1], dpi=140)
+if PICTURE:
+    figure.savefig(PICTURE, dpi=140)
