@@ -254,7 +254,7 @@ def response_table(limits: Limits | None = None, end: End | None = None) -> list
 
 
 def response_page() -> str:
-    """The table in Markdown, as docs/boats.md shows it."""
+    """The table in Markdown, as docs/boat_reference.md shows it."""
     head = ("What happens", "How it is seen", "Within", "What is done", "How control returns")
     rows = [head, ("---",) * len(head), *response_table()]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)

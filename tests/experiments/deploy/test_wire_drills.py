@@ -24,7 +24,7 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.platforms import layout as L
 
-DOC = Path(__file__).parents[3] / "docs" / "boats.md"
+DOC = Path(__file__).parents[3] / "docs" / "boat_reference.md"
 STEP_S, LISTEN_S = 0.05, 0.004
 STRIKE_S, AFTER_S = 4.0, 14.0
 KEY = bytes(range(32))

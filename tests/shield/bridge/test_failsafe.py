@@ -214,7 +214,7 @@ def test_the_table_names_only_settings_that_there_are_and_only_what_can_be_overr
 
 
 def test_the_page_shows_the_table_that_the_loop_acts_by():
-    page = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
     assert f"<!-- responses -->\n{response_page()}\n<!-- /responses -->" in page
 
 

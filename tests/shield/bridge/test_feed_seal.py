@@ -53,7 +53,7 @@ def test_what_is_not_sealed_with_the_key_is_dropped_and_counted_by_kind(receiver
 
 
 def test_a_sender_of_your_own_as_documented_is_heard(receiver):
-    text = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    text = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
     (block,) = (part.split("```")[0] for part in text.split("```python\n")[1:] if "feed_key" in part)
     packet = json.loads(Packet("mine", 1, 1, fixes=(TRUE,)).encode())
     names = {"json": json, "hmac": hmac, "time": time, "packet": packet, "key": KEY}
