@@ -15,7 +15,7 @@ from steerclear.policies.entrants.learned.weights_file import arrays_of
 from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
-TEMPLATE = Path(__file__).parent.parent / "report" / "templates" / "learned_solution.py.txt"
+TEMPLATE = Path(__file__).parent.parent / "templates" / "learned_solution.py.txt"
 
 
 def write_submission(network: Network, path: Path) -> Path:

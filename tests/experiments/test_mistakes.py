@@ -266,7 +266,7 @@ def workplace(tmp_path, monkeypatch, game_record):
     Path("other.json").write_text(json.dumps({"command": "play", "game": {}}))
     Path("a.zip").write_bytes(b"PK\x05\x06" + bytes(18))
     save(game_record, "game.npz")
-    demo = Path(cli.__file__).parent / "report" / "templates" / "demo_fleet.yaml"
+    demo = Path(cli.__file__).parent / "templates" / "demo_fleet.yaml"
     Path("fleet.yaml").write_text(demo.read_text(encoding="utf-8"))
     return tmp_path
 
