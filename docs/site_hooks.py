@@ -1,4 +1,4 @@
-"""Hooks of the site (`mkdocs build`): generated pages, formulas as MathML (no page needs the network), code for API pages.
+"""Hooks of the site (`mkdocs build`): generated pages, formulas as MathML (no network), code for API pages.
 
 mkdocs calls ``on_config``, ``on_files`` and ``on_page_content``.
 """

@@ -80,7 +80,9 @@ def nav_pages(entries):
 
 def test_every_page_is_in_the_site():
     nav = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
-    assert sorted(nav_pages(nav)) == sorted(GENERATED | {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")})
+    assert sorted(nav_pages(nav)) == sorted(
+        GENERATED | {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+    )
 
 
 HAND_WRITTEN = [page for page in sorted(DOCS.glob("*.md")) if page.name not in ("README.md", "api.md", "settings.md")]
