@@ -23,7 +23,7 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
     assert "add --resume" in again.output
     files = "--out", tmp_path / "team.npz", "--submission", tmp_path / "solution.zip"
     exported = call("export", folder / "model.zip", *files)
-    assert exported.exit_code == 0
+    assert exported.exit_code == 0, exported.output
     assert exported.output.count("for games of preset aamas2024") == 2
     made = made_for(tmp_path / "solution.zip")
     assert (made.preset, made.shielded) == ("aamas2024", False)
