@@ -321,12 +321,12 @@ def test_a_training_writes_over_nothing(name, tmp_path, monkeypatch):
 
 
 def test_docs_makes_its_own_pages_anew_and_no_others(tmp_path):
-    (tmp_path / "settings.md").write_text("# Our settings\n")
+    (tmp_path / "json_keys.md").write_text("# Our keys\n")
     done = CliRunner().invoke(app, ["docs", "--out", str(tmp_path)], terminal_width=200)
     assert done.exit_code == ExitCode.BAD_INPUT
-    assert "settings.md was not made by steerclear docs; choose another --out, or move it" in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["settings.md"]
-    (tmp_path / "settings.md").unlink()
+    assert "json_keys.md was not made by steerclear docs; choose another --out, or move it" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]
+    (tmp_path / "json_keys.md").unlink()
     for _ in range(2):
         assert CliRunner().invoke(app, ["docs", "--out", str(tmp_path)]).exit_code == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["json_keys.md", "settings.md"]
+    assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]
