@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import pandas as pd
 from steerclear import policies
@@ -106,7 +106,10 @@ class AblationSettings:
         return Experiment(command, asdict(self), jobs, play_job, "games", compiles)
 
 
-def quick(settings: AblationSettings, max_time_s: float, games: int) -> AblationSettings:
+AnySettings = TypeVar("AnySettings", bound=AblationSettings)
+
+
+def quick(settings: AnySettings, max_time_s: float, games: int) -> AnySettings:
     """Return the small version of an ablation: fewer and shorter games."""
     return replace(settings, games=games, rules={**settings.rules, "max_time_s": max_time_s})
 

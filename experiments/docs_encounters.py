@@ -117,7 +117,9 @@ def contests_of(cells: Iterable[Cell]) -> list[Contest]:
     for cell in cells:
         conditions = tuple(float(cell[key]) for key in CONDITIONS)
         groups[cell["own"], cell["other"], conditions, cell["seed"]][cell["guard"]][cell["family"]] = cell
-    return [_contest(*key, by_guard) for key, by_guard in groups.items()]
+    return [
+        _contest(own, other, conditions, seed, by_guard) for (own, other, conditions, seed), by_guard in groups.items()
+    ]
 
 
 def _contest(
@@ -170,7 +172,7 @@ def comparison_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[s
     return "comparison.md", _text(contests, picture, versions), [picture]
 
 
-def _plot(contests: Sequence[Contest]) -> plots.Figure:
+def _plot(contests: Sequence[Contest]) -> Any:
     """Share of encounters breached over share of commands changed, with its one-sided 95 % upper limit."""
     panels = []
     for contest in contests:

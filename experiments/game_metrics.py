@@ -74,9 +74,10 @@ def entries(distances: PairDistances, radius_m: ArrayLike) -> NDArray[np.bool_]:
     Raises:
         ConfigError: a radius that is not positive.
     """
-    if not (np.asarray(radius_m) > 0.0).all():
-        raise ConfigError(f"the separation radius must be positive, in metres; got {radius_m}")
-    inside = distances.distance_m <= radius_m
+    radii = np.asarray(radius_m, np.float64)
+    if not (radii > 0.0).all():
+        raise ConfigError(f"the separation radius must be positive, in metres; got {radii}")
+    inside = distances.distance_m <= radii
     before = np.zeros_like(inside)
     before[1:] = inside[:-1]
     return inside & ~before

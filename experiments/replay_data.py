@@ -169,7 +169,15 @@ def page_meta(record: Record) -> Mapping[str, Any]:
     arena = Arena.from_meta(meta)
     circles = [[o.radius_m, o.points_m[0]] for o in arena.obstacles if o.radius_m > 0.0]
     polygons = [o.points_m for o in arena.obstacles if o.radius_m == 0.0]
-    kept = ("dt_s", "env_bounds_m", "agent_ids", "team", "flag_home", "catch_radius_m", "flag_keepout_m")
+    kept: tuple[str, ...] = (
+        "dt_s",
+        "env_bounds_m",
+        "agent_ids",
+        "team",
+        "flag_home",
+        "catch_radius_m",
+        "flag_keepout_m",
+    )
     kept += ("separation_m", "preset", "policies", "shielded", "seed", "reason_names", "platforms")
     drawn = {"scrimmage": arena.scrimmage_m, "obstacles": {"circle": circles, "polygon": polygons}}
     return {key: meta[key] for key in kept} | drawn

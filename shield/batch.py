@@ -198,7 +198,7 @@ class GamesFilter:
         self.shield.serves = self.team
         return self.shield.decide(core.state, commands, *self._about(core))
 
-    def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array]:
+    def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array | None]:
         """Boats to decide for, boats on the other side, and what drives those that the games drive."""
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from steerclear.policies.protocol import TeamPolicy
 
-from ..game_metrics import breach_column, tally
+from ..game_metrics import tally
+from ..metrics import breach_column
 from ..play.match import Match, MatchResult
 from ..play.seat import Failures
 from ..play.spec import SIDES, MatchSpec

@@ -34,7 +34,7 @@ Rate = Annotated[float, Field(ge=1e-9, le=1e3)]
 Held = Annotated[int, Field(ge=1, le=1000)]
 """Game steps."""
 Weights = Mapping[str, Annotated[float, Field(ge=-1000.0, le=1000.0)]]
-Settings = Annotated[Mapping[str, Any], Field(default_factory=dict)]
+Settings = Mapping[str, Any]
 Names = Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1), BeforeValidator(_as_tuple)]
 Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
 Span = Annotated[Seconds | tuple[Seconds, Seconds], BeforeValidator(_as_tuple), AfterValidator(_in_order)]
@@ -76,8 +76,8 @@ class Stage(Opponents):
     cooldown_s: Span | None = None
     rewards: Weights = Field(default_factory=dict)
     shielded: bool = True
-    shield_settings: Settings
-    rules: Settings
+    shield_settings: Settings = Field(default_factory=dict)
+    rules: Settings = Field(default_factory=dict)
 
 
 class CurriculumStage(Stage):
@@ -264,7 +264,7 @@ class Games(Part):
 
     preset: str = "aamas2024"
     platform: str = ""
-    rules: Settings
+    rules: Settings = Field(default_factory=dict)
     games: Annotated[int, Field(ge=1, le=100_000)] = 64
     seed: Annotated[int, Field(ge=0, le=2**40)] = 0
 
@@ -302,7 +302,7 @@ class Learning(Games):
     stages: Annotated[tuple[Stage, ...], Field(min_length=1, max_length=1), BeforeValidator(_as_tuple)] = (Stage(),)
     rewards: Weights = Field(default_factory=lambda: {"sparse": 1.0, "progress": 1.0})
     shield: Literal["none", "deployment", "training", "training+intervention"] = "none"
-    shield_settings: Settings
+    shield_settings: Settings = Field(default_factory=dict)
     entrants_every: Held = 1
     threads: Annotated[int, Field(ge=1, le=1024)] = 1
     device: Literal["auto", "cpu", "cuda"] = "auto"

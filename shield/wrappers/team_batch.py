@@ -185,7 +185,7 @@ class TeamBatch:
         if self.actions != "discrete":
             raise ConfigError(f"actions are {self.actions}, and masks are of numbers; give actions='discrete'")
         core, boats = self.core, self.boats
-        if self.shield is None:
+        if self._games_filter is None:
             return np.ones((self.learners, len(DISCRETE)), np.bool_)
         wanted = np.zeros((core.n_games, core.n_boats, len(DISCRETE), 2))
         wanted[:, boats] = DISCRETE
