@@ -178,6 +178,6 @@ def page_meta(record: Record) -> Mapping[str, Any]:
         "catch_radius_m",
         "flag_keepout_m",
     )
-    kept += ["separation_m", "preset", "policies", "shielded", "seed", "reason_names", "platforms"]
+    kept += ("separation_m", "preset", "policies", "shielded", "seed", "reason_names", "platforms")
     drawn = {"scrimmage": arena.scrimmage_m, "obstacles": {"circle": circles, "polygon": polygons}}
     return {key: meta[key] for key in kept} | drawn
