@@ -8,7 +8,7 @@ from typing import Any
 
 from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
-from steerclear.shield.bridge.fleet_settings import BoatSettings
+from steerclear.shield.bridge.fleet_settings import BoatSettings, MoosLinkSettings
 from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.platforms import Platform
 
@@ -49,6 +49,7 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
                 address=None if boat.link is None else boat.link.address,
                 policy=opponents if driven else "",
                 start=None if boat.agent is not None else _beside(fleet, i),
+                gate=boat.link.gate if isinstance(boat.link, MoosLinkSettings) else "helm",
             )
         )
     return boats

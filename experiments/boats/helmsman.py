@@ -7,7 +7,7 @@ import math
 from steerclear.shield.platforms import layout as L
 
 from .hull import AT_REST_MPS, Hull
-from .orders import Bear, Keep, Order, Reach, Steer, Turn
+from .orders import Actuate, Bear, Keep, Order, Reach, Steer, Turn
 
 _BACK_UP_PER_S = 0.17
 """Speed of backing up per metre still to go: with 2 m it begins at the measured 0.34 m/s."""
@@ -44,6 +44,8 @@ class Helmsman:
             self._go_to((order.x_m, order.y_m), order.speed_mps, _REACHED_M)
         elif isinstance(order, Keep):
             self._keep(order)
+        elif isinstance(order, Actuate):
+            self.hull.drive(order.rudder, order.thrust)
         else:
             self.hull.coast()
 

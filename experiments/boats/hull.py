@@ -15,7 +15,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate
-from steerclear.shield.platforms.usv import wrap_degrees
+from steerclear.shield.platforms.usv import advance_hull, wrap_degrees
 
 STEP_S = 0.1
 """Step for which the platforms are defined, s."""
@@ -92,6 +92,13 @@ class Hull:
         speed = self._through_water(speed_mps)
         turn_deg = math.degrees(rate_rads) * self.dt_s
         self._run(speed, lambda: actuate(self.params, self.state, abs(speed), turn_deg, self.dt_s))
+
+    def drive(self, rudder: float, thrust: float) -> None:
+        """Move a thrust boat under rudder and thrust, percent, within the platform's limits."""
+        limit, most = min(float(self.params[L.MAX_RUDDER]), 100.0), float(self.params[L.MAX_THRUST])
+        self.state[L.RUDDER] = min(max(rudder, -limit), limit)
+        self.state[L.THRUST] = min(max(thrust, 0.0), most)
+        self._move(lambda: advance_hull(self.params, self.state, self.dt_s))
 
     def stop(self) -> None:
         """Take the way off hard, heading kept."""

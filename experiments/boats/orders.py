@@ -50,8 +50,16 @@ class Keep:
 
 
 @dataclass(frozen=True)
+class Actuate:
+    """Rudder and thrust themselves, percent; only thrust ahead."""
+
+    rudder: float
+    thrust: float
+
+
+@dataclass(frozen=True)
 class Coast:
     """Motors off."""
 
 
-Order = Steer | Bear | Turn | Reach | Keep | Coast
+Order = Steer | Bear | Turn | Reach | Keep | Actuate | Coast

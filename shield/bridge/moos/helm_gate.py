@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 from ..frame import TWO_PI, FieldFrame
@@ -37,10 +38,12 @@ class Gate(Protocol):
 
     Attributes:
         inputs, outputs: variables read and written.
+        at_rest: what is posted last to a boat that is left, whose actuators would keep the command before; mostly none.
     """
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    at_rest: Mapping[str, float]
 
     def hear(self, message: Message, now_s: float) -> None:
         """Take mail of an input in."""
@@ -104,6 +107,7 @@ class HelmGate:
     """
 
     outputs: tuple[str, ...] = ("DESIRED_HEADING", "DESIRED_SPEED")
+    at_rest: Mapping[str, float] = MappingProxyType({})
 
     def __init__(self, frame: FieldFrame, prefix: str = "RAW_") -> None:
         self.inputs: tuple[str, ...] = tuple(f"{prefix}{name}" for name in self.outputs)

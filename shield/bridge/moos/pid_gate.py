@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
+from ...exceptions import ConfigError
 from ...platforms import Platform, fresh_state, step_boat
 from ...platforms import layout as L
 from ..frame import TWO_PI
@@ -25,17 +27,32 @@ SAME_RAD, SAME_MPS = 1e-9, 1e-9
 """A command this near to what the PID meant is the PID's: what is left is the rounding of angles."""
 
 
+def check_actuated(platform: Platform) -> None:
+    """Check that a boat is moved by rudder and thrust.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if platform.pack()[L.KIND] != L.KIND_USV:
+        raise ConfigError(f"platform {platform.name!r} has no rudder and thrust; take gate: helm for its boats")
+
+
 class PidGate:
     """See the module.
 
     Args:
         platform: of the boat.
         dt_s: between two commands, s.
+
+    Raises:
+        ConfigError: the platform has no rudder and thrust.
     """
 
     outputs: tuple[str, ...] = ("DESIRED_RUDDER", "DESIRED_THRUST")
+    at_rest: Mapping[str, float] = MappingProxyType(dict.fromkeys(outputs, 0.0))
 
     def __init__(self, platform: Platform, dt_s: float) -> None:
+        check_actuated(platform)
         self.inputs: tuple[str, ...] = tuple(f"{name}{SUFFIX}" for name in self.outputs)
         self._inputs = Inputs(self.inputs)
         self._platform, self._params, self._dt_s = platform, platform.pack(), dt_s

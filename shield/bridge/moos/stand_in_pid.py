@@ -1,11 +1,17 @@
-"""`StandInPid`: when a PID of MOOS obeys, as pMarinePID was measured to; its control law is the platform's own."""
+"""`StandInPid`: when a PID of MOOS obeys, as pMarinePID was measured to; its control law is the platform's own.
+
+`StandInActuators` is what a boat has behind it whose PID is made to post *_PRECBF.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from ...platforms import Platform, fresh_state, step_boat
+from ...platforms import layout as L
 from .drivers import OVERRIDES
+from .pid_gate import SUFFIX, PidGate, check_actuated
 from .wire import DOUBLE, Message
 
 TARDY_S = 2.0
@@ -50,3 +56,58 @@ class StandInPid:
         """Heading, deg true, and speed, m/s, that it steers by now; None: thrust off."""
         tardy = now_s - self.heard_s > TARDY_S
         return None if tardy or self.overridden or self.broken else (self.heading_deg, self.speed_mps)
+
+
+class StandInActuators:
+    """Rudder and thrust that obey the plain names, and the control law of the PID that posts *_PRECBF before them.
+
+    As uSimMarine, they keep what they were last told, however old it is.
+
+    Args:
+        platform: of the boat.
+        dt_s: between two looks of the PID, s.
+
+    Attributes:
+        rudder, thrust: as last told, percent.
+
+    Raises:
+        ConfigError: the platform has no rudder and thrust.
+    """
+
+    def __init__(self, platform: Platform, dt_s: float) -> None:
+        check_actuated(platform)
+        self._params, self._dt_s, self._row = platform.pack(), dt_s, fresh_state(0.0, 0.0, 0.0)
+        self.rudder = self.thrust = 0.0
+        self._heard_s = -math.inf
+
+    def hear(self, message: Message, now_s: float) -> None:
+        """A variable was written at MOOS time ``now_s``."""
+        if message.key not in PidGate.outputs or message.data != DOUBLE or not math.isfinite(message.value):
+            return
+        self._heard_s = now_s
+        if message.key == "DESIRED_RUDDER":
+            self.rudder = message.value
+        else:
+            self.thrust = message.value
+
+    def is_driven(self, now_s: float) -> bool:
+        """Whether somebody posts the plain names at this moment."""
+        return now_s - self._heard_s <= TARDY_S
+
+    def wants(self, command: tuple[float, float] | None, heading_deg: float, speed_mps: float) -> dict[str, float]:
+        """What the PID posts for a heading, deg, and a speed, m/s; thrust off without a command.
+
+        Args:
+            command: heading and speed to hold; None: nobody commands.
+            heading_deg: of the boat, in the same frame.
+            speed_mps: of the boat.
+        """
+        row = self._row
+        if command is None:
+            row[L.THRUST] = row[L.RUDDER] = 0.0
+        else:
+            row[L.HEADING], row[L.SPEED] = (heading_deg + 180.0) % 360.0 - 180.0, abs(speed_mps)
+            error_deg = (command[0] - heading_deg + 180.0) % 360.0 - 180.0
+            step_boat(self._params, row, command[1], error_deg, self._dt_s)
+        values = (float(row[L.RUDDER]), float(row[L.THRUST]))
+        return {f"{name}{SUFFIX}": value for name, value in zip(PidGate.outputs, values, strict=True)}

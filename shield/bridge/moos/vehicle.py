@@ -256,12 +256,21 @@ class MoosLink:
             if "override" in reading.why_not.lower():
                 return f"left as it is: {reading.why_not}"
             if not self.stop().delivered:
-                return f"cannot be told to stop ({reading.why_not}); its PID stops it 2 s after our last command"
+                stops = "take it over by hand" if self.gate.at_rest else "its PID stops it 2 s after our last command"
+                return f"cannot be told to stop ({reading.why_not}); {stops}"
             if abs(reading.speed_mps) < REST_MPS and reading.velocity_age_s < 1.0:
-                return "stopped; its PID gets no more commands and holds thrust at 0"
+                return f"stopped; {self._let_go()}"
             if time.monotonic() > end_s:
-                return f"told to stop, makes {reading.speed_mps:.1f} m/s yet; its PID drops thrust by itself"
+                return f"told to stop, makes {reading.speed_mps:.1f} m/s yet; {self._let_go()}"
             time.sleep(POLL_S)
+
+    def _let_go(self) -> str:
+        """What holds thrust at 0 from now on, in words."""
+        if not self.gate.at_rest:
+            return "its PID gets no more commands and drops thrust by itself"
+        if self.client.post(self.gate.at_rest):
+            return "thrust 0 was posted last, which its actuators keep"
+        return "thrust 0 was not delivered: take it over by hand, its actuators keep the last command"
 
     def _hear(self, message: Message, received_s: float) -> None:
         """Take mail in; in the client's thread."""
