@@ -27,6 +27,7 @@ SAYS = {
     "own_platform": "launch turns to",
     "own_policy": "every boat straight to the flag",
     "own_reader": "read by FoggyReader",
+    "policy_over_moos": "m towards the flag over MOOS",
     "read_black_box": "12 decisions of blue_1",
     "wrap_env": "PASSED margin",
     "wrap_policy": "commands changed: ",
