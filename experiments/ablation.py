@@ -1,5 +1,8 @@
 """Games of one policy against others, without and with the shield, from the same seeds: ablate, evaluate, entries.
 
+With the shield there may be two states: ``on`` leaves the boats that the game drives (tagged, out of bounds) to it, as
+a real game and a zip do; ``covered`` decides for them too. Goals and replay are of ``off`` and ``on``.
+
 The ablation is the experiment that the others are written after: settings, jobs, ``run``, metrics, goals, report.
 """
 
@@ -11,6 +14,7 @@ from typing import Any, TypeVar
 
 import pandas as pd
 from steerclear import policies
+from steerclear.shield.exceptions import ConfigError
 
 from .game_metrics import DEFAULT_PENALTY
 from .metrics import RADII_M, breach_column, check, game_goals, game_metrics_of, pairs_of
@@ -22,12 +26,12 @@ from .report import write_report
 from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Run
 from .statistics import DIFFERENCE, summarise
-from .verdicts import all_breaches, summarise_verdicts
+from .verdicts import COVERED, OFF, ON, all_breaches, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Row, Workers, outcomes
 
-STATES = {False: "off", True: "on", DIFFERENCE: DIFFERENCE}
-"""What the states of the shield, and their difference, are called in results."""
+COVERED_DIFFERENCE = f"{DIFFERENCE}_{COVERED}"
+"""What the difference of covered and off is called in results; that of on and off is `DIFFERENCE`."""
 RETIRED = ("qp_relaxed", "escape")
 """Reasons that only rows of earlier versions name."""
 TIMED = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
@@ -48,6 +52,11 @@ class AblationSettings:
         shield: settings of the shield.
         states: shield states to play, False for off and True for on.
         shield_autopilot: see `MatchSpec`; as the rest.
+        covered: also play each game with a shield that covers boats that the game drives, as a state of its own; the
+            state on then leaves them to the game.
+
+    Raises:
+        ConfigError: ``covered`` with ``shield_autopilot``: both states would be the same.
     """
 
     preset: str = "aamas2024"
@@ -66,6 +75,11 @@ class AblationSettings:
     conditions: Conditions = CALM
     trust: bool = False
     answer_s: float = ANSWER_S
+    covered: bool = False
+
+    def __post_init__(self) -> None:
+        if self.covered and self.shield_autopilot:
+            raise ConfigError("covered is a state beside on: give shield_autopilot=False with it, or leave it out")
 
     @property
     def separation_m(self) -> float:
@@ -80,8 +94,10 @@ class AblationSettings:
     def specs(self) -> list[MatchSpec]:
         """List all games, those with the same number next to each other, so that an early end leaves pairs."""
         digests = {name: policies.fingerprint(name) for name in (self.own, *self.opponents)}
-        same = {name: getattr(self, name) for name in ("preset", "own", "shield_autopilot", "fixed_start", "penalty")}
+        same = {name: getattr(self, name) for name in ("preset", "own", "fixed_start", "penalty")}
         same |= {name: getattr(self, name) for name in ("judge", "conditions", "trust", "answer_s", "radii_m")}
+        ways = [(shielded, self.shield_autopilot) for shielded in self.states]
+        ways += [(True, True)] if self.covered else []
         return [
             MatchSpec(
                 **same,
@@ -90,13 +106,18 @@ class AblationSettings:
                 seed=self.seed + game,
                 side=self.sides[game % len(self.sides)],
                 shield=dict(self.shield) if shielded else None,
+                shield_autopilot=autopilot,
                 rules=dict(self.rules),
                 files=(digests[self.own], digests[opponent]),
             )
             for game in range(self.games)
             for opponent in self.opponents
-            for shielded in self.states
+            for shielded, autopilot in ways
         ]
+
+    def off_and_on(self, table: pd.DataFrame) -> pd.DataFrame:
+        """The rows of the two states that goals and replay are of."""
+        return table[~(table["shielded"] & table["covered"])] if self.covered and len(table) else table
 
     def experiment(self, command: str) -> Experiment:
         """What `runner.execute` runs."""
@@ -122,10 +143,11 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
         settings: of the run.
         is_quick: whether it is the small version.
     """
-    rows = run.rows
-    goals = [] if pairs_of(run.table).empty else check(game_goals(settings.separation_m), run.table)
-    named = ("pairing", "game", "shielded", "error", "fault")
-    failed = [{**_names(MatchSpec.of_job(job)), **job} for job in run.failed]
+    rows = with_states(run.rows, settings.covered)
+    first = settings.off_and_on(run.table)
+    goals = [] if pairs_of(first).empty else check(game_goals(settings.separation_m), first)
+    named = ("pairing", "game", "shielded", "state", "error", "fault")
+    failed = with_states([{**_names(MatchSpec.of_job(job)), **job} for job in run.failed], settings.covered)
     return {
         **run.head(),
         "quick": is_quick,
@@ -136,7 +158,7 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
         "failed": [{name: job[name] for name in named} for job in failed],
         "warnings": failure_warnings(rows),
         "held": held_games(rows),
-        "pairings": pairings_of(run.table, settings.radii_m, settings.seed),
+        "pairings": pairings_of(pd.DataFrame(rows), settings.radii_m, settings.seed),
         "goals": goals,
         "breaches": all_breaches(rows),
         "deprecated": {"bars": goals},
@@ -144,34 +166,52 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
 
 
 def _names(spec: MatchSpec) -> dict[str, Any]:
-    return {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None}
+    return {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None, "covered": spec.covered}
+
+
+def with_states(rows: Sequence[Row], covered: bool) -> list[dict[str, Any]]:
+    """Add to each row the ``state`` of the shield that it counts for: off, on, or covered where that is one."""
+    return [{**row, "state": COVERED if covered and row["covered"] else state_of(row)} for row in rows]
 
 
 def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) -> list[dict[str, Any]]:
     """Summarise every pairing.
 
+    Args:
+        table: of games; without a column ``state`` they are off or on.
+        radii_m: at which breaches were counted.
+        seed: of the bootstrap.
+
     Returns:
         Of each, JSON-ready: ``pairing``, ``games_off``, ``games_on``, ``metrics`` (per key ``label``, ``off``, ``on``,
-        ``difference``, each with value, low, high, n; absent where there is none), ``verdicts``, ``reasons``,
-        ``policy_failures``.
+        ``difference``, each with value, low, high, n; absent where there is none), ``verdicts``, ``reasons`` (on),
+        ``policy_failures``; where games were played covered also ``games_covered``, and per metric ``covered`` and
+        ``difference_covered``.
     """
     if table.empty:
         return []
     metrics = game_metrics_of(radii_m)
-    table = table.drop_duplicates(["pairing", "game", "shielded"], keep="last")
-    figures = summarise(table, metrics, ["pairing"], ("shielded", False, True), ["game"], seed)
+    if "state" not in table:
+        table = table.assign(state=[state_of(row) for row in table.to_dict("records")])
+    table = table.drop_duplicates(["pairing", "game", "state"], keep="last")
+    figures = summarise(table, metrics, ["pairing"], ("state", OFF, ON), ["game"], seed)
+    if (table["state"] == COVERED).any():
+        more = summarise(table, metrics, ["pairing"], ("state", OFF, COVERED), ["game"], seed)
+        more = more[more["state"] != OFF].replace({"state": {DIFFERENCE: COVERED_DIFFERENCE}})
+        figures = pd.concat([figures, more])
     found = []
     for pairing, games in table.groupby("pairing", sort=False):
-        shielded = games["shielded"].astype(bool)
+        count = {state: int((games["state"] == state).sum()) for state in (OFF, ON, COVERED)}
         lines = figures[figures["pairing"] == pairing]
         found.append(
             {
                 "pairing": pairing,
-                "games_off": int((~shielded).sum()),
-                "games_on": int(shielded.sum()),
+                "games_off": count[OFF],
+                "games_on": count[ON],
+                **({"games_covered": count[COVERED]} if count[COVERED] else {}),
                 "metrics": {m.key: {"label": m.label, **_states(lines, m.key)} for m in metrics},
                 "verdicts": summarise_verdicts(games.to_dict("records")),
-                "reasons": _reasons(games[shielded]),
+                "reasons": _reasons(games[games["state"] == ON]),
                 "policy_failures": int(games["policy_failures"].sum()),
             }
         )
@@ -181,7 +221,7 @@ def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) ->
 def _states(lines: pd.DataFrame, key: str) -> dict[str, Any]:
     chosen = lines[lines["metric"] == key]
     return {
-        STATES[line["shielded"]]: {name: line[name] for name in ("value", "low", "high", "n")}
+        line["state"]: {name: line[name] for name in ("value", "low", "high", "n")}
         for line in chosen.to_dict("records")
     }
 
@@ -214,7 +254,8 @@ def write_results(run: Run, results: dict[str, Any], records: Sequence[Any] = ()
         played = results["replay"]
         label = f"{played['pairing']}, game {played['game']}: without the shield and with it"
         links = [{"label": label, "path": files["replay"]}]
-    flat = [{name: value for name, value in row.items() if name != "breaches"} for row in run.rows]
+    rows = with_states(run.rows, results["settings"]["covered"])
+    flat = [{name: value for name, value in row.items() if name != "breaches"} for row in rows]
     files["report"] = write_report({**results, "games": flat, "replays": links}, run.folder / "report.html").name
     run.write(results)
 
@@ -266,7 +307,7 @@ def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row
 
 
 def spec_of(row: Row, specs: Sequence[MatchSpec]) -> MatchSpec:
-    """Find the spec a row was played from."""
+    """Find the spec a row was played from; of a shielded row that of the state on, which `specs` lists first."""
     wanted = (row["pairing"], row["game"], row["shielded"])
     return next(spec for spec in specs if (spec.pairing, spec.game, spec.shield is not None) == wanted)
 

@@ -19,7 +19,7 @@ from .statistics import DIFFERENCE, summarise
 COMMANDS = ("ablate", "evaluate", "entry report")
 SAME = ("preset", "rules", "fixed_start", "penalty")
 """Settings without which games of one seed are no pairs."""
-BESIDE = ("opponents", "games", "seed", "sides", "states", "judge", "trust", "answer_s")
+BESIDE = ("opponents", "games", "seed", "sides", "states", "covered", "judge", "trust", "answer_s")
 """Settings that say which games there are, or change nothing in them."""
 GAME = ("opponent", "seed", "side")
 """What makes two games a pair."""
@@ -85,6 +85,8 @@ def _games(
         if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"]:
             continue
         if row["shielded"] is not shielded or row["seed"] not in seeds:
+            continue
+        if settings.get("covered") and row["covered"]:  # beside the state on, which is compared
             continue
         game = tuple(row[part] for part in GAME)
         if keys.setdefault(game, name) != name:

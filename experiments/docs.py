@@ -32,7 +32,14 @@ Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
 SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
 _TIMES = ("decision_p50_us", "decision_p99_us")
-_COLUMNS = (("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"))
+_COLUMNS = (
+    ("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"),
+    ("covered", "covered"), ("difference_covered", "covered - off, paired"),
+)  # fmt: skip
+_COVERED_WORDS = (
+    "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game and a wrapped zip do; "
+    "covered decides for them too. Goals are of shield on."
+)
 
 
 def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
@@ -155,6 +162,7 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     """Write the page of an ablation or evaluation."""
     settings = content["settings"]
     lines = [f"# {line(settings['own'])} on {line(settings['preset'])}", "", MADE, "", _what_was_played(content), ""]
+    lines += [_COVERED_WORDS, ""] if settings.get("covered") else []
     lines += [f"![off and on]({path.name})\n" for path in plots]
     for summary in content["pairings"]:
         lines += [f"## {line(summary['pairing'])}", "", *_metrics_table(summary), ""]

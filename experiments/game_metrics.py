@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from steerclear.env.record import NOT_COVERED, Record, read_meta
+from steerclear.env.record import NOT_COVERED, Record, find_breaches, read_meta
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, kernel
 
@@ -293,6 +293,30 @@ def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[
         "mean_speed_change_mps": float(slowed_mps.mean()) if slowed_mps.size else None,
         "reversals_per_boat_minute": float(reversals / minutes) if minutes else None,
     }
+
+
+def driven_breaches(
+    record: Record, driven: NDArray[np.bool_], side: int, radii_m: Sequence[float] = RADII_M
+) -> dict[str, int]:
+    """Count the breaches of a team in which the game drove a boat of the team: no policy's command could prevent them.
+
+    Args:
+        record: a game.
+        driven: (T, n) boats that the game drove in each step.
+        side: the team in question, 0 blue or 1 red.
+        radii_m: radii at which to count.
+
+    Returns:
+        Per radius ``breaches_driven_2.5m`` and so on, of team-mates and with opponents.
+    """
+    own = np.asarray(read_meta(record)["team"]) == side
+    found = {}
+    for radius_m in radii_m:
+        rows = find_breaches(record["position"], radius_m)[:, :3].astype(np.int64)
+        steps, boats = rows[:, 0] - 1, rows[:, 1:]
+        inside = own[boats] & driven[steps[:, None], boats]
+        found[breach_column("driven", radius_m)] = int(inside.any(axis=1).sum())
+    return found
 
 
 def reason_counts(record: Record, side: int) -> dict[str, int]:

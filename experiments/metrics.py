@@ -70,6 +70,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
     """
     mates = "entries of two own boats into that radius, per pair"
     opponents = "entries of an own boat and an opponent into that radius, per pair"
+    driven = "of both, those of an own boat that the game drove (tagged, out of bounds), which obeys no policy"
     return [
         Metric("captures", "count", "captures", "", "flags captured"),
         Metric("captures_against", "count", "captures against", "", "flags captured by the other team"),
@@ -79,6 +80,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
         Metric("tags_against", "count", "times tagged", "", "tags made by the other team: times tagged"),
         *(Metric(breach_column("teammate", r), "count", f"hits mates {r:g} m", "", mates) for r in radii_m),
         *(Metric(breach_column("opponent", r), "count", f"hits opp. {r:g} m", "", opponents) for r in radii_m),
+        *(Metric(breach_column("driven", r), "count", f"hits driven {r:g} m", "", driven) for r in radii_m),
         Metric("clean_games", "share", "games without hit", "", "whether the game had no hit at all", paired=False),
         Metric("closest_m", "mean", "closest, mean m", "m", "closest distance of an own boat to any other, m"),
         Metric("closest_m", "least", "closest of all, m", "m", "smallest of all games", "", "closest_of_all_m", False),
@@ -127,6 +129,7 @@ GAME_COLUMNS = {
     "pairing": "own policy vs opponent policy",
     "game": "number within the pairing; the same number off and on starts from the same seed",
     "shielded": "whether the own team had a shield",
+    "covered": "whether that shield also decided for boats that the game drove",
     "preset": "rules of the game",
     "own": "policy whose results are counted",
     "opponent": "policy of the other team",
@@ -168,6 +171,7 @@ REASONS = {
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two team-mates kept each other from turning: one gives way, one stands on",
     "limited": "the wanted speed is beyond what the boat does: cut to that, and so it is safe",
+    "stopped": "beyond the hard line, or about to touch an obstacle: the boat is told to stop, as the settings say",
 }
 """Why a command was changed, by name of the reason, small letters."""
 

@@ -24,8 +24,8 @@ else:
 
 WIDTH_IN = 6.0
 COLOURS = {
-    "off": "#94a3b8", "on": "#0b8a8f", "ink": "#0f172a", "muted": "#546276", "line": "#d8dfe8", "mark": "#be1893",
-    "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#64748b",
+    "off": "#94a3b8", "on": "#0b8a8f", "covered": "#3b6fd4", "ink": "#0f172a", "muted": "#546276", "line": "#d8dfe8",
+    "mark": "#be1893", "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#64748b",
 }  # fmt: skip
 """By name of the variable in ``report.css`` (its light page's values)."""
 SERIES = ("on", "r1", "r2", "mark", "r4", "r5")
@@ -221,8 +221,10 @@ def off_on(groups: Sequence[Mapping[str, Any]], metrics: Sequence[tuple[str, str
     """
     canvas, axes = _canvas(3.2, max(len(metrics), 2), 4.0 * max(len(metrics), 2))
     for axis, (key, title) in zip(axes, metrics, strict=False):
-        for shift, state in ((-0.18, "off"), (0.18, "on")):
-            _columns(axis, shift, state, [pairing["metrics"][key] for pairing in groups])
+        figures = [pairing["metrics"][key] for pairing in groups]
+        states = ["off", "on", *(["covered"] if any("covered" in figure for figure in figures) else [])]
+        for k, state in enumerate(states):
+            _columns(axis, (k - (len(states) - 1) / 2) * 0.72 / len(states), 0.68 / len(states), state, figures)
         names = [text(pairing["pairing"].replace(" vs ", "\nvs ")) for pairing in groups]
         axis.set_xticks(np.arange(len(groups)), names, color=COLOURS["ink"])
         axis.set_title(title, fontsize=9)
@@ -270,12 +272,12 @@ def scatter(
     return canvas
 
 
-def _columns(axis: Any, shift: float, state: str, figures: Sequence[Mapping[str, Any]]) -> None:
+def _columns(axis: Any, shift: float, width: float, state: str, figures: Sequence[Mapping[str, Any]]) -> None:
     shown = [(x + shift, figure[state]) for x, figure in enumerate(figures) if state in figure]
     values = np.array([(f["value"], f["low"], f["high"]) for _, f in shown], dtype=np.float64).reshape(-1, 3)
     spread = np.nan_to_num(np.abs(values[:, [1, 2]] - values[:, [0]]).T)
     places = [x for x, _ in shown]
-    axis.bar(places, values[:, 0], 0.34, color=COLOURS[state], label=f"shield {state}")
+    axis.bar(places, values[:, 0], width, color=COLOURS[state], label=f"shield {state}")
     axis.errorbar(places, values[:, 0], spread, fmt="none", ecolor=COLOURS["ink"], capsize=3)
 
 

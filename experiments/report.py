@@ -16,10 +16,10 @@ from .metrics import RADII_M, REASONS, breach_column, game_metrics_of, meanings_
 from .page import render, write_page
 from .play.conditions import words_of
 from .tables import interval_text, limits_text, measured_text, number_text
-from .verdicts import HEADS, verdict_rows
+from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
 Summary = Mapping[str, Any]
-OFF_ON = (("off", "shield off"), ("on", "shield on"))
+SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, "shield on, covering boats that the game drives"))
 MOST_ROWS, MOST_BREACHES = 600, 200
 CHANGED_SHARE_GOAL = 5.0
 VERDICTS = {True: ("met", "good"), False: ("not met", "bad"), None: ("no data", "muted")}
@@ -311,10 +311,16 @@ def _plots(results: Mapping[str, Any], separation_m: float) -> list[Plot]:
 
 def _bars(title: str, pairings: Sequence[Summary], key: str, words: str, reference: float | None = None) -> Plot:
     found = [(pairing["pairing"], pairing["metrics"][key]) for pairing in pairings]
-    groups = [(name, [(state, figures[state]) for state, _ in OFF_ON if state in figures]) for name, figures in found]
+    groups = [(name, [(state, figures[state]) for state, _ in SHIELDS if state in figures]) for name, figures in found]
     figure = plots.bars([group for group in groups if group[1]], words, reference)
-    legend = OFF_ON if any(len(group) > 1 for _, group in groups) else ()
+    legend = _legend(groups) if any(len(group) > 1 for _, group in groups) else ()
     return Plot(title, Markup(plots.svg(figure, words)), legend)
+
+
+def _legend(groups: Sequence[tuple[str, Sequence[tuple[str, Any]]]]) -> list[tuple[str, str]]:
+    """Colours of the states that are drawn."""
+    drawn = {state for _, group in groups for state, _ in group}
+    return [(state, words) for state, words in SHIELDS if state in drawn]
 
 
 def _closest(games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:
@@ -322,11 +328,11 @@ def _closest(games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:
     found: dict[str, dict[str, list[float]]] = {}
     for row in games:
         if row["closest_m"] is not None and row["closest_m"] == row["closest_m"]:
-            states = found.setdefault(row["pairing"], {state: [] for state, _ in OFF_ON})
-            states["on" if row["shielded"] else "off"].append(float(row["closest_m"]))
+            states = found.setdefault(row["pairing"], {state: [] for state, _ in SHIELDS})
+            states[state_of(row)].append(float(row["closest_m"]))
     groups = [(name, [(state, values) for state, values in states.items() if values]) for name, states in found.items()]
     figure = plots.dots(groups, words, separation_m)
-    return Plot("Closest distance", Markup(plots.svg(figure, words)), OFF_ON)
+    return Plot("Closest distance", Markup(plots.svg(figure, words)), _legend(groups))
 
 
 def _reasons(pairings: Sequence[Summary]) -> Plot:
@@ -351,15 +357,22 @@ def reason_words(name: str) -> str:
 
 def _pairing_table(pairing: Summary) -> Table:
     told = meanings_of(game_metrics_of())
+    columns = {"off": "shield off", "on": "shield on", "difference": "on − off, paired"}
+    note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
+    if covered := pairing.get("games_covered"):
+        columns |= {"covered": "covered", "difference_covered": "covered − off, paired"}
+        note += (
+            f". Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game does; "
+            f"covered ({covered} games) decides for them too. Goals are of shield on"
+        )
     rows = [
         [
             Cell(figures.get("label", key), told.get(key, "")),
-            *(interval_text(figures.get(part)) for part in ("off", "on", "difference")),
+            *(interval_text(figures.get(part)) for part in columns),
         ]
         for key, figures in pairing["metrics"].items()
     ]
-    note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
-    return Table(pairing["pairing"], ["", "shield off", "shield on", "on − off, paired"], rows, note)
+    return Table(pairing["pairing"], ["", *columns.values()], rows, note)
 
 
 def _verdict_table(pairing: Summary) -> Table:
@@ -378,7 +391,7 @@ def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
         rows.append(
             [
                 f"{breach['pairing']}, {breach['game']}",
-                "on" if breach["shielded"] else "off",
+                state_of(breach),
                 number_text(breach["time_s"]),
                 ", ".join(breach["boats"]),
                 number_text(breach["closest_m"]),

@@ -15,6 +15,8 @@ from .verdicts import SHORT_HEADS, verdict_rows
 
 Figure = Mapping[str, float | None]
 _KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
+_COVERED_SHOWN = ("captures", "net_captures", "clean_games", "changed_share")
+"""Figures of the small table of covered games, beside hits; report and results have all."""
 _VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}
 
 
@@ -38,6 +40,22 @@ def pairing_table(summary: Mapping[str, Any]) -> Group:
         for figures in summary["metrics"].values()
     ]
     return titled(title, ["", *(head for _, head in shown)], rows)
+
+
+def covered_table(summary: Mapping[str, Any]) -> Group | None:
+    """Build the table of the games whose shield also covered boats that the game drives; None where there are none.
+
+    Args:
+        summary: as `ablation.pairings_of` returns it.
+    """
+    if not summary.get("games_covered"):
+        return None
+    rows = [
+        [figures["label"], *(interval_text(figures.get(key), short_limit) for key in ("covered", "difference_covered"))]
+        for name, figures in summary["metrics"].items()
+        if name.startswith("breaches_") or name in _COVERED_SHOWN
+    ]
+    return titled("Covering boats that the game drives", ["", "covered", "covered - off, paired"], rows)
 
 
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:

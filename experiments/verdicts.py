@@ -177,10 +177,11 @@ AVOIDABLE = Outcome.AVOIDABLE.value
 Row = Mapping[str, Any]
 KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
 SIDES = ("own", "opponent", "both", "game", "neither", "start")
-_STATES = ((False, "off"), (True, "on"))
+OFF, ON, COVERED = STATES = ("off", "on", "covered")
+"""States of the shield; covered, where it is played beside on: also for boats that the game drives."""
 _COUNTED = (*OUTCOMES, NOT_JUDGED)
 HEADS = ("", "breaches", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game")
-SHORT_HEADS = ("", "breaches", "avoidable", "unavoid.", "inside", "unjudged", "avoidable/game")
+SHORT_HEADS = ("", "breaches", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
 
 
 def verdict_column(verdict: str, kind: str, radius_m: float) -> str:
@@ -213,18 +214,25 @@ def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
         rows: games; those without ``breaches`` (stored by an earlier version, or not asked for) were not judged.
 
     Returns:
-        Per shield state off and on: ``games`` and ``games_judged``; per kind the number of breaches per outcome,
-        ``breaches``, ``avoidable_per_game`` (value, low, high; None when no game was judged) and ``responsible``
-        (number per side).
+        Per shield state off, on and, where there are such games, covered: ``games`` and ``games_judged``; per kind the
+        number of breaches per outcome, ``breaches``, ``avoidable_per_game`` (value, low, high; None when no game was
+        judged) and ``responsible`` (number per side).
     """
     summary = {}
-    for shielded, state in _STATES:
-        games = [row for row in rows if bool(row["shielded"]) is shielded]
+    for state in STATES:
+        games = [row for row in rows if state_of(row) == state]
+        if state == COVERED and not games:
+            continue
         judged = [row["breaches"] for row in games if row.get("breaches") is not None]
         found = [breach for breaches in judged for breach in breaches]
         kinds = {kind: _kind(found, kind, len(judged)) for kind, _ in KINDS}
         summary[state] = {"games": len(games), "games_judged": len(judged), **kinds}
     return summary
+
+
+def state_of(row: Row) -> str:
+    """The state of the shield that a row counts for: as it says, else off or on."""
+    return str(row.get("state") or (ON if row["shielded"] else OFF))
 
 
 def _kind(breaches: Sequence[Row], kind: str, games: int) -> dict[str, Any]:
@@ -245,7 +253,11 @@ def _number(breaches: Sequence[Row], kind: str, verdict: str) -> int:
 def all_breaches(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """List the breaches of all judged games, each with the game it happened in."""
     named = ("pairing", "game", "shielded")
-    return [{**{name: row[name] for name in named}, **breach} for row in rows for breach in row.get("breaches") or ()]
+    return [
+        {**{name: row[name] for name in named}, "state": state_of(row), **breach}
+        for row in rows
+        for breach in row.get("breaches") or ()
+    ]
 
 
 def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[str]]:
@@ -258,9 +270,9 @@ def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[s
         interval_text: writes a figure.
     """
     lines: list[list[str]] = []
-    if not any((verdicts.get(state) or {}).get("games_judged") for _, state in _STATES):
+    if not any((verdicts.get(state) or {}).get("games_judged") for state in STATES):
         return lines
-    for state in ("off", "on"):
+    for state in STATES:
         part = verdicts.get(state) or {}
         if part.get("games"):
             lines += [_line(state, part, kind, words, interval_text) for kind, words in KINDS]

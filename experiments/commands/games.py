@@ -19,7 +19,7 @@ from ..play.learned_elsewhere import made_of
 from ..play.sea import check_current
 from ..result_files import write_json
 from ..runner import Run, execute
-from ..tables import goals_table, pairing_table, verdict_table
+from ..tables import covered_table, goals_table, pairing_table, verdict_table
 from ..verdicts import check_judge
 from ..workers import Workers
 from .console import err, finish, out, progress
@@ -31,6 +31,10 @@ FEW_GAMES = 20
 KEYBOARD = "keyboard"
 HITS_WORDS = (
     f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
+)
+COVERED_WORDS = (
+    "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as\na real game does; covered decides "
+    "for them too. Goals are of shield on."
 )
 
 MOST_GAMES = 100_000
@@ -120,7 +124,7 @@ def run_games(
     replay = None
     if not run.interrupted:
         try:
-            replay = replay_of(run.table, settings.specs(), settings.separation_m, workers)
+            replay = replay_of(settings.off_and_on(run.table), settings.specs(), settings.separation_m, workers)
         except KeyboardInterrupt:
             run.interrupted = True
     results = results_of(run, settings, quick) | {"files": {}}
@@ -160,18 +164,18 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
     for words in results["warnings"]:
         console.print(f"WARNING: {words}\n", markup=False, soft_wrap=True)
     for summary in results["pairings"]:
-        console.print(pairing_table(summary))
-        if (judged := verdict_table(summary)) is not None:
-            console.print(judged)
+        tables = (pairing_table(summary), covered_table(summary), verdict_table(summary))
+        console.print(*(table for table in tables if table is not None))
         console.print()
     if results["pairings"]:
         console.print(f"{HITS_WORDS}\n", soft_wrap=True)
+    if results["settings"]["covered"]:
+        console.print(f"{COVERED_WORDS}\n", soft_wrap=True)
     if results["goals"]:
         console.print(goals_table(results["goals"]))
         console.print()
     for failed in results["failed"]:
-        state = "on" if failed["shielded"] else "off"
-        words = f"not played: {failed['pairing']}, game {failed['game']}, shield {state}: {failed['error']}"
+        words = f"not played: {failed['pairing']}, game {failed['game']}, shield {failed['state']}: {failed['error']}"
         console.print(words, markup=False, soft_wrap=True)
     for name in results["files"].values():
         console.print(f"{folder / name}", soft_wrap=True)
@@ -187,7 +191,7 @@ def show(console: Console, results: dict[str, Any], folder: Path) -> None:
 def _small_version(settings: dict[str, Any]) -> str:
     length_s = settings["rules"]["max_time_s"]
     return (
-        f"This was the small version: {settings['games']} games of {length_s:g} s per pairing. "
+        f"This was the small version: {settings['games']} games of {length_s:g} s per pairing and state. "
         "Its intervals are wide; leave out --quick for 20 games of full length."
     )
 

@@ -46,6 +46,9 @@ NoAutopilot = Annotated[
     bool,
     typer.Option("--no-shield-autopilot", help="Leave boats the game drives (tagged, out of bounds) unshielded."),
 ]
+NotCovered = Annotated[
+    bool, typer.Option("--no-shield-autopilot", help="Play off and on only, not the shield on boats the game drives.")
+]
 Penalty = Annotated[float, typer.Option(metavar="W", help="Weight of a collision in the primary score.")]
 MaxTime = Annotated[float | None, typer.Option(metavar="S", help="Length of a game, s.", show_default="600")]
 Platform = Annotated[str | None, typer.Option(metavar="NAME", help="Platform of all boats, else the preset's.")]

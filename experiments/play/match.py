@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import Record, absolute_commands, find_breaches
 from steerclear.env.record_meta import meta_of
@@ -18,7 +19,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
 from ..entries.team import make_team
-from ..game_metrics import reason_counts, scores, tally
+from ..game_metrics import driven_breaches, reason_counts, scores, tally
 from ..verdicts import StateLog, judge_game, verdict_columns
 from .openings import opening
 from .playing_env import PlayingEnv, live_view, read_infos
@@ -72,6 +73,7 @@ class Match:
         ]
         self._tape: Tape | None = None
         self._log = StateLog() if spec.judged else None
+        self._driven: list[NDArray[np.bool_]] = []
         self._decision_us: list[float] = []
         self._moment: tuple[Array, Array, Seen] | None = None
 
@@ -169,6 +171,7 @@ class Match:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
         self._tape.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        self._driven.append(self.env.core.driven[0].copy())
         if self._log is not None:
             self._log.step(self.env.core)
         if seen.solve_time_s is not None:
@@ -184,6 +187,7 @@ class Match:
     def _row(self, record: Record, wall_s: float) -> dict[str, Any]:
         spec = self.spec
         counts = {**self._events(), **tally(record, spec.own_team, spec.radii_m)}
+        counts |= driven_breaches(record, np.array(self._driven), spec.own_team, spec.radii_m)
         own, opponent = (self.teams[k].failures() for k in (spec.own_team, 1 - spec.own_team))
         return {
             **self._header(record),
@@ -202,6 +206,7 @@ class Match:
             "pairing": spec.pairing,
             "game": spec.game,
             "shielded": spec.shield is not None,
+            "covered": spec.covered,
             **{name: getattr(spec, name) for name in ("preset", "own", "opponent", "side", "seed", "penalty")},
             **dict(zip(("own_files", "opponent_files"), spec.files, strict=True)),
             "steps": steps,

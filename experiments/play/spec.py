@@ -80,6 +80,11 @@ class MatchSpec:
         return f"{self.own} vs {self.opponent}"
 
     @property
+    def covered(self) -> bool:
+        """Whether the own shield also decides for boats that the game drives."""
+        return self.shield is not None and self.shield_autopilot
+
+    @property
     def own_team(self) -> int:
         """0 when the own team is blue, 1 when it is red."""
         return SIDES.index(self.side)

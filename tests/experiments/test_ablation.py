@@ -3,6 +3,7 @@
 import io
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -30,8 +31,15 @@ from steerclear.experiments.play.spec import MatchSpec
 from steerclear.experiments.report import goal_rows
 from steerclear.experiments.result_files import finite
 from steerclear.experiments.runner import execute
-from steerclear.experiments.tables import goals_table, interval_text, measured_text, number_text, pairing_table
-from steerclear.shield.exceptions import GameError
+from steerclear.experiments.tables import (
+    covered_table,
+    goals_table,
+    interval_text,
+    measured_text,
+    number_text,
+    pairing_table,
+)
+from steerclear.shield.exceptions import ConfigError, GameError
 
 SETTINGS = AblationSettings(opponents=("easy", "hold"), games=2, rules={"max_time_s": 3.0})
 
@@ -74,6 +82,57 @@ def test_games_come_back_in_order_with_documented_columns(played):
     assert undocumented(played.rows[1], GAME_ROW) == []
 
 
+THREE = AblationSettings(opponents=("easy",), games=1, rules={"max_time_s": 3.0}, shield_autopilot=False, covered=True)
+
+
+def test_each_game_is_also_played_covering_boats_that_the_game_drives():
+    off, on, covered = THREE.specs()
+    assert (off.shield, on.shield, covered.shield) == (None, {}, {})
+    assert [spec.covered for spec in (off, on, covered)] == [False, False, True]
+    assert len({(spec.pairing, spec.game, spec.seed, spec.side) for spec in (off, on, covered)}) == 1
+    assert [spec.covered for spec in replace(THREE, covered=False).specs()] == [False, False]
+    with pytest.raises(ConfigError, match="give shield_autopilot=False with it"):
+        replace(THREE, shield_autopilot=True)
+
+
+def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first(tmp_path):
+    run = execute(THREE.experiment("ablate"), tmp_path)
+    first, goals_before = THREE.off_and_on(run.table), results_of(run, THREE)["goals"]
+    assert list(first["covered"]) == [False, False]
+    run.__dict__.pop("table", None)
+    run.rows = [
+        {**row, "breaches_opponent_2.5m": 7, "breaches_teammate_2.5m": 9, "breaches_driven_2.5m": 16}
+        if row["covered"] else row for row in run.rows
+    ]  # fmt: skip
+    results = results_of(run, THREE)
+    assert str(results["goals"]) == str(goals_before), "what is covered decides none"
+    assert most_instructive(THREE.off_and_on(run.table), 2.5)[1]["covered"] is False
+    (summary,) = results["pairings"]
+    assert (summary["games_off"], summary["games_on"], summary["games_covered"]) == (1, 1, 1)
+    hits = summary["metrics"]["breaches_opponent_2.5m"]
+    assert (hits["covered"]["value"], hits["on"]["value"]) == (7.0, first["breaches_opponent_2.5m"].iloc[1])
+    assert hits["difference_covered"]["value"] == 7.0 - hits["off"]["value"]
+    assert sum(summary["reasons"].values()) == run.rows[1]["covered_steps"]
+    assert summary["verdicts"]["covered"]["games"] == 1
+    text = printed(covered_table(summary), 80)
+    assert "covered - off, paired" in text
+    assert "hits driven 2.5 m" in text
+    write_results(run, results)
+    content = json.loads((run.folder / "results.json").read_text())
+    assert undocumented(content, RESULTS) == []
+    assert "covered − off, paired" in (run.folder / "report.html").read_text()
+    (page,) = (path for path in write_pages([content], tmp_path / "docs") if path.name == "ablation_aamas2024.md")
+    assert "| shield off | shield on | on - off, paired | covered | covered - off, paired |" in page.read_text()
+
+
+def test_games_of_two_states_say_nothing_of_a_third(played):
+    results = results_of(played, SETTINGS)
+    assert all("covered" not in figures for figures in results["pairings"][0]["metrics"].values())
+    assert "games_covered" not in results["pairings"][0]
+    assert set(results["pairings"][0]["verdicts"]) == {"off", "on"}
+    assert covered_table(results["pairings"][0]) is None
+
+
 def explode(job):
     if job["opponent"] == "hold":
         raise GameError("no room; use a larger field")
@@ -89,6 +148,7 @@ def test_a_bad_later_pairing_loses_nothing(tmp_path, played, monkeypatch):
         "pairing": "medium vs hold",
         "game": 0,
         "shielded": False,
+        "state": "off",
         "error": "no room; use a larger field",
         "fault": False,
     }
@@ -196,6 +256,7 @@ def row(game, shielded, **columns):
         "covered_steps": 300 if shielded else 0, "changed_steps": 30 if shielded else 0,
         "mean_heading_change_deg": 12.0 if shielded else None, "mean_speed_change_mps": 0.25 if shielded else None,
         "decision_p50_us": 80.0 if shielded else None, "decision_p99_us": 200.0 if shielded else None,
+        "breaches_driven_2.5m": 0, "breaches_driven_4.0m": 0,
         "reversals_per_boat_minute": 4.0, "deadlocks": 0, "primary": 0.5, "secondary": 2.0,
         "reason_PASSED": 270 if shielded else 0, "reason_QP_RELAXED": 0,
     }  # fmt: skip

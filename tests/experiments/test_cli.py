@@ -114,12 +114,14 @@ def test_a_tiny_ablation_from_end_to_end(tmp_path):
     assert done.exit_code == ExitCode.OK, done.output
     content = json.loads(Path("copy.json").read_text())
     assert keys.undocumented(content, keys.RESULTS) == []
-    assert (content["games_played"], content["complete"], len(content["pairings"])) == (8, True, 2)
+    assert (content["games_played"], content["complete"], len(content["pairings"])) == (12, True, 2)
     assert json.loads(Path("out/results.json").read_text()) == content
     for name in ("rows.jsonl", "report.html", "replay.html", content["files"]["games"]):
         assert (tmp_path / "out" / name).stat().st_size > 0
     assert "medium vs easy: 2 games" in done.stdout
     assert "hits with opponents at 2.5 m, on / off" in done.stdout
+    assert [content["pairings"][0][f"games_{state}"] for state in ("off", "on", "covered")] == [2, 2, 2]
+    assert "covered decides for them too. Goals are of shield on." in done.stdout
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
     assert "…" not in done.stdout
 
@@ -138,7 +140,7 @@ def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
     monkeypatch.setattr(ablation, "play_job", stop_at_the_third)
     stopped = run(*arguments)
     assert stopped.exit_code == ExitCode.INTERRUPTED
-    assert "2 of 4 games kept" in stopped.stderr
+    assert "2 of 6 games kept" in stopped.stderr
     assert "--out out --resume" in stopped.stderr
     assert json.loads(Path("out/results.json").read_text())["complete"] is False
     monkeypatch.setattr(ablation, "play_job", whole)
@@ -147,10 +149,18 @@ def test_an_ablation_is_resumed_and_never_overwritten(monkeypatch):
     assert "add --resume" in refused.stderr
     resumed = run(*arguments, "--resume")
     assert resumed.exit_code == ExitCode.OK, resumed.output
-    assert "2 of 4 games are in out/rows.jsonl and are taken from there" in resumed.stderr
+    assert "2 of 6 games are in out/rows.jsonl and are taken from there" in resumed.stderr
     content = json.loads(Path("out/results.json").read_text())
-    assert (content["games_resumed"], content["games_played"], content["complete"]) == (2, 4, True)
-    assert len(Path("out/rows.jsonl").read_text().splitlines()) == 4
+    assert (content["games_resumed"], content["games_played"], content["complete"]) == (2, 6, True)
+    assert len(Path("out/rows.jsonl").read_text().splitlines()) == 6
+
+
+def test_the_shield_is_not_played_covering_where_that_is_not_wanted():
+    done = run("ablate", "--opponents", "hold", *TINY, "--no-shield-autopilot", "--out", "out")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("out/results.json").read_text())
+    assert (content["games_played"], "games_covered" in content["pairings"][0]) == (4, False)
+    assert "covered" not in done.stdout
 
 
 BAD_INPUT, FAULT = GameError("no such game"), RuntimeError("sunk")
@@ -170,10 +180,10 @@ def test_a_game_that_cannot_be_played_is_told_and_the_rest_is_kept(error, code, 
     assert done.exit_code == code
     words = "no such game" if error is BAD_INPUT else "this is a fault of steerclear, not of yours (RuntimeError: sunk)"
     assert f"not played: medium vs hold, game 0, shield off: {words}" in done.stdout
-    assert "4 games could not be played" in done.stderr
+    assert "6 games could not be played" in done.stderr
     assert ("its traceback is in" in done.stderr) == (error is FAULT)
     assert "Traceback" not in done.output
-    assert json.loads(Path("out/results.json").read_text())["games_played"] == 4
+    assert json.loads(Path("out/results.json").read_text())["games_played"] == 6
 
 
 def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
@@ -183,7 +193,7 @@ def test_a_run_of_which_no_game_could_be_played_says_so(monkeypatch):
     monkeypatch.setattr(ablation, "play_job", broken)
     done = run("ablate", "--opponents", "easy", *TINY, "--out", "out", "--json", "out.json")
     assert done.exit_code == ExitCode.BAD_INPUT, done.output
-    assert "4 games could not be played" in done.stderr
+    assert "6 games could not be played" in done.stderr
     assert json.loads(Path("out.json").read_text())["files"] == {}
 
 

@@ -83,7 +83,7 @@ def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):
     assert ROUGH.words in report
     assert ROUGH.words in Path("out/replay.html").read_text()
     again = run("ablate", *TINY, *GIVEN, "--out", "out", "--resume")
-    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 2, again.output
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 3, again.output
     calm = run("ablate", *TINY, "--out", "out", "--resume")
     assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 0, calm.output
     pages = [path.name for path in write_pages([content], tmp_path / "docs")]
