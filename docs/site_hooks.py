@@ -12,7 +12,7 @@ from typing import Any
 
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File
-from steerclear.experiments.docs_keys import keys_page
+from steerclear.experiments.docs import keys_page
 from steerclear.experiments.reach.show import tables_page
 from steerclear.shield.tables.files import read_table
 
