@@ -129,7 +129,8 @@ class Kernel(CPUDispatcher):
         return self.overloads[args].entry_point
 
     def _whole(self, args: Any) -> Any:
-        collecting, context = gc.isenabled(), self.targetctx
+        collecting = gc.isenabled()
+        context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))  # boxes arrays it returns
         gc.disable()  # a sixth of the time, and next to nothing to collect
         try:
             part = self._part(args)

@@ -4,7 +4,9 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from steerclear.shield.jit import kernel
 
 KERNEL = """
 import math
@@ -75,3 +77,14 @@ def test_a_folder_that_cannot_be_written_is_told_and_stops_nothing(call, tmp_pat
     value, said = call(kept=tmp_path / "file" / "below")
     assert value == 12.0
     assert "NUMBA_CACHE_DIR" in said or (tmp_path / "home").is_dir()
+
+
+def test_a_kernel_returns_arrays_that_it_made_to_python():
+    @kernel
+    def thirds(count):
+        made = np.empty((2, count))
+        made[:] = 1.0 / 3.0
+        return made
+
+    for _ in range(3):
+        assert thirds(4).tolist() == [[1.0 / 3.0] * 4] * 2
