@@ -81,5 +81,6 @@ def test_the_tutorial_explains_what_its_program_prints(capsys):
 
 
 def test_examples_are_short():
-    for path in EXAMPLES.glob("*.py"):
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= 45, path.name
+    for path in EXAMPLES.glob("*.py"):  # those that draw the docs' figures have lines of axes and labels besides
+        most = 90 if path.stem.startswith("draw_") else 45
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= most, path.name
