@@ -227,6 +227,10 @@ class Deciders:
         self._desk: Any = None
         self._decide_all: Any = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is made anew at the next decision: addresses and machine code are of this process."""
+        return self.__dict__ | {"_desk": None, "_decide_all": None}
+
     def forget(self, which: slice | BoolArray) -> None:
         """Forget the backups of some deciders, and the commands on their way."""
         self.memory.has_backup[which] = False

@@ -1,5 +1,6 @@
 """Fixtures that several folders of tests share."""
 
+import logging
 import subprocess
 import sys
 
@@ -24,6 +25,18 @@ def pytest_configure(config):
     shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, workers)]) for k in range(workers)]
     for share in shares:  # what goes wrong is for the tests to tell
         share.wait()
+
+
+@pytest.fixture(autouse=True)
+def logs_are_as_before():
+    """Submissions that run in the tests' own process may switch logs off, and nobody puts that back for them."""
+    yield
+    logging.disable(logging.NOTSET)
+    for name in list(logging.root.manager.loggerDict):
+        if name.startswith("steerclear"):
+            logger = logging.getLogger(name)
+            logger.disabled, logger.propagate = False, True
+    logging.getLogger("steerclear").setLevel(logging.NOTSET)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from steerclear.shield.wrappers import readers
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "examples"
-LOG = ROOT / "tests" / "shield" / "bridge" / "blackbox" / "data" / "version_1.mcap"
+LOG = ROOT / "tests" / "shield" / "bridge" / "data" / "log_0.8.0.mcap"
 SAYS = {
     "ablation": "shield off: ",
     "batched_training": "24 learners",

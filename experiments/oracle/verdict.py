@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.shield.compat import StrEnum
 
 Array = NDArray[np.float64]
 
 
-class Outcome(StrEnum):
+class Outcome(str, Enum):
     """Whether a boat could have kept the radius.
 
     AVOIDABLE is proved: there are commands, replayed with the full model. UNAVOIDABLE means that the search was
@@ -19,13 +19,17 @@ class Outcome(StrEnum):
     and never apart before the breach, so that nobody had a chance.
     """
 
+    __str__ = str.__str__
+
     AVOIDABLE = "avoidable"
     UNAVOIDABLE = "unavoidable"
     STARTED_INSIDE = "started_inside"
 
 
-class Responsible(StrEnum):
+class Responsible(str, Enum):
     """Whose command let the last chance pass, see `steerclear.experiments.oracle.sides`."""
+
+    __str__ = str.__str__
 
     FIRST = "first"
     SECOND = "second"

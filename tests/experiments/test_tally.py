@@ -133,7 +133,7 @@ def make_meta(config):
 
 def test_scores():
     counts = {"captures": 3, "captures_against": 1, "grabs": 5, "grabs_against": 2, "tags": 4, "tags_against": 6}
-    assert scores({**counts, "collisions": 4}, 0.25) == {"primary": 1.0, "secondary": 1.0}
+    assert scores({**counts, "collisions": 4}, 0.25) == {"net_captures": 2, "primary": 1.0, "secondary": 1.0}
     assert scores({**counts, "collisions": 4}, 0.0)["primary"] == 2.0
 
 

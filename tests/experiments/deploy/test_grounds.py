@@ -50,7 +50,7 @@ class Played:
     def _beside(self, core, commands):
         seen = self.reader.fleet(self.fleet.team_number, shield_autopilot=True)
         told = json.loads(json.dumps(state_of(core, self.names).as_dict()))
-        around = self.water.around(seen, game_state(told), 0.1)
+        around = self.water.around(game_state(told), 0.1)
         self.beside = self.shield.decide(seen, Commands.relative_deg(commands[0]), around), around
         return commands
 
