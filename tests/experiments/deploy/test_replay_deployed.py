@@ -14,6 +14,7 @@ from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_f
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.messages import Answer
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
 
@@ -45,7 +46,7 @@ class HeadOn:
     def latest(self):
         values = np.full((4, 2), np.nan)
         values[:2] = (2.0, math.pi / 2), (2.0, 1.5 * math.pi)
-        return Commands.absolute_rad(values), 0.0, ""
+        return Answer(Commands.absolute_rad(values), 0.0, "")
 
     def close(self):
         """Nothing to end."""

@@ -20,6 +20,7 @@ from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.mavlink.signing import SigningClock
+from steerclear.shield.bridge.messages import Answer
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.platforms import layout as L
@@ -47,7 +48,7 @@ class HeadOn:
         """Nothing to see."""
 
     def latest(self):
-        return Commands.absolute_rad(np.array([[2.0, 0.0], [2.0, math.pi]])), 0.0, ""
+        return Answer(Commands.absolute_rad(np.array([[2.0, 0.0], [2.0, math.pi]])), 0.0, "")
 
     def close(self):
         """Nothing to end."""

@@ -286,7 +286,7 @@ def test_options_set_by_stable_baselines_are_refused_once():
 def test_without_stable_baselines_the_remedy_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
     monkeypatch.delitem(sys.modules, "steerclear.shield.wrappers.vector_sb3", raising=False)
-    with pytest.raises(ImportError, match=r"pip install '\.\[train\]'"):
+    with pytest.raises(ImportError, match=r"pip install .*\[train\]"):
         _ = wrappers.MctfVecEnv
     with pytest.raises(AttributeError, match="no attribute 'Nonsense'"):
         _ = wrappers.Nonsense
