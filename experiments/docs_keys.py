@@ -91,7 +91,6 @@ RESULTS = {
     **{f"pairings[].metrics.{key}": words for key, words in MEANINGS.items()},
     **{f"pairings[].metrics.*.off.{k}": f"{v}, shield off, per game" for k, v in _FIGURE.items()},
     **{f"pairings[].metrics.*.on.{k}": f"{v}, shield on, per game" for k, v in _FIGURE.items()},
-    "pairings[].metrics.changed_share.on.value": "steps changed, %, of all games; the column of a game is a fraction",
     **{f"pairings[].metrics.*.difference.{k}": f"{v}, mean of on - off, paired" for k, v in _FIGURE.items()},
     **{f"pairings[].metrics.*.covered.{k}": f"{v}, shield on and covering, per game" for k, v in _FIGURE.items()},
     **{f"pairings[].metrics.*.difference_covered.{k}": f"{v}, covered - off, paired" for k, v in _FIGURE.items()},

@@ -89,7 +89,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
             "percent",
             "steps changed, %",
             "%",
-            "commands sent otherwise than wanted, of all that the shield decided",
+            "% of the shield's decisions that differ from what was wanted; the column of a game: a fraction",
             per="covered_steps",
             name="changed_share",
             of_shield=True,
