@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from steerclear.shield.exceptions import ConfigError
 
-from ..result_files import lock_folder
+from ..runner import RESULTS_FILE
 from ..training.config_file import read_config
 from ..workers import processes_of
 from . import options as o
-from .console import Interrupted, command, out, progress
+from .console import command, out, progress
 from .train import Config, check_extra
 
 Seeds = Annotated[int, typer.Option(metavar="N", min=1, max=100, help="Trainings per cell.")]
@@ -33,19 +32,8 @@ def train_study(
     """
     settings, processes = read_config(config), processes_of(jobs)
     check_extra()
-    from ..training.study import RESULTS, cells, run_study
+    from ..training.study import run_study, trainings_of
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = lock_folder(folder)
-    except OSError as error:
-        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
-    try:
-        with progress("trainings and games", len(list(cells(seeds)))) as notice:
-            run_study(settings, folder, seeds, games, lambda done, words: notice(done), processes)
-    except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted: what is done is kept in {folder}; the same command goes on from there"
-        ) from None
-    del lock
-    out().print(f"{folder / RESULTS}", soft_wrap=True)
+    with progress("trainings", len(trainings_of(settings, folder, seeds, games))) as notice:
+        run_study(settings, folder, seeds, games, lambda done, of: notice(done), processes)
+    out().print(f"{folder / RESULTS_FILE}", soft_wrap=True)

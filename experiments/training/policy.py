@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +14,7 @@ from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.policies.entrants.learned.sb3_file import network_of_tensors
 from torch import nn
 
+ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 NEAR_M = 10.0
 """Distances below about this are told apart by the features' nearness, m."""
 
@@ -53,11 +55,11 @@ class TeamFeatures(BaseFeaturesExtractor):
         self.register_buffer("gain", torch.tensor(features.gain, dtype=torch.float32))
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Features (N, size) of observations (N, n)."""
-        seen, place = observations[:, : self._n_obs], observations[:, self._n_obs :]
-        turn = np.float32(np.pi) * seen[:, self.angles]
-        near = torch.exp(-self.gain * (seen[:, self.distances] + 1.0))
-        return torch.cat([seen[:, self.plain], torch.sin(turn), torch.cos(turn), near, place], dim=1)
+        """Features (..., size) of observations (..., n)."""
+        seen, place = observations[..., : self._n_obs], observations[..., self._n_obs :]
+        turn = np.float32(np.pi) * seen[..., self.angles]
+        near = torch.exp(-self.gain * (seen[..., self.distances] + 1.0))
+        return torch.cat([seen[..., self.plain], torch.sin(turn), torch.cos(turn), near, place], dim=-1)
 
 
 class RoleExtractor(nn.Module):
@@ -78,11 +80,10 @@ class RoleExtractor(nn.Module):
         widths = (size, *hidden)
         for who in ("policy", "value"):
             pairs = list(pairwise(widths))
-            weights = [nn.Parameter(_orthogonal(roles, one, two)) for one, two in pairs]
-            setattr(self, f"{who}_weights", nn.ParameterList(weights))
-            setattr(
-                self, f"{who}_biases", nn.ParameterList([nn.Parameter(torch.zeros(roles, two)) for _, two in pairs])
-            )
+            weights = nn.ParameterList([nn.Parameter(_orthogonal(roles, one, two)) for one, two in pairs])
+            biases = nn.ParameterList([nn.Parameter(torch.zeros(roles, two)) for _, two in pairs])
+            setattr(self, f"{who}_weights", weights)
+            setattr(self, f"{who}_biases", biases)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Latents of actor and critic."""
@@ -128,6 +129,20 @@ class BoatPolicy(ActorCriticPolicy):
         hidden = tuple(self.net_arch["pi"] if isinstance(self.net_arch, dict) else self.net_arch)
         size = self.features_dim - self._roles
         self.mlp_extractor = RoleExtractor(size, self._roles, hidden, self.activation_fn).to(self.device)
+
+
+def layers(size: int, hidden: Sequence[int], outputs: int, activation: str) -> list[nn.Module]:
+    """Layers of a plain network; ``activation`` between them."""
+    widths, act = (size, *hidden), ACTIVATIONS[activation]
+    between = [part for pair in pairwise(widths) for part in (nn.Linear(*pair), act())]
+    return [*between, nn.Linear(widths[-1], outputs)]
+
+
+def numbers_of(network: nn.Module) -> tuple[list[Any], list[Any]]:
+    """Weights (1, in, out) and biases (1, out) of a plain network's layers, as they are now, in numpy."""
+    linear = [layer for layer in network.modules() if isinstance(layer, nn.Linear)]
+    weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in linear]
+    return weights, [layer.bias.detach().cpu().numpy()[None].copy() for layer in linear]
 
 
 def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:

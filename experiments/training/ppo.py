@@ -17,16 +17,14 @@ from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER
 from steerclear.policies.entrants.learned.weights_file import joined, read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
-from torch import nn
 
 from .checkpoints import newest, read_checkpoint, write_checkpoint, write_model
 from .config import SELF, PpoConfig
 from .env import TrainEnv, carriers_of
-from .policy import BoatPolicy, TeamFeatures, features_of, load_actor, network_of
+from .policy import ACTIVATIONS, BoatPolicy, TeamFeatures, features_of, load_actor, network_of
 from .training import DivergedError, Notice, Training, card_of, device_of, means, threads
 
 MODEL, SNAPSHOTS = "model.zip", "snapshots"
-ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 TOLD = ("r", "l", "captures", "captures_against", "grabs", "grabs_against", "tags", "tags_against", "hits")
 ONE_OF_TWO = "give weights of a single network, such as play/final.npz of a training by qmix+ppo"
 MAY_DIFFER = ("decisions", "checkpoint_every", "device")

@@ -15,32 +15,34 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from steerclear.policies.entrants.learned.network import Network
+from steerclear.shield.actions import DISCRETE
 from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
 from .config import QmixConfig
 from .env import TrainEnv
-from .policy import TeamFeatures, features_of
+from .policy import TeamFeatures, features_of, layers, numbers_of
 from .training import DivergedError, Notice, Training, card_of, threads
+
+TARGET_EVERY = 100
+"""Updates between copies to the target networks."""
 
 
 class Transitions(NamedTuple):
-    """N moments of a team of n boats.
+    """N moments of a team of n boats; the mixer's state is what all of them see, (N, n * obs).
 
     Attributes:
-        seen: (N, n, obs) what each boat saw, next_seen the same a decision later.
-        state: (N, s) what the mixer sees, next_state likewise.
+        seen: (N, n, obs) what each boat saw.
         actions: (N, n) whole numbers.
         rewards: (N,) of the team.
+        next_seen: (N, n, obs) what each saw a decision later.
         ended: (N,) 1.0 where no reward can follow.
     """
 
     seen: torch.Tensor
-    state: torch.Tensor
     actions: torch.Tensor
     rewards: torch.Tensor
     next_seen: torch.Tensor
-    next_state: torch.Tensor
     ended: torch.Tensor
 
 
@@ -75,31 +77,15 @@ class Qmix:
     Args:
         agent: network from what a boat sees to its actions' values.
         mixer: of their values.
-        copies: builds another agent and mixer of the same shapes, for the targets.
         rate: of Adam.
         discount: per decision.
-        target_every: updates between copies to the targets.
     """
 
-    def __init__(
-        self,
-        agent: nn.Module,
-        mixer: nn.Module,
-        copies: tuple[nn.Module, nn.Module],
-        rate: float = 5e-4,
-        discount: float = 0.99,
-        target_every: int = 100,
-    ) -> None:
-        self.agent, self.mixer = agent, mixer
-        self.agent_target, self.mixer_target = copies
-        self.discount, self.target_every, self.updates = discount, target_every, 0
+    def __init__(self, agent: nn.Module, mixer: nn.Module, rate: float, discount: float) -> None:
+        self.agent, self.mixer, self.discount, self.updates = agent, mixer, discount, 0
+        self.agent_target, self.mixer_target = deepcopy(agent), deepcopy(mixer)
         self._parameters = [*agent.parameters(), *mixer.parameters()]
         self.optimiser = torch.optim.Adam(self._parameters, lr=rate)
-        self._copy()
-
-    def _copy(self) -> None:
-        self.agent_target.load_state_dict(self.agent.state_dict())
-        self.mixer_target.load_state_dict(self.mixer.state_dict())
 
     def loss(self, batch: Transitions) -> torch.Tensor:
         """Mean squared error of r + discount * Q_tot'(s', argmax Q) over transitions."""
@@ -107,9 +93,9 @@ class Qmix:
         with torch.no_grad():
             best = self.agent(batch.next_seen).argmax(2, keepdim=True)
             after = self.agent_target(batch.next_seen).gather(2, best)[..., 0]
-            future = self.mixer_target(after, batch.next_state)
+            future = self.mixer_target(after, batch.next_seen.flatten(1))
             target = batch.rewards + self.discount * (1.0 - batch.ended) * future
-        return nn.functional.mse_loss(self.mixer(chosen, batch.state), target)
+        return nn.functional.mse_loss(self.mixer(chosen, batch.seen.flatten(1)), target)
 
     def update(self, batch: Transitions) -> float:
         """One step of Adam; the loss before it."""
@@ -119,8 +105,9 @@ class Qmix:
         nn.utils.clip_grad_norm_(self._parameters, 10.0)
         self.optimiser.step()
         self.updates += 1
-        if self.updates % self.target_every == 0:
-            self._copy()
+        if self.updates % TARGET_EVERY == 0:
+            self.agent_target.load_state_dict(self.agent.state_dict())
+            self.mixer_target.load_state_dict(self.mixer.state_dict())
         return float(loss.detach())
 
 
@@ -145,11 +132,11 @@ class QmixTraining(Training):
         self.env = TrainEnv(config)
         core = self.env.batch.core
         self.boats, self._features = len(self.env.batch.boats), features_of(core, config.net.features)
-        looks = TeamFeatures(_Space(core.n_obs), self._features, core.n_obs, config.interval)
-        self.agent = _agent(looks, self._features.size(core.n_obs), config)
+        looks = TeamFeatures(self.env.observation_space, self._features, core.n_obs, config.interval)
+        size, net = self._features.size(core.n_obs), config.net
+        self.agent = nn.Sequential(looks, *layers(size, net.hidden, len(DISCRETE), net.activation))
         mixer = MonotoneMixer(self.boats, self.boats * core.n_obs)
-        copies = (deepcopy(self.agent), deepcopy(mixer))
-        self.learner = Qmix(self.agent, mixer, copies, config.options.rate, config.ppo.discount)
+        self.learner = Qmix(self.agent, mixer, config.options.rate, config.ppo.discount)
         self._replay = _Replay(config.options.replay, self.boats, core.n_obs)
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
@@ -173,7 +160,7 @@ class QmixTraining(Training):
         with torch.no_grad():
             best = self.agent(torch.as_tensor(seen)).argmax(1).numpy()
         random = self._rng.random(len(best)) < self._exploration()
-        actions = np.where(random, self._rng.integers(0, 17, len(best)), best)
+        actions = np.where(random, self._rng.integers(0, len(DISCRETE), len(best)), best)
         out = self.env.decide(actions)
         shape = (games, self.boats, -1)
         rewards = out.rewards.reshape(games, self.boats).mean(axis=1)
@@ -203,63 +190,31 @@ class QmixTraining(Training):
 
     def network(self) -> Network:
         """The boats' network in numpy; its outputs are values, whose best is played."""
-        layers = [layer for layer in self.agent if isinstance(layer, nn.Linear)]
-        weights = [layer.weight.detach().numpy().T[None].copy() for layer in layers]
-        biases = [layer.bias.detach().numpy()[None].copy() for layer in layers]
+        weights, biases = numbers_of(self.agent)
         card = {**card_of(self.config), "algorithm": "qmix"}
         n_obs, held = self.env.batch.core.n_obs, self.config.interval
         return Network(weights, biases, self._features, self.config.net.activation, "discrete", held, n_obs, card)
 
 
-class _Space:
-    """The shape of observations, for `TeamFeatures`."""
-
-    def __init__(self, size: int) -> None:
-        self.shape = (size,)
-
-
-def _agent(looks: nn.Module, size: int, config: QmixConfig) -> nn.Sequential:
-    act = nn.Tanh if config.net.activation == "tanh" else nn.ReLU
-    layers: list[nn.Module] = [_Each(looks)]
-    for width in config.net.hidden:
-        layers += [nn.Linear(size, width), act()]
-        size = width
-    return nn.Sequential(*layers, nn.Linear(size, 17))
-
-
-class _Each(nn.Module):
-    """Features of (..., n_obs)."""
-
-    def __init__(self, looks: nn.Module) -> None:
-        super().__init__()
-        self.looks = looks
-
-    def forward(self, seen: torch.Tensor) -> torch.Tensor:
-        flat = self.looks(seen.reshape(-1, seen.shape[-1]))
-        return flat.reshape(*seen.shape[:-1], -1)
-
-
 class _Replay:
-    """The last moments, in a ring."""
+    """The last moments, in a ring, in the order of `Transitions`."""
 
     def __init__(self, capacity: int, boats: int, n_obs: int) -> None:
         self.size = self._next = 0
-        self._seen = np.zeros((capacity, boats, n_obs), np.float32)
-        self._after = np.zeros_like(self._seen)
-        self._actions = np.zeros((capacity, boats), np.int64)
-        self._rewards, self._ended = np.zeros(capacity, np.float32), np.zeros(capacity, np.float32)
+        seen, numbers = (capacity, boats, n_obs), (capacity,)
+        shapes = ((seen, np.float32), ((capacity, boats), np.int64), (numbers, np.float32), (seen, np.float32))
+        self._kept = [np.zeros(*one) for one in (*shapes, (numbers, np.float32))]
 
-    def add(self, seen: Any, actions: Any, rewards: Any, after: Any, ended: Any) -> None:
+    def add(self, *moments: Any) -> None:
         """Add the moments of all games."""
-        at = (self._next + np.arange(len(rewards))) % len(self._rewards)
-        self._seen[at], self._actions[at], self._rewards[at] = seen, actions, rewards
-        self._after[at], self._ended[at] = after, ended
-        self._next = int((at[-1] + 1) % len(self._rewards))
-        self.size = min(self.size + len(rewards), len(self._rewards))
+        capacity, count = len(self._kept[0]), len(moments[0])
+        at = (self._next + np.arange(count)) % capacity
+        for kept, values in zip(self._kept, moments, strict=True):
+            kept[at] = values
+        self._next = int((at[-1] + 1) % capacity)
+        self.size = min(self.size + count, capacity)
 
     def draw(self, count: int, rng: np.random.Generator) -> Transitions:
         """So many at random."""
         at = rng.integers(0, self.size, count)
-        seen, after = torch.as_tensor(self._seen[at]), torch.as_tensor(self._after[at])
-        numbers = [torch.as_tensor(one[at]) for one in (self._actions, self._rewards, self._ended)]
-        return Transitions(seen, seen.flatten(1), numbers[0], numbers[1], after, after.flatten(1), numbers[2])
+        return Transitions(*(torch.as_tensor(kept[at]) for kept in self._kept))

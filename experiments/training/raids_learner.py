@@ -17,6 +17,7 @@ from steerclear.shield.exceptions import ConfigError
 from torch import nn
 
 from .config import RaidsConfig
+from .policy import ACTIVATIONS, numbers_of
 from .training import DivergedError, device_of
 
 NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
@@ -157,19 +158,17 @@ class RaidsLearner:
 
     def network(self, card: dict[str, Any]) -> Network:
         """The actor in numpy."""
-        layers = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
-        weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in layers]
-        biases = [layer.bias.detach().cpu().numpy()[None].copy() for layer in layers]
+        weights, biases = numbers_of(self.actor)
         config, n = self._config, weights[0].shape[1]
         return Network(weights, biases, NONE, config.net.activation, "raids", config.interval, n, card)
 
 
 def _network(config: RaidsConfig, outputs: int) -> nn.Sequential:
     """Layers; the last begins near nothing, so that raids begin as the script's."""
-    sizes, layers = (SEEN, *config.net.hidden, outputs), []
-    for before, after in pairwise(sizes):
-        layers += [nn.Linear(before, after), nn.Tanh() if config.net.activation == "tanh" else nn.ReLU()]
-        nn.init.orthogonal_(layers[-2].weight, 2.0**0.5)
-        nn.init.zeros_(layers[-2].bias)
-    nn.init.orthogonal_(layers[-2].weight, FIRST_GAIN)
-    return nn.Sequential(*layers[:-1])
+    found: list[nn.Module] = []
+    for before, after in pairwise((SEEN, *config.net.hidden, outputs)):
+        found += [nn.Linear(before, after), ACTIVATIONS[config.net.activation]()]
+        nn.init.orthogonal_(found[-2].weight, 2.0**0.5)
+        nn.init.zeros_(found[-2].bias)
+    nn.init.orthogonal_(found[-2].weight, FIRST_GAIN)
+    return nn.Sequential(*found[:-1])

@@ -13,82 +13,51 @@ from steerclear.shield.platforms import layout as L
 
 from ..play.spec import near
 
+Earned = Callable[[Any, BoolArray], Array]
 
-class Sparse:
-    """Captures +-1 and grabs +-0.5 of both teams, shared by the team."""
+
+class Term:
+    """A reward term that remembers nothing.
+
+    Args:
+        earned: of the last game step, (B, n), or (B, 1) where the team shares it: takes the batch, and (B, n) whose
+            commands the shield changed.
+    """
+
+    def __init__(self, earned: Earned) -> None:
+        self.reward = earned
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Nothing is remembered."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        events = batch.core.events
-        net = events[:, batch.team] - events[:, 1 - batch.team]
-        team = 1.0 * net[:, 0] + 0.5 * net[:, 1]
-        return np.repeat(team[:, None], len(batch.boats), axis=1)
+        """Games (B,) begin anew."""
 
 
-class Tags(Sparse):
-    """Tags made +1, tags suffered -1, shared by the team."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        events = batch.core.events
-        net = (events[:, batch.team, 2] - events[:, 1 - batch.team, 2]).astype(float)
-        return np.repeat(net[:, None], len(batch.boats), axis=1)
+def _net(batch: Any, event: int) -> Array:
+    """(B, 1) an event of the own team less the other's: captures 0, grabs 1, tags 2."""
+    events = batch.core.events
+    net: Array = (events[:, batch.team, event] - events[:, 1 - batch.team, event]).astype(float)[:, None]
+    return net
 
 
-class Tagging(Sparse):
-    """+1 to a boat that has just tagged an opponent: credit for defending, to who did it."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        made: Array = (batch.core.made_tag[:, batch.boats] >= 0).astype(float)
-        return made
-
-
-class Collision(Sparse):
-    """-1 for each new collision of the boat itself; the paper's Table 1 weighs it 0.025, its Table 3 fits 0.25."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        return -batch.core.new_collisions[:, batch.boats].astype(float)
-
-
-class Intervention(Sparse):
-    """-1 for each game step in which the shield changed the boat's command."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        return -changed.astype(float)
+def _remembered(before: Array | None, now: Array, games: BoolArray) -> Array:
+    """What is remembered, as it is now in games (B,) that begin, and everywhere where nothing was."""
+    kept = now.copy() if before is None or before.shape != now.shape else before
+    kept[games] = now[games]
+    return kept
 
 
 class Tagged:
     """-1 to a boat that has just been tagged, or left the field."""
 
+    before: Array | None = None
+
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember who is tagged."""
-        now = batch.core.is_tagged[:, batch.boats]
-        if not hasattr(self, "before") or self.before.shape != now.shape:
-            self.before = now.copy()
-        self.before[games] = now[games]
+        self.before = _remembered(self.before, batch.core.is_tagged[:, batch.boats], games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
-        now = batch.core.is_tagged[:, batch.boats]
-        fresh = now & ~self.before
-        self.before[:] = now
-        return -fresh.astype(float)
-
-
-class Captures(Sparse):
-    """Captures +-1 of both teams, shared by the team: what the game is won by, without a prize for grabs alone."""
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        events = batch.core.events
-        net = (events[:, batch.team, 0] - events[:, 1 - batch.team, 0]).astype(float)
-        return np.repeat(net[:, None], len(batch.boats), axis=1)
+        before, self.before = self.before, batch.core.is_tagged[:, batch.boats]
+        return -(self.before & ~before).astype(float)
 
 
 class Own:
@@ -98,22 +67,18 @@ class Own:
     more than those that do.
     """
 
+    before: Array | None = None
+
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember who carries."""
-        now = batch.core.has_flag[:, batch.boats]
-        if not hasattr(self, "before") or self.before.shape != now.shape:
-            self.before = now.copy()
-        self.before[games] = now[games]
+        self.before = _remembered(self.before, batch.core.has_flag[:, batch.boats], games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
-        core = batch.core
-        now = core.has_flag[:, batch.boats]
-        grabbed = now & ~self.before
-        given = self.before & ~now
-        home = given & (core.events[:, batch.team, 0] > 0)[:, None]
-        self.before[:] = now
-        return grabbed + 2.0 * home - (given & ~home)
+        before, self.before = self.before, batch.core.has_flag[:, batch.boats]
+        given = before & ~self.before
+        home = given & (batch.core.events[:, batch.team, 0] > 0)[:, None]
+        return (self.before & ~before) + 2.0 * home - (given & ~home)
 
 
 class Progress:
@@ -125,13 +90,15 @@ class Progress:
     """
 
     share_back = 0.0
+    way: Array | None = None
+    goal: Array | None = None
+    gained: Array | None = None
 
     def begin(self, batch: Any, games: BoolArray) -> None:
         """Remember ways."""
         way, goal = self._ways(batch)
-        if not hasattr(self, "way") or self.way.shape != way.shape:
-            self.way, self.goal, self.gained = way.copy(), goal.copy(), np.zeros(way.shape)
-        self.way[games], self.goal[games], self.gained[games] = way[games], goal[games], 0.0
+        self.way, self.goal = _remembered(self.way, way, games), _remembered(self.goal, goal, games)
+        self.gained = _remembered(self.gained, np.zeros(way.shape), games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
@@ -139,9 +106,9 @@ class Progress:
         tagged = batch.core.is_tagged[:, batch.boats]
         same = (goal == self.goal) & (goal > 0)
         earned = np.where(tagged, -self.share_back * self.gained, np.where(same, self.way - way, 0.0))
-        self.gained += earned
-        self.gained[tagged | ((self.goal == 2) & (goal != 2))] = 0.0
-        self.way[:], self.goal[:] = way, goal
+        kept = ~tagged & ((self.goal != 2) | (goal == 2))
+        self.gained = np.where(kept, self.gained + earned, 0.0)
+        self.way, self.goal = way, goal
         return earned / float(batch.core.config.env_bounds_m[0])
 
     @staticmethod
@@ -182,8 +149,7 @@ class Denied(Advance):
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
-        theirs = super().reward(_other_team(batch), changed).sum(axis=1, keepdims=True)
-        return -np.repeat(theirs, len(batch.boats), axis=1)
+        return -super().reward(_other_team(batch), changed).sum(axis=1, keepdims=True)
 
 
 def _other_team(batch: Any) -> Any:
@@ -192,19 +158,23 @@ def _other_team(batch: Any) -> Any:
 
 
 TERMS: dict[str, Callable[[], Any]] = {
-    "sparse": Sparse,
-    "captures": Captures,
+    "sparse": lambda: Term(lambda batch, changed: _net(batch, 0) + 0.5 * _net(batch, 1)),
+    "captures": lambda: Term(lambda batch, changed: _net(batch, 0)),
     "progress": Progress,
     "advance": Advance,
     "denied": Denied,
     "own": Own,
-    "tags": Tags,
-    "tagging": Tagging,
+    "tags": lambda: Term(lambda batch, changed: _net(batch, 2)),
+    "tagging": lambda: Term(lambda batch, changed: (batch.core.made_tag[:, batch.boats] >= 0).astype(float)),
     "tagged": Tagged,
-    "collision": Collision,
-    "intervention": Intervention,
+    "collision": lambda: Term(lambda batch, changed: -batch.core.new_collisions[:, batch.boats].astype(float)),
+    "intervention": lambda: Term(lambda batch, changed: -changed.astype(float)),
 }
-"""By the name that a config weighs them with."""
+"""By the name that a config weighs them with; docs/train.md says what each is.
+
+``sparse``, ``captures`` and ``tags`` are the team's, which its boats share; ``tagging`` pays who made the tag. Of
+``collision`` the paper's Table 1 weighs 0.025, its Table 3 fits 0.25.
+"""
 
 
 class WeightedSum:

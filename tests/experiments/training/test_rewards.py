@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from steerclear.experiments.training.rewards import Advance, Denied, Own, Progress, Tagging
+from steerclear.experiments.training.rewards import TERMS, Advance, Denied, Own, Progress
 from steerclear.shield.platforms.layout import N_STATE, X, Y
 
 NOW = np.ones(1, np.bool_)
@@ -73,7 +73,7 @@ def kept_at_home():
 def test_who_tags_is_paid_and_nobody_else():
     made = np.array([[-1, 4, -1, -1, 0, -1]])
     ours = SimpleNamespace(core=SimpleNamespace(made_tag=made), boats=np.arange(3), team=0)
-    assert Tagging().reward(ours, NOW).tolist() == [[0.0, 1.0, 0.0]]
+    assert TERMS["tagging"]().reward(ours, NOW).tolist() == [[0.0, 1.0, 0.0]]
 
 
 def seen_by_the_others(batch):

@@ -1,23 +1,25 @@
 import json
+import shutil
 
 import pytest
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.result_files import write_json
+from steerclear.experiments.runner import RESULTS_FILE
+from steerclear.experiments.training.config import SHIELDS
 from steerclear.experiments.training.config_file import config_of
-from steerclear.experiments.training.study import cells, learning_of, settings_of_cell
+from steerclear.experiments.training.study import config_of_training, learning_of, run_study, trainings_of
 from steerclear.shield.exceptions import ConfigError
 
 
-def test_a_deployed_shield_shares_the_training_without_one():
-    found = list(cells(seeds=2))
-    assert len(found) == 16
-    assert len({cell.training for cell in found}) == 12
-    bare, deployed = (next(c for c in found if c.shield == shield) for shield in ("none", "deployment"))
-    base = config_of({"rewards": {"sparse": 1.0, "collision": 9.0}})
-    assert settings_of_cell(base, bare) == settings_of_cell(base, deployed)
-    assert settings_of_cell(base, bare).rewards == {"sparse": 1.0}
-    with_term = next(cell for cell in found if cell.collision == "on")
-    assert settings_of_cell(base, with_term).rewards["collision"] == 0.25
+def test_a_deployed_shield_shares_the_training_without_one(tmp_path):
+    base = config_of({"rewards": {"sparse": 1.0, "collision": 9.0}, "seed": 5})
+    found = trainings_of(base, tmp_path, 2, 1)
+    assert len(found) == len({job["folder"] for job in found}) == 12
+    bare, with_term = found[0], found[3]
+    assert [cell["shield"] for cell in bare["cells"]] == ["none", "deployment"]
+    assert (bare["config"]["rewards"], bare["config"]["shield"], bare["config"]["seed"]) == ({"sparse": 1.0}, "none", 5)
+    assert with_term["config"]["rewards"]["collision"] == 0.25
+    assert config_of(found[-1]["config"]) == config_of_training(base, "training+intervention", 0.25, 1)
 
 
 def test_what_a_training_tells_of_its_learning():
@@ -32,12 +34,12 @@ def test_what_a_training_tells_of_its_learning():
 
 def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     rows = []
-    for cell in cells(seeds=2):
-        nets = [1.0, 2.0, 3.0] if cell.shield == "none" else [2.0, 2.0, 3.0]
-        hits = [4.0, 5.0, 3.0] if cell.shield == "none" else [0.0, 0.0, 0.0]
+    for cell in [cell for job in trainings_of(config_of({}), tmp_path, 2, 1) for cell in job["cells"]]:
+        nets = [1.0, 2.0, 3.0] if cell["shield"] == "none" else [2.0, 2.0, 3.0]
+        hits = [4.0, 5.0, 3.0] if cell["shield"] == "none" else [0.0, 0.0, 0.0]
         figures = {"captures": 2.0, "captures_against": 0.0, "interventions": 4.0, "nets": nets, "hit_counts": hits}
-        about = {"shield": cell.shield, "collision": cell.collision, "seed": cell.seed, "opponent": "hard"}
-        rows.append({**about, **figures, "learned": [None, 0.0, 1.0, 2.0], "training_hits": 3.0})
+        learned = {"learned": [None, 0.0, 1.0, 2.0], "training_hits": 3.0}
+        rows.append({**cell, "opponent": "hard", **figures, **learned})
     training = {"decisions": 1000, "interval": 10, "preset": "aamas2024", "stages": [{"opponents": ["medium"]}]}
     settings = {"seeds": 2, "games": 3, "training": training}
     write_pages([{"command": "train-study", "settings": settings, "rows": rows}], tmp_path)
@@ -53,43 +55,44 @@ def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     assert "| training | on | - | +0.00 | +1.00 | +2.00 | 3.00 |" in page
 
 
-def test_trainings_at_once_give_what_they_give_one_after_another(tiny_content, tmp_path):
-    pytest.importorskip("stable_baselines3")
-    from steerclear.experiments.training.study import run_study
+@pytest.fixture(scope="module")
+def base(tiny_content):
+    return config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
 
-    base = config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+
+def test_trainings_at_once_give_what_they_give_one_after_another(base, tmp_path):
     told = []
     rows = [
-        run_study(base, tmp_path / str(jobs), 1, 1, lambda done, words: told.append(done), jobs)["rows"]
+        run_study(base, tmp_path / str(jobs), 1, 1, lambda done, of: told.append((done, of)), jobs)["rows"]
         for jobs in (1, 2)
     ]
     assert rows[0] == rows[1]
-    assert [row["shield"] for row in rows[0]] == [cell.shield for cell in cells(1)]
-    assert told[-1] == 8
+    assert [(row["shield"], row["collision"]) for row in rows[0]] == [
+        (shield, collision) for collision in ("off", "on") for shield in SHIELDS
+    ]
+    assert told[-1] == (6, 6)
 
 
 def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
     """Its networks would be taken for those of the config given."""
-    pytest.importorskip("stable_baselines3")
-    from steerclear.experiments.training.study import RESULTS, _results, run_study
+    base, other = (config_of({"decisions": decisions}) for decisions in (100, 200))
+    for name in ("results.json", "experiment.json"):  # the second is there from the beginning
+        settings = {"seeds": 1, "games": 1, "training": other.model_dump(mode="json")}
+        write_json(tmp_path / name, {"command": "train-study", "settings": settings})
+        with pytest.raises(ConfigError, match=r"holds a study of another config \(decisions\); give its own, or name"):
+            run_study(base, tmp_path, 1, 1, lambda done, of: None)
+        (tmp_path / name).write_text('{"command": "ablate"}')
+        with pytest.raises(ConfigError, match="holds no study; name another --out"):
+            run_study(base, tmp_path, 1, 1, lambda done, of: None)
+        (tmp_path / name).unlink()
 
-    base = config_of({"decisions": 100})
-    write_json(tmp_path / RESULTS, _results(config_of({"decisions": 200}), 1, 1, {}))
-    with pytest.raises(ConfigError, match=r"holds a study of another config \(decisions\); give its own, or name"):
-        run_study(base, tmp_path, 1, 1, lambda done, words: None)
-    (tmp_path / RESULTS).write_text('{"command": "ablate"}')
-    with pytest.raises(ConfigError, match="holds no study; name another --out"):
-        run_study(base, tmp_path, 1, 1, lambda done, words: None)
 
-
-def test_a_training_that_fails_is_named_and_the_others_are_kept(tiny_content, tmp_path):
-    pytest.importorskip("stable_baselines3")
-    from steerclear.experiments.training.study import RESULTS, run_study
-
-    base = config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
+def test_a_training_that_fails_is_named_and_the_others_are_kept(base, tmp_path):
     spoiled = tmp_path / "training-collision_on-seed_0"
     (spoiled / "checkpoints").mkdir(parents=True)
     (spoiled / "checkpoints" / "00000001.zip").write_bytes(b"no checkpoint")
     with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
-        run_study(base, tmp_path, 1, 1, lambda done, words: None)
-    assert len(json.loads((tmp_path / RESULTS).read_text())["rows"]) == 7
+        run_study(base, tmp_path, 1, 1, lambda done, of: None)
+    assert len(json.loads((tmp_path / RESULTS_FILE).read_text())["rows"]) == 7
+    shutil.rmtree(spoiled)
+    assert len(run_study(base, tmp_path, 1, 1, lambda done, of: None)["rows"]) == 8

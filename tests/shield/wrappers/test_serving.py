@@ -1,8 +1,5 @@
 """A shield remembers the boats it decides for: serving two teams, or two games, in turn is refused, in any wrapper."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from steerclear import policies
@@ -83,17 +80,6 @@ def test_one_shield_round_two_functions_is_refused_until_its_reset():
         other("other")
     shield.reset()
     np.testing.assert_array_equal(other("other").values, [[1.0, 0.0]])
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
-def test_copies_serve_on(copied):
-    env = ShieldedParallelEnv(MctfEnv(SMALL), Shield())
-    env.reset(seed=0)
-    still = {agent: 16 for agent in env.possible_agents}
-    twin = copied(env)
-    twin.step(still)
-    env.step(still)
-    np.testing.assert_array_equal(env.unwrapped.core.state, twin.unwrapped.core.state)
 
 
 def test_one_shield_of_games_for_both_teams_is_refused_until_its_reset():

@@ -128,11 +128,6 @@ def test_other_wrappers_may_stand_in_between(on):
     np.testing.assert_array_equal(twice.decisions.fleet.state[:, :2], core.previous_position[0])
 
 
-def test_an_environment_of_turns_is_refused():
-    with pytest.raises(ConfigError, match=r"is an AEC env, in which boats act in turn, .* wrap the parallel env"):
-        ShieldedParallelEnv(parallel_to_aec(MctfEnv(SMALL)), Shield())
-
-
 def test_both_teams_are_shielded_in_either_order_and_through_other_wrappers():
     def both(first, second, wrap=lambda env: env):
         return play(ShieldedParallelEnv(wrap(ShieldedParallelEnv(MctfEnv(SMALL), Shield(), first)), Shield(), second))

@@ -40,21 +40,6 @@ def test_pettingzoo_in_turns():
     seed_test(lambda: parallel_to_aec(one(SMALL)), num_cycles=5)
 
 
-def test_decisions_are_the_same_from_the_same_seed_and_others_from_another():
-    def told(seed):
-        env, found = both(SMALL), []
-        env.reset(seed=seed)
-        for agent in env.possible_agents:
-            env.action_space(agent).seed(0)
-        for _ in range(20):
-            *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-            found.append([info["shield"] for info in infos.values()])
-        return found
-
-    assert data_equivalence(told(3), told(3))
-    assert not data_equivalence(told(3), told(4))
-
-
 def test_gymnasium_spaces_and_seeds_of_the_vector_environment():
     envs = [Batch(MctfVectorEnv).front for _ in range(2)]
     assert isinstance(envs[0], VectorEnv)

@@ -14,7 +14,6 @@ from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.wrappers import ShieldedParallelEnv, ShieldedTeamPolicy
 from wrapped_games import GAMES, KINDS, SMALL, Batch, Env, sb3_front
 
 COPIES = {
@@ -54,37 +53,6 @@ def test_copies_of_the_environment_for_stable_baselines_go_on_alike(way):
     game = begun(lambda: Batch(sb3_front))
     other = COPIES[way](game)
     assert other.play() == game.play()
-
-
-@pytest.mark.parametrize("way", COPIES)
-def test_decisions_of_a_copy_are_of_its_own_boats(way):
-    env = begun(Env).env
-    other = COPIES[way](env)
-    for _ in range(12):
-        env.step({})
-    other.step({})
-    decided = other.decisions.fleet.state[:, :2]
-    np.testing.assert_allclose(decided, other.unwrapped.core.previous_position[0], atol=1e-9)
-    assert np.abs(decided - env.unwrapped.core.state[0, :, :2]).max() > 0.5
-
-
-class SelfCopying:
-    """A policy with its own way of being copied, which knows nothing of a shield."""
-
-    def reset(self, env, agent_ids, seed):
-        pass
-
-    def act(self, observations, infos):
-        return {}
-
-    def __deepcopy__(self, memo):
-        return SelfCopying()
-
-
-def test_a_policy_that_copies_itself_takes_its_shield_along():
-    team = Shield().wrap(SelfCopying())
-    assert isinstance(copy.deepcopy(team), ShieldedTeamPolicy)
-    assert isinstance(copy.deepcopy(team).policy, SelfCopying)
 
 
 def fleet_of(gap_m):
@@ -165,14 +133,6 @@ def test_threads_with_wrappers_of_their_own_do_not_mix_their_games():
     for thread in threads:
         thread.join(60.0)
     assert found == [alone, alone]
-
-
-def test_a_wrapper_is_copied_with_the_wrapped_game_only():
-    env = MctfEnv(SMALL)
-    wrapped = ShieldedParallelEnv(env, Shield())
-    other = copy.deepcopy(wrapped)
-    assert other.unwrapped is not env
-    assert other._reader.env is other.unwrapped
 
 
 @pytest.mark.parametrize("way", [*COPIES, "another game"])

@@ -68,6 +68,10 @@ def test_the_three_ways_to_begin_anew(mode):
     last, _, terminated, truncated, infos = envs.step(stop)
     assert (terminated | truncated).all()
     assert infos["_totals"].all()
+    assert ("final_obs" in infos) == (mode is AutoresetMode.SAME_STEP)
+    if mode is AutoresetMode.SAME_STEP:
+        assert envs.single_observation_space.contains(infos["final_obs"][0])
+        assert (infos["final_obs"] != last).any()
     np.testing.assert_array_equal(infos["totals"]["l"], 2)
     if mode is AutoresetMode.DISABLED:
         with pytest.raises(ConfigError, match="games have ended; reset them"):

@@ -8,7 +8,6 @@ import pytest
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Reason, Shield
-from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import ShieldedParallelEnv
 from steerclear.shield.wrappers.pyquaticus import PyquaticusReader
@@ -89,24 +88,6 @@ def test_boats_the_game_drives_are_covered_only_when_asked(autopilot):
     *_, infos = env.step(dict.fromkeys(env.agents, STRAIGHT))
     assert env.unwrapped.view().driven[0]
     assert (infos["agent_0"]["shield"].reason == Reason.NOT_COVERED) is not autopilot
-
-
-def test_a_new_game_starts_with_a_shield_that_remembers_nothing():
-    env, options = duel()
-    env = ShieldedParallelEnv(env, Shield())
-    first, told = sail(env, options)
-    second, again = sail(env, options)
-    assert first == second
-    assert [i["agent_0"]["shield"].sent_heading_rad for i in told] == [
-        i["agent_0"]["shield"].sent_heading_rad for i in again
-    ]
-
-
-def test_unknown_teams_and_environments_are_refused():
-    with pytest.raises(ConfigError, match="unknown team 'green'; choose 'blue' or 'red'"):
-        ShieldedParallelEnv(duel()[0], Shield(), team="green")
-    with pytest.raises(ConfigError, match="cannot read a game from SimpleNamespace"):
-        ShieldedParallelEnv(SimpleNamespace(), Shield())
 
 
 class Player:
@@ -197,15 +178,6 @@ def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():
     env.step({"agent_0": STRAIGHT})
     assert env.decisions[0].reason == Reason.NOT_COVERED
     assert game.moved[0]["agent_0"].tolist() == [1.5, 0.0]
-
-
-@pytest.mark.parametrize("action", [17, -18, [[1, 2, 3]], 2.5, math.nan])
-def test_pyquaticus_actions_that_are_none_are_refused(action):
-    env = ShieldedParallelEnv(Quaticus(gap_m=30.0), Shield())
-    env.reset(seed=0)
-    with pytest.raises(GameError, match=r"of agent_0 is (not usable|out of range); give a whole number 0\.\.16"):
-        env.step({"agent_0": action})
-    assert env.unwrapped.stepped == []
 
 
 def test_rows_of_pyquaticus_players_hold_what_is_known():

@@ -9,7 +9,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Commands, Fleet, Reason, Shield
-from steerclear.shield.exceptions import ConfigError, GameError, PolicyError
+from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.wrappers import ShieldedCallable, ShieldedParallelEnv, ShieldedTeamPolicy, games_shield
 
 OWN = ["agent_0", "agent_1", "agent_2"]
@@ -179,51 +179,6 @@ def test_a_class_is_no_policy_and_a_team_policy_is_not_read():
         Shield().wrap(type(policies.make("medium")))
     with pytest.raises(ConfigError, match=r"read= is for plain functions; .* leave it out"):
         Shield().wrap(policies.make("medium"), read=near)
-
-
-def answering(action):
-    """A shielded team in a game, whose policy always gives every boat one action."""
-
-    class Odd:
-        def reset(self, env, agent_ids, seed):
-            pass
-
-        def act(self, observations, infos):
-            return dict.fromkeys(OWN, action)
-
-    env, start = crowd()
-    env.reset(seed=1, options=start)
-    team = Shield().wrap(Odd())
-    team.reset(env, OWN, 0)
-    return team
-
-
-@pytest.mark.parametrize(
-    ("action", "text"),
-    [
-        (np.array([np.nan, 0.0]), "not finite"),
-        (None, "not usable"),
-        ((1.0, 2.0, 3.0), "not usable"),
-        (np.ma.masked_array([1.0, 2.0], mask=[False, True]), "not usable"),
-        (np.array(4.5), "not usable"),
-        (1.0 + 2.0j, "not usable"),
-        ("home", "unknown field point 'home'"),
-        (True, "not usable"),
-        ((True, 0.0), "not usable"),
-        (np.array([True, False]), "not usable"),
-        (iter([1.0, 2.0]), "not usable"),
-    ],
-)
-def test_what_is_no_action_is_refused_by_name_of_the_boat(action, text):
-    team = answering(action)
-    with pytest.raises(GameError, match=text):
-        team.act({}, {})
-
-
-@pytest.mark.parametrize("action", [np.array([1.0, 20.0], np.float16), np.array(4), np.ma.masked_array([1.0, 20.0])])
-def test_numbers_of_any_kind_are_actions(action):
-    team = answering(action)
-    assert set(team.act({}, {})) == set(OWN)
 
 
 def test_a_policy_that_answers_nothing_is_told_what_to_answer():
