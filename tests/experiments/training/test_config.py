@@ -63,7 +63,7 @@ def test_what_a_config_may_not_say(content, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("path", [*TEAMS, ROOT / "docs" / "studies" / "learning.yaml"], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*TEAMS, *(ROOT / "docs" / "studies").glob("*.yaml")], ids=lambda path: path.stem)
 def test_every_config_of_the_repository_can_be_read(path):
     found = read_config(path)
     assert found.algorithm == yaml.safe_load(path.read_text()).get("algorithm", "ppo")
