@@ -28,7 +28,7 @@ sys.exit(main(sys.argv[1:]))
 """
 """What the process runs: the supervisor, without the working directory's own modules in its way."""
 PART = "steerclear.experiments.deploy.policy_child"
-DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True)
+DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True, network=True)
 """Limits of a policy that may play for days."""
 TAIL_BYTES = 4096
 """How much of what the policy prints is kept."""

@@ -33,21 +33,18 @@ def to_plain(action: Any, depth: int = 0) -> Any:
     """An answer as JSON content, from which `from_plain` makes the same action."""
     if hasattr(action, "detach"):  # a tensor
         action = action.detach().cpu().numpy()
-    if isinstance(action, (np.ndarray, np.generic)):
-        if action.size <= MOST and action.dtype.name in _NUMBERS:
-            return {"array": action.tolist(), "dtype": action.dtype.name, "scalar": isinstance(action, np.generic)}
-        return _unreadable(action)
-    if isinstance(action, list | tuple):
-        if len(action) > MOST or depth >= DEEPEST:
-            return _unreadable(action)
+    if isinstance(action, (np.ndarray, np.generic)) and action.size <= MOST and action.dtype.name in _NUMBERS:
+        return {"array": action.tolist(), "dtype": action.dtype.name, "scalar": isinstance(action, np.generic)}
+    if isinstance(action, list | tuple) and len(action) <= MOST and depth < DEEPEST:
         return {"tuple" if isinstance(action, tuple) else "list": [to_plain(item, depth + 1) for item in action]}
-    if action is None or type(action) in (bool, float):
+    short = (type(action) is int and abs(action) < 2**63) or (type(action) is str and len(action) <= MOST)
+    if short or action is None or type(action) in (bool, float):
         return action
-    if type(action) is int:
-        return action if abs(action) < 2**63 else _unreadable(action)
-    if type(action) is str and len(action) <= MOST:
-        return action
-    return _unreadable(action)
+    try:
+        text = repr(action)
+    except Exception:
+        text = type(action).__name__
+    return {"unreadable": plain_text(text, 80)}
 
 
 def from_plain(content: Any, depth: int = 0) -> Any:
@@ -66,11 +63,3 @@ def from_plain(content: Any, depth: int = 0) -> Any:
         if isinstance(items, list) and depth < DEEPEST:
             return kind(from_plain(item, depth + 1) for item in items)
     return Unreadable(plain_text(content.get("unreadable", "nothing"), 80))
-
-
-def _unreadable(action: Any) -> dict[str, str]:
-    try:
-        text = repr(action)
-    except Exception:
-        text = type(action).__name__
-    return {"unreadable": plain_text(text, 80)}

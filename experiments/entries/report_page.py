@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import pandas as pd
 from steerclear.env.config import GameConfig
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.policies.submissions.stage import Stage
@@ -16,13 +16,23 @@ from ..ablation import AblationSettings
 from ..metrics import breach_column
 from ..page import render, write_page
 from ..play.spec import MatchSpec
-from ..statistics import Interval, paired_difference
-from ..tables import number_text
+from ..statistics import paired_difference
+from ..tables import interval_text, number_text
 from ..workers import Row
 from .package import game_spec
 from .wrap import own_files, shielded_files, write_zip
 
 PAGE, ZIP = "entry.html", "shielded.zip"
+LOOKED = "a game, every step looked at"
+TILES = (
+    ("opponents", "hits with opponents", LOOKED),
+    ("teammates", "hits with team-mates", LOOKED),
+    ("collisions", "counted by the game", "a game, once a decision"),
+    ("captures", "captures", "a game"),
+    ("net", "net of captures", "made less given up, a game"),
+)
+SUMS = ("captures", "captures_against", "teammates", "opponents", "collisions")
+"""Columns of totals in the table."""
 
 
 @dataclass(frozen=True)
@@ -77,28 +87,25 @@ def shielded_zip(
         stage.close()
 
 
-def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, tuple[list[Row], ...]]:
-    """Games against each opponent that were played in every way: bare, (as the zip,) with the shield round the game."""
+def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, list[pd.DataFrame]]:
+    """Games against each opponent that were played in every way: bare, (as the zip,) with the shield round the game.
+
+    Returns:
+        Tables by game, with the columns ``net`` (captures made less given up), ``teammates`` and ``opponents`` (hits).
+    """
+    columns = {f"{kind}s": breach_column(kind, settings.separation_m) for kind in ("teammate", "opponent")}
+    table = pd.DataFrame(rows).rename(columns={column: name for name, column in columns.items()})
+    table["net"] = table["captures"] - table["captures_against"]
     ways = [(settings.own, False), *([(settings.zip_file, False)] if settings.zip_file else []), (settings.own, True)]
     found = {}
-    for name in dict.fromkeys(row["opponent"] for row in rows):
-        played = [
-            {row["game"]: row for row in rows if row["opponent"] == name and (row["own"], bool(row["shielded"])) == way}
-            for way in ways
+    for name, played in table.groupby("opponent", sort=False):
+        each = [
+            played[(played["own"] == own) & (played["shielded"].astype(bool) == shielded)].set_index("game")
+            for own, shielded in ways
         ]
-        common = sorted(set.intersection(*map(set, played)))
-        found[name] = tuple([each[game] for game in common] for each in played)
+        common = sorted(set.intersection(*(set(one.index) for one in each)))
+        found[str(name)] = [one.loc[common] for one in each]
     return found
-
-
-def net(row: Row) -> float:
-    """Captures made less those of the other team."""
-    return float(row["captures"] - row["captures_against"])
-
-
-def net_change(off: Sequence[Row], on: Sequence[Row], seed: int = 0) -> Interval:
-    """Mean change of the net of captures by the shield, with its 95 % interval over pairs of games."""
-    return paired_difference([net(row) for row in off], [net(row) for row in on], seed)
 
 
 def write_entry_page(
@@ -131,57 +138,29 @@ def write_entry_page(
         "same seeds.",
         warnings=warnings,
         ways=["bare", *(["the zip"] if settings.zip_file else []), "shield round the game"],
-        tiles=_tiles(groups, settings),
-        rows=[_opponent(name, group, settings) for name, group in groups.items()],
+        tiles=_tiles(groups),
+        rows=[_opponent(name, ways, settings.seed) for name, ways in groups.items()],
         radius=f"{settings.separation_m:g} m",
         links=links,
     )
     return write_page(folder / PAGE, page)
 
 
-def _sums(rows: Sequence[Row], settings: EntryGames) -> dict[str, float]:
-    """Totals of some games."""
-    names = {
-        "captures": "captures",
-        "against": "captures_against",
-        "counted": "collisions",
-        "mates": breach_column("teammate", settings.separation_m),
-        "opponents": breach_column("opponent", settings.separation_m),
-    }
-    return {short: float(sum(row[column] for row in rows)) for short, column in names.items()}
+def _tiles(groups: Mapping[str, Sequence[pd.DataFrame]]) -> list[tuple[str, list[str], str]]:
+    """Label, a figure a game for each way, and a note."""
+    ways = [pd.concat(each) for each in zip(*groups.values(), strict=True)]
+    return [
+        (label, [number_text(float(games[column].mean()) if len(games) else 0.0) for games in ways], note)
+        for column, label, note in TILES
+    ]
 
 
-def _tiles(groups: Mapping[str, tuple[list[Row], ...]], settings: EntryGames) -> list[tuple[str, list[str], str]]:
-    """Label, a figure for each way, and a note."""
-    ways = [[row for group in each for row in group] for each in zip(*groups.values(), strict=True)]
-    sums = [_sums(rows, settings) for rows in ways]
-    games = max(1, len(ways[0]))
-    looked = "a game, every step looked at"
-    shown = (
-        ("hits with opponents", "opponents", looked),
-        ("hits with team-mates", "mates", looked),
-        ("counted by the game", "counted", "a game, once a decision"),
-        ("captures", "captures", "a game"),
-    )
-    tiles = [(label, [number_text(one[name] / games) for one in sums], note) for label, name, note in shown]
-    nets = [number_text(float(np.mean([net(row) for row in rows])) if rows else 0.0) for rows in ways]
-    return [*tiles, ("net of captures", nets, "made less given up, a game")]
-
-
-def _opponent(name: str, group: tuple[list[Row], ...], settings: EntryGames) -> list[str]:
+def _opponent(name: str, ways: Sequence[pd.DataFrame], seed: int) -> list[str]:
     """Row of the table: one opponent, totals of all games that were played in every way."""
-    sums = [_sums(rows, settings) for rows in group]
-    cells = [Path(name).name, str(len(group[0]))]
-    for column in ("captures", "against", "mates", "opponents", "counted"):
-        cells.append(" → ".join(f"{one[column]:g}" for one in sums))
-    changes = [net_change(group[0], rows, settings.seed) for rows in group[1:] if rows]
-    cells.insert(4, " → ".join(map(_change_text, changes)) or "-")
-    return cells
-
-
-def _change_text(change: Interval) -> str:
-    limits = "" if change.low != change.low else f" [{number_text(change.low)}, {number_text(change.high)}]"
-    return f"{number_text(change.value)}{limits}"
+    changes = [paired_difference(ways[0]["net"], games["net"], seed) for games in ways[1:] if len(games)]
+    sums = [" → ".join(f"{games[column].sum():g}" for games in ways) for column in SUMS]
+    change = " → ".join(interval_text(asdict(one)) for one in changes) or "-"
+    return [Path(name).name, str(len(ways[0])), *sums[:2], change, *sums[2:]]
 
 
 def games_to_look_at(rows: Sequence[Row], settings: EntryGames, most: int) -> list[tuple[str, Row, Row]]:
@@ -189,21 +168,19 @@ def games_to_look_at(rows: Sequence[Row], settings: EntryGames, most: int) -> li
 
     Each pair once, at most so many.
     """
-    pairs = [pair for bare, *_, on in by_opponent(rows, settings).values() for pair in zip(bare, on, strict=True)]
-    columns = [breach_column(kind, settings.separation_m) for kind in ("teammate", "opponent")]
-
-    def hits(row: Mapping[str, Any]) -> int:
-        return sum(int(row[column]) for column in columns)
-
-    rated = [
-        ("most hits without the shield", lambda pair: hits(pair[0])),
-        ("hits with the shield", lambda pair: hits(pair[1])),
-        ("captures lost with the shield", lambda pair: net(pair[0]) - net(pair[1])),
-    ]
-    chosen: list[tuple[str, Row, Row]] = []
-    for words, worth in rated:
-        best = max(pairs, key=worth, default=None)
-        if best is None or worth(best) <= 0 or any(best[1] is row for _, _, row in chosen):
-            continue
-        chosen.append((words, *best))
-    return chosen[:most]
+    groups = [(ways[0], ways[-1]) for ways in by_opponent(rows, settings).values()]
+    off, on = (pd.concat(games).reset_index() for games in zip(*groups, strict=True)) if groups else (None, None)
+    if off is None or on is None:
+        return []
+    played = {(row["opponent"], row["game"], bool(row["shielded"])): row for row in rows if row["own"] == settings.own}
+    chosen: dict[tuple[str, int], str] = {}
+    for words, worth in (
+        ("most hits without the shield", off["teammates"] + off["opponents"]),
+        ("hits with the shield", on["teammates"] + on["opponents"]),
+        ("captures lost with the shield", off["net"] - on["net"]),
+    ):
+        if len(worth) and worth.max() > 0:
+            best = worth.idxmax()
+            chosen.setdefault((off.at[best, "opponent"], off.at[best, "game"]), words)
+    pairs = [(words, played[(*game, False)], played[(*game, True)]) for game, words in chosen.items()]
+    return pairs[:most]

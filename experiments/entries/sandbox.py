@@ -22,6 +22,7 @@ import sys
 import time
 import traceback
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,9 @@ GIB = 1024**3
 MOST_DESCENDANTS = 4096
 """Descendants that are listed at most."""
 _SET_DEATH_SIGNAL, _SET_SUBREAPER = 1, 36
-"""Numbers of Linux' prctl."""
+"""Numbers of Linux' prctl,"""
+_NEW_USER, _NEW_NETWORK = 0x10000000, 0x40000000
+"""and flags of its unshare."""
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 
@@ -54,6 +57,7 @@ class Limits:
         processes: processes at the same time, its own among them.
         files: files open in one process.
         gives_way: whether others go first on a busy machine.
+        network: whether it reaches the network; else only where the system cannot take that away, see `unlimited`.
     """
 
     memory_bytes: int = 4 * GIB
@@ -63,6 +67,7 @@ class Limits:
     processes: int = 16
     files: int = 1024
     gives_way: bool = False
+    network: bool = False
 
     def exceeded(self, supervisor: int) -> str:
         """What the descendants of a process have too much of, in words; empty: nothing."""
@@ -89,6 +94,8 @@ class Limits:
                 os.nice(5)
         with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
             file.write("1000")
+        if not self.network:
+            _leave_network()
 
 
 def unlimited() -> str:
@@ -96,8 +103,28 @@ def unlimited() -> str:
     if not hasattr(os, "fork"):
         return "entries cannot be run in a process of their own on this system: they run in this one, without limits"
     if not sys.platform.startswith("linux"):
-        return "memory and number of processes of entries are not limited on this system"
-    return ""
+        return "memory, number of processes and network of entries are not limited on this system"
+    return "" if _can_leave_network() else "this system lets nobody take the network from entries: they may reach it"
+
+
+def _leave_network() -> bool:
+    """Give this process, and all it will start, a network that leads nowhere (Linux); False: the system refuses.
+
+    Who may not make one right away may as the root of a user namespace, which changes no right on files.
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    unshare = ctypes.CDLL(None).unshare
+    return bool(unshare(_NEW_NETWORK) == 0 or unshare(_NEW_USER | _NEW_NETWORK) == 0)
+
+
+@cache
+def _can_leave_network() -> bool:
+    """Whether it can be taken away: tried by a process that does nothing else."""
+    pid = os.fork()
+    if pid == 0:
+        os._exit(0 if _leave_network() else 1)
+    return os.waitpid(pid, 0)[1] == 0
 
 
 class Supervisor:
@@ -142,11 +169,11 @@ class Supervisor:
             status: Any = 1
             try:
                 os.setsid()
+                self._limits.confine()
                 _prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)  # ended with the supervisor, whatever it is doing
                 if os.getppid() != own:
                     os._exit(1)
                 os.close(self._note_fd)
-                self._limits.confine()
                 status = self._serve(self._read_fd, self._write_fd, self._folder)
             except BaseException:
                 traceback.print_exc()

@@ -1,12 +1,13 @@
 """Whatever an entry does, the game goes on in time, what it did is named, and nothing of it is left."""
 
 import os
+import socket
 import time
 
 import pytest
 from steerclear import policies
 from steerclear.experiments.entries import process
-from steerclear.experiments.entries.sandbox import Limits
+from steerclear.experiments.entries.sandbox import Limits, unlimited
 from steerclear.experiments.entries.team import EntryTeam
 from steerclear.shield.exceptions import PolicyError
 
@@ -198,6 +199,16 @@ def test_it_has_no_standard_input_and_its_prints_stay_with_it(team_of, play, cap
     assert play(team, 1) == [dict.fromkeys(HELD, 4)]
     assert "hello" in team._process._worker.output()
     assert "hello" not in capfd.readouterr().out
+
+
+@pytest.mark.skipif("network" in unlimited(), reason="this system lets nobody take the network away")
+def test_it_reaches_no_network(team_of, play):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        reach = f"import socket; socket.create_connection({server.getsockname()!r}, 2).close(); return 4"
+        team = team_of(reach)
+        assert play(team, 1) == [HELD]
+        assert "Network is unreachable" in team.report().failures[0].message
+        assert play(team_of(reach, limits=Limits(network=True)), 1) == [dict.fromkeys(HELD, 4)]
 
 
 @pytest.mark.parametrize("name", ["pipe", "pipe.zip"])

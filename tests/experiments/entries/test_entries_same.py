@@ -16,6 +16,7 @@ from steerclear.experiments.play.match import play_match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield.exceptions import PolicyError
 
+NO_NETWORK_TAKEN = "this system lets nobody take the network from entries: they may reach it"
 DICE = """
 self.n += 1
 seen, place = full_obs_normalized[agent_id], global_state[(agent_id, "pos")]
@@ -134,6 +135,6 @@ def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_ent
         team.close()
     assert caplog.text.count("entries cannot be run in a process of their own on this system") == 1
     monkeypatch.undo()
-    assert sandbox.unlimited() == "" or sys.platform != "linux"
+    assert sandbox.unlimited() in ("", NO_NETWORK_TAKEN) or sys.platform != "linux"
     monkeypatch.setattr(sandbox.sys, "platform", "darwin")
-    assert "memory and number of processes of entries are not limited" in sandbox.unlimited()
+    assert "memory, number of processes and network of entries are not limited" in sandbox.unlimited()
