@@ -26,8 +26,6 @@ MOVED_M, FROZEN_M = 0.05, 0.6
 """A position that moved less than the first while the boat's speed says it ran the second is frozen, m."""
 UNDER_WAY_MPS = 0.2
 """Slower boats may well stay where they are: noise of the speed is no way run."""
-STILL_S, TOLD_MPS = 1.5, 0.3
-"""A boat told to go faster than this whose fixes stay the same to the last digit for so long is frozen."""
 
 EARLY_S = 0.1
 """Contacts fixed later than now by more than this are faults of a clock."""
@@ -61,16 +59,9 @@ class Gate:
         self._fastest = SPEED_SHARE * fastest_mps + SPEED_MORE_MPS
         self._last: Contact | None = None
         self._still: Contact | None = None
-        self._same: tuple[float, ...] = ()
-        self._same_since_s, self._told_since_s, self._is_still = math.inf, math.inf, False
         self._newest_s, self._run_m = -math.inf, 0.0
         self._doubted: Contact | None = None
         self._doubted_since_s = 0.0
-
-    def told(self, speed_mps: float, now_s: float) -> None:
-        """The boat obeys a command of that speed, m/s; NaN: it obeys none."""
-        is_told = abs(speed_mps) >= TOLD_MPS
-        self._told_since_s = min(self._told_since_s, now_s) if is_told else math.inf
 
     def refuse(self, fix: Contact, witness: Contact | None = None) -> str:
         """Why this fix is not taken; empty: it is taken.
@@ -105,22 +96,14 @@ class Gate:
         return ""
 
     def _is_frozen(self, fix: Contact) -> bool:
-        """Whether the position stays although the boat is under way; its time stamps may be fresh all the same.
-
-        So does one that repeats all it says to the last digit while it is told to move; once found frozen it stays so
-        until something changes: told to stop for that very reason, it is no better.
-        """
-        values = (*fix.position_m, fix.heading_rad, fix.speed_mps)
-        if values != self._same:
-            self._same, self._same_since_s, self._is_still = values, fix.fixed_s, False
-        self._is_still = self._is_still or fix.fixed_s - max(self._same_since_s, self._told_since_s) > STILL_S
+        """Whether the position stays although the boat is under way; its time stamps may be fresh all the same."""
         still = self._still
         if still is None or math.dist(fix.position_m, still.position_m) > MOVED_M:
             self._still, self._run_m = fix, 0.0
         elif fix.fixed_s > self._newest_s and abs(fix.speed_mps) > UNDER_WAY_MPS:
             self._run_m += abs(fix.speed_mps) * min(fix.fixed_s - self._newest_s, 1.0)
         self._newest_s = max(self._newest_s, fix.fixed_s)
-        return self._is_still or self._run_m > FROZEN_M
+        return self._run_m > FROZEN_M
 
     def _is_near(self, before: Contact, fix: Contact) -> bool:
         """Whether the boat can have come from there, whatever it did on the way."""

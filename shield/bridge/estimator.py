@@ -37,6 +37,13 @@ SPENT_S = 1.0
 LONGEST_GAP_STEPS = 50
 """Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
 
+GONE_M, LEFT_M, STILL_MPS = 0.3, 0.05, 0.1
+"""A source that repeats itself to the last digit while the model goes the first is frozen, since it left by the second.
+Slower than the third a boat lies still."""
+
+MOST_UNSEEN_M = 2.0
+"""A boat found at rest again after it may have gone unseen is believed anew until that way is longer than this, m."""
+
 RATE_AGE_S, RATE_ROUNDING_DPS, RATE_GAIN = 0.15, 2.0, 0.3
 """Turn rates told are taken when no older, s; smaller differences, deg/s, are left alone; of larger ones this share."""
 
@@ -61,6 +68,10 @@ class Estimate:
 class Estimator:
     """Follows one boat.
 
+    Attributes:
+        still_since_s: when its source froze, s; inf: it did not.
+        unseen_m: way it may have gone while its source repeated itself, m; counts until something changes.
+
     Args:
         platform: the boat's.
         dt_s: step of the loop and the model, s.
@@ -75,6 +86,9 @@ class Estimator:
         self._row: Array | None = None
         self._deaf: Array | None = None
         self._last_heard: tuple[float, float] | None = None
+        self._alone: Array | None = None
+        self._same, self._new_s = tuple[float, ...](), -math.inf
+        self.still_since_s, self._left_s, self.unseen_m = math.inf, math.inf, 0.0
         self._time_s = -math.inf
         self._fixed_s = np.full(len(_SEEN), -math.inf)
         self._commands: deque[tuple[float, float, float]] = deque(maxlen=64)
@@ -108,6 +122,8 @@ class Estimator:
         for _ in range(min(steps, LONGEST_GAP_STEPS)):
             self._step(self._row, self._in_effect(self._time_s))
             self._step(self._deaf, self._unheard(self._time_s))
+            if self._alone is not None:
+                self._step(self._alone, self._in_effect(self._time_s))
             self._time_s += self._dt_s
         if steps > 0 or now_s < self._time_s:
             self._time_s = now_s
@@ -132,6 +148,34 @@ class Estimator:
         self._correct_rate(reading)
         self._fixed_s = np.maximum(self._fixed_s, fixed_s)
         self._deaf, self._last_heard = self._row.copy(), self._in_effect(self._time_s)
+
+    def stands_still(self, reading: BoatReading) -> bool:
+        """Whether a reading repeats an older one although the boat must have moved since, whatever its time stamps say.
+
+        At rest a boat may say the same to the last digit for ever. Only commands tell that from a source that froze:
+        the model starts where the values were new, is never corrected, and leaves them as the boat would. Told to stop
+        for that, it comes to rest; then the boat lies where the source has it, or no farther off than the model went,
+        and is believed anew with that much more error.
+        """
+        measured, fixed_s = _measured(reading), reading.read_s - reading.age_s
+        if tuple(measured.tolist()) != self._same or not reading.ready:  # who has a boat by hand moves it as he likes
+            self._same, self._new_s, self.unseen_m = tuple(measured.tolist()), fixed_s, 0.0
+            self._alone = fresh_state(*measured)
+            self._alone[L.THRUST] = thrust_at(self._params, float(measured[3]))
+            self.still_since_s = self._left_s = math.inf
+        elif self._alone is not None and fixed_s > self._new_s + 1e-3:
+            command = self._in_effect(self._time_s)
+            gone_m = float(np.hypot(*(self._alone[: L.Y + 1] - measured[: L.Y + 1])))
+            if gone_m > LEFT_M:
+                self._left_s = min(self._left_s, reading.read_s)
+            if gone_m > GONE_M:
+                self.still_since_s = self._left_s
+            rests = max(abs(self._alone[L.SPEED]), abs(measured[3])) < STILL_MPS
+            if rests and (command is None or command[0] == 0.0) and self.unseen_m + gone_m <= MOST_UNSEEN_M:
+                self.unseen_m += gone_m
+                self._alone[: L.Y + 1], self._new_s = measured[: L.Y + 1], fixed_s
+                self.still_since_s = self._left_s = math.inf
+        return math.isfinite(self.still_since_s)
 
     def _correct_rate(self, reading: BoatReading) -> None:
         """Bring the turn rate of a rate-controlled boat, all that its steering remembers, nearer to telemetry."""

@@ -12,7 +12,7 @@ from ..config import ShieldConfig
 from ..exceptions import ConfigError, FleetFileError
 from ..platforms import Gains, Platform, get_platform
 from ..surroundings import Surroundings
-from .fleet_settings import BoatSettings, FleetSettings
+from .fleet_settings import BoatSettings, FleetSettings, MoosLinkSettings
 
 LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 MOOS = "moos://"
@@ -185,7 +185,8 @@ def _check_links(fleet: FleetSettings) -> None:
     for boat in fleet.boats:
         if boat.link is None:
             continue
-        if boat.link.kind == "moos":
+        if isinstance(boat.link, MoosLinkSettings):
+            _check_stop(boat.name, boat.link)
             address_of(boat.link.address.removeprefix(MOOS), f"boat {boat.name!r}: link address {MOOS}...")
             other = seen.setdefault((boat.link.address, 0), boat.name)
             if other != boat.name:
@@ -213,6 +214,18 @@ def _check_links(fleet: FleetSettings) -> None:
                 f"boats {other!r} and {boat.name!r} have one system_id, {boat.link.system_id}, on {boat.link.address}; "
                 "give each its own"
             )
+
+
+def _check_stop(name: str, link: MoosLinkSettings) -> None:
+    """Somebody knows what stops a boat whose gate died: behind "helm" its PID does, behind "pid" the file must say."""
+    answers = (link.thrust_timeout_s is not None) + link.nothing_stops_it
+    if link.gate == "pid" and answers != 1:
+        raise FleetFileError(
+            f"boat {name!r}: with gate: pid no PID stops it when the gate dies; give its link thrust_timeout_s (s "
+            "after which its actuators take thrust off by themselves) or nothing_stops_it: true, or take gate: helm"
+        )
+    if link.gate == "helm" and answers:
+        raise FleetFileError(f"boat {name!r}: thrust_timeout_s and nothing_stops_it are for gate: pid; leave them out")
 
 
 def contact_kind(fleet: FleetSettings, boat: BoatSettings) -> str:

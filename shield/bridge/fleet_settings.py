@@ -111,7 +111,9 @@ class MoosLinkSettings(LinkSettings):
 
     ``gate``: where the shield sits: "helm" between helm and PID, "pid" between PID and actuators. ``prefix``: what the
     helm puts before its DESIRED_*. ``corner_m``: the field's corner on the mission's local grid, x east, y north.
-    ``mission``: the boat's .moos file, which checks before a start read.
+    ``mission``: the boat's .moos file, which checks before a start read. ``thrust_timeout_s``: after how long without
+    posts the actuators behind gate "pid" take thrust off by themselves. ``nothing_stops_it``: true acknowledges that
+    they do not.
     """
 
     kind: Literal["moos"] = Field(description="the kind of link: moos")
@@ -123,6 +125,8 @@ class MoosLinkSettings(LinkSettings):
     )
     corner_m: tuple[Metres, Metres] = Field((0.0, 0.0), description="give [x, y] of the field's corner in m")
     mission: Path | None = Field(None, description="give the path of the boat's .moos file")
+    thrust_timeout_s: Annotated[float, Field(gt=0.0, le=10.0, description="give seconds, at most 10")] | None = None
+    nothing_stops_it: Annotated[bool, Field(description="give true, or leave it out")] = False
 
 
 class BoatSettings(Section):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .autopilot_parameters import STANDARD_TIMEOUT_S, parameter_faults
 from .clock import Clock
 from .mavlink.telemetry import ENOUGH_FIX
 from .mavlink.vehicle import LinkHealth
-from .messages import BoatReading
+from .messages import BoatReading, Link
 from .preflight_checks import Check, CheckResult
 
 LONGEST_TRIP_S = 0.2
@@ -35,19 +35,6 @@ WATCH_S = 5.0
 LOOK_EVERY_S = 0.05
 
 
-class Watched(Protocol):
-    """A link as checks see it."""
-
-    def read(self) -> BoatReading:
-        """See `messages.Link`."""
-
-    def learn(self, timeout_s: float) -> None:
-        """Ask for what is not known yet."""
-
-    def health(self) -> LinkHealth:
-        """What it knows of itself."""
-
-
 class Watch:
     """Readings and health of all links; taken when first asked for.
 
@@ -57,18 +44,18 @@ class Watch:
         seconds: how long.
     """
 
-    def __init__(self, links: Mapping[str, Watched], clock: Clock, seconds: float = WATCH_S) -> None:
+    def __init__(self, links: Mapping[str, Link], clock: Clock, seconds: float = WATCH_S) -> None:
         self._links, self._clock, self._seconds = links, clock, seconds
         self._readings: dict[str, list[BoatReading]] = {}
-        self._health: dict[str, LinkHealth] = {}
+        self._health: dict[str, Any] = {}
 
     def readings(self, boat: str) -> list[BoatReading]:
         """What that boat said, in order."""
         self._look()
         return self._readings[boat]
 
-    def health(self, boat: str) -> LinkHealth:
-        """Health of its link at the end."""
+    def health(self, boat: str) -> Any:
+        """Health of its link at the end, of whatever kind."""
         self._look()
         return self._health[boat]
 
@@ -90,7 +77,7 @@ class Watch:
 
 
 def link_checks(
-    links: Mapping[str, Watched], platforms: Mapping[str, Platform], clock: Clock, seconds: float = WATCH_S
+    links: Mapping[str, Link], platforms: Mapping[str, Platform], clock: Clock, seconds: float = WATCH_S
 ) -> list[Check]:
     """All of them; they move no boat. The first to run watches all links for ``seconds``.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping
 
 from .clock import Clock
 from .fleet_file import FleetFile
@@ -11,38 +10,11 @@ from .fleet_settings import BoatSettings
 from .mavlink.connection import Endpoint, OnBytes
 from .mavlink.signing import Signing, read_key
 from .mavlink.vehicle import MavlinkLink
-from .messages import ContactSource, Link
+from .messages import LinkMaker
 from .moos.links import MoosLinks
 
 
-class BoatLink(Link, Protocol):
-    """A link that can also be given back unused, as one that was only listened to is."""
-
-    def release(self) -> None:
-        """Give the link back without a word to the boat."""
-
-
-class LinkMaker(Protocol):
-    """Makes the links of one kind and holds what several boats share, such as a socket."""
-
-    def link(self, boat: BoatSettings) -> BoatLink:
-        """Make a boat's link; nothing is opened yet."""
-
-    def open(self) -> None:
-        """Open all that is shared.
-
-        Raises:
-            LinkError: a wire cannot be opened.
-        """
-
-    def close(self) -> None:
-        """Give it back; may be called again."""
-
-    def sources(self) -> Sequence[ContactSource]:
-        """Who tells of other boats by the same way."""
-
-
-class MavlinkLinks:
+class MavlinkLinks(LinkMaker):
     """A `LinkMaker`: one `Endpoint` an address, shared by the boats behind it.
 
     Args:
@@ -70,10 +42,6 @@ class MavlinkLinks:
             self._endpoints[settings.address] = endpoint
         frame, rate_hz, route = self._fleet.frame, settings.rate_hz, settings.route
         return MavlinkLink(boat.name, endpoint, settings.system_id, frame, self._clock, rate_hz=rate_hz, route=route)
-
-    def sources(self) -> Sequence[ContactSource]:
-        """See `LinkMaker`: nobody, other boats have links of their own."""
-        return ()
 
     def open(self) -> None:
         """See `LinkMaker`."""

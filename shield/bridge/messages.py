@@ -5,6 +5,7 @@ All times and ages are of one monotonic clock; positions m in the field's frame,
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,9 +17,13 @@ import numpy as np
 from ..commands import Commands
 from ..compat import Self
 from ..decision import Decisions
+from ..exceptions import LinkError
 from ..fleet import Fleet
 from ..jit import Array
 from ..surroundings import Surroundings
+from .fleet_settings import BoatSettings
+
+LOG = logging.getLogger(__name__)
 
 NEVER_S = math.inf
 """Age of what was never received."""
@@ -134,6 +139,9 @@ class Link(Protocol):
             LinkError: no boat answers in time, or the address cannot be used.
         """
 
+    def learn(self, timeout_s: float) -> None:
+        """Ask for what checks look at and is not known yet; mostly nothing."""
+
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
 
@@ -169,11 +177,52 @@ class Link(Protocol):
             What the boat was left doing, in words.
         """
 
-    def __enter__(self) -> Self: ...
+    def health(self) -> Any:
+        """What the link knows of itself, of a form of its own."""
+
+    def release(self) -> None:
+        """Give the link back without a word to the boat: for one that was only listened to."""
+
+    def __enter__(self) -> Self:
+        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    ) -> None:
+        LOG.info("%s", self.close())
+
+
+class LinkMaker(Protocol):
+    """Makes the links of one kind and holds what several boats share, such as a socket."""
+
+    def link(self, boat: BoatSettings) -> Link:
+        """Make a boat's link; nothing is opened yet."""
+
+    def open(self) -> None:
+        """Open all that is shared.
+
+        Raises:
+            LinkError: a wire cannot be opened.
+        """
+
+    def close(self) -> None:
+        """Give it back; may be called again."""
+
+    def sources(self) -> Sequence[ContactSource]:
+        """Who tells of other boats by the same way."""
+        return ()
+
+
+def check_finite(boat: str, heading_rad: float, speed_mps: float) -> None:
+    """Check that a command is made of numbers.
+
+    Raises:
+        LinkError: it is not.
+    """
+    if not (math.isfinite(heading_rad) and math.isfinite(speed_mps)):
+        raise LinkError(
+            f"boat {boat} was to be sent heading {heading_rad} rad and speed {speed_mps} m/s; give finite numbers"
+        )
 
 
 @dataclass(frozen=True)

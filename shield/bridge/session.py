@@ -16,8 +16,8 @@ from .control_loop import Parts
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
-from .links import LINK_MAKERS, BoatLink, LinkMaker, key_of
-from .messages import Contact, ContactSource, TickSink, WantedSource, contact_of
+from .links import LINK_MAKERS, key_of
+from .messages import Contact, ContactSource, Link, LinkMaker, TickSink, WantedSource, contact_of
 
 LOG = logging.getLogger(__name__)
 
@@ -134,7 +134,7 @@ class VehicleSession:
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
-        links: dict[str, BoatLink] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
+        links: dict[str, Link] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
         ears = getattr(self, "ears", {})
         if links and not self.left:
             with ThreadPoolExecutor(len(links)) as pool:
@@ -165,7 +165,7 @@ class VehicleSession:
             if entry.link is not None and entry.name not in names and self.fleet.contact_of(entry) == "telemetry"
         ]
 
-    def _link(self, boat: BoatSettings) -> BoatLink:
+    def _link(self, boat: BoatSettings) -> Link:
         kind = "" if boat.link is None else boat.link.kind
         if kind not in self._makers:
             on_bytes = None if self._tlog is None else self._tlog.on_bytes
@@ -173,7 +173,7 @@ class VehicleSession:
         return self._makers[kind].link(boat)
 
     @staticmethod
-    def _all(links: Mapping[str, BoatLink], work: Callable[[BoatLink], None]) -> None:
+    def _all(links: Mapping[str, Link], work: Callable[[Link], None]) -> None:
         """Do something slow with all links at the same time; the first that fails is told, after all are done."""
         if not links:
             return
@@ -186,7 +186,7 @@ class VehicleSession:
             raise errors[0]
 
 
-def _leave(link: BoatLink) -> str:
+def _leave(link: Link) -> str:
     try:
         return link.close()
     except Exception as error:  # the other boats must still be stopped

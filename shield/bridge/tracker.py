@@ -110,7 +110,6 @@ class Tracker:
     def sent(self, tick_s: float, sent: Mapping[str, Sent]) -> None:
         """Note what left at the tick of that time."""
         for name, message in sent.items():
-            self._own_gates[name].told(message.speed_mps if message.delivered else math.nan, tick_s)
             if message.delivered and math.isfinite(message.speed_mps):
                 self._estimators[name].sent(tick_s, message.heading_rad, message.speed_mps)
 
@@ -212,10 +211,10 @@ class Tracker:
     def _own_track(self, name: str) -> Track | None:
         estimator = self._estimators.get(name)
         estimate = None if estimator is None else estimator.estimate(self._now_s)
-        if estimate is None:
+        if estimator is None or estimate is None:
             return None
         declared_m = max(self.fleet.shield_config.position_error_m, self.margin_m.get(name, 0.0))
-        error = max(declared_m, self._fed_m.get(name, 0.0))
+        error = max(declared_m, self._fed_m.get(name, 0.0)) + estimator.unseen_m
         stale = estimate.age_s > self.fleet.limits.navigation.max_age_s
         return Track(estimate.row, 0.0, estimate.age_s, error + estimate.spread_m * stale)
 
@@ -229,7 +228,11 @@ class Tracker:
     def _take_reading(self, name: str, reading: BoatReading, estimator: Estimator) -> None:
         fixed_s = reading.read_s - reading.position_age_s
         fix = Contact(name, reading.position_m, reading.heading_rad, reading.speed_mps, fixed_s, 0.0, "")
+        still = estimator.stands_still(reading)
         text = self._own_gates[name].refuse(fix, self._agreed(name))
+        if still:
+            text = "says the same to the last digit, and must have moved by its commands: its source is frozen"
+            self._telemetry_s[name] = min(self._telemetry_s.get(name, -NEVER_S), estimator.still_since_s)
         if text:
             self._note(name, text)
             return

@@ -6,17 +6,15 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
 from ..autopilot_parameters import ASKED, FENCE_ASKED
 from ..clock import Clock
 from ..frame import FieldFrame
-from ..messages import NEVER_S, BoatReading, Sent, never
+from ..messages import NEVER_S, BoatReading, Link, Sent, check_finite, never
 from .autopilot import Autopilot
 from .commands import (
     GUIDED,
@@ -88,7 +86,7 @@ class LinkHealth:
     home_deg: Point | None = None
 
 
-class MavlinkLink:
+class MavlinkLink(Link):
     """One boat. `connect`, `prepare`, then `read` and `send` at the loop's rate, then `close`; see `messages.Link`.
 
     Signing is the endpoint's: all boats on a wire have one key.
@@ -224,11 +222,7 @@ class MavlinkLink:
         Raises:
             LinkError: heading or speed is not finite; nothing is sent.
         """
-        if not (math.isfinite(heading_rad) and math.isfinite(speed_mps)):
-            raise LinkError(
-                f"boat {self.boat} was to be sent heading {heading_rad} rad and speed {speed_mps} m/s; "
-                "give finite numbers"
-            )
+        check_finite(self.boat, heading_rad, speed_mps)
         route = self.autopilot.route
         if route is None:
             return Sent(self.boat, self._clock.now_s(), heading_rad, speed_mps, "none: the boat is not prepared", False)
@@ -293,14 +287,6 @@ class MavlinkLink:
                 fence=boat.fence.zones,
                 home_deg=boat.fence.home_deg,
             )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        LOG.info("%s", self.close())
 
     def _send(self, route: str, encoded: Encoded) -> Sent:
         delivered = self.autopilot.send(encoded.message)

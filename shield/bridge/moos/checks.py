@@ -3,44 +3,44 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
+from ..clock import MonotonicClock
 from ..fleet_file import FleetFile
 from ..fleet_settings import MoosLinkSettings
-from ..link_checks import check_spread
+from ..link_checks import LONGEST_TRIP_S, OLDEST_S, WATCH_S, Watch, check_spread
 from ..messages import BoatReading
 from ..preflight_checks import Check, CheckResult
-from .mission import mission_faults, read_mission
+from .client import Health
+from .mission import LONGEST_S, PIDS, SIMULATORS, Mission, mission_faults, number, parse_mission
+from .nav import REFUSED
 from .vehicle import MoosLink, client_name
 
-WATCH_S, LOOK_EVERY_S = 5.0, 0.05
-OLDEST_S = 0.5
-LONGEST_TRIP_S = 0.2
 APART_M = 5.0
 """NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this."""
 
 
-_Kind = Callable[[MoosLink, list[BoatReading], FleetFile], CheckResult]
+@dataclass(frozen=True)
+class Watched:
+    """What a check looks at: a boat's link, what it said for a while, the file, and the mission where there is one."""
 
+    link: MoosLink
+    readings: list[BoatReading]
+    health: Health
+    fleet: FleetFile
+    settings: MoosLinkSettings
 
-class _Watch:
-    """Readings of all links for a while, taken when first asked for; texts and faults stay with the readings."""
+    def mission(self) -> Mission:
+        """Settings of the boat's .moos file; empty: the fleet file names none.
 
-    def __init__(self, links: Mapping[str, MoosLink], seconds: float) -> None:
-        self._links, self._seconds = links, seconds
-        self._readings: dict[str, list[BoatReading]] = {}
-
-    def readings(self, boat: str) -> list[BoatReading]:
-        if not self._readings:
-            self._readings = {name: [] for name in self._links}
-            end_s = time.monotonic() + self._seconds
-            while time.monotonic() < end_s:
-                for name, link in self._links.items():
-                    self._readings[name].append(link.read())
-                time.sleep(LOOK_EVERY_S)
-        return self._readings[boat]
+        Raises:
+            OSError: it cannot be read.
+            ValueError: it holds no text.
+        """
+        path = self.settings.mission
+        return {} if path is None else parse_mission(path.read_text(encoding="utf-8"))
 
 
 def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float = WATCH_S) -> list[Check]:
@@ -51,103 +51,135 @@ def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float 
         fleet: the file.
         seconds: how long links are watched, real s.
     """
-    watch = _Watch(links, seconds)
-    kinds: dict[str, _Kind] = {
-        "moosdb": check_moosdb,
-        "rates": check_rates,
-        "spread": lambda link, readings, fleet: check_spread(link.boat, readings),
-        "grid": check_grid,
-        "commanders": check_commanders,
-        "mission": check_mission,
-    }
+    watch = Watch(links, MonotonicClock(), seconds)
+
+    def run(name: str, check: _Kind, link: MoosLink) -> CheckResult:
+        settings = fleet.boat(link.boat).link
+        if not isinstance(settings, MoosLinkSettings):
+            raise TypeError(f"boat {link.boat} has no link of MOOS")
+        watched = Watched(link, watch.readings(link.boat), watch.health(link.boat), fleet, settings)
+        passed, text, figures = check(watched)
+        return CheckResult(name, passed, text, figures)
+
     return [
-        Check(f"{kind}:{boat}", partial(_run, check, link, watch, fleet))
+        Check(f"{kind}:{boat}", partial(run, f"{kind}:{boat}", check, link))
         for boat, link in links.items()
-        for kind, check in kinds.items()
+        for kind, check in KINDS.items()
     ]
 
 
-def _run(check: _Kind, link: MoosLink, watch: _Watch, fleet: FleetFile) -> CheckResult:
-    return check(link, watch.readings(link.boat), fleet)
+_Found = tuple[bool, str, Mapping[str, float]]
+_Kind = Callable[[Watched], _Found]
 
 
-def check_moosdb(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:
+def check_moosdb(watched: Watched) -> _Found:
     """The MOOSDB answers quickly, is the one of this boat, and took no damage."""
-    name, health = f"moosdb:{link.boat}", link.health()
-    figures = {"round_trip_s": health.round_trip_s, "sessions": float(health.sessions), "warp": link.client.warp}
-    if not health.connected:
-        return CheckResult(name, False, health.fault, figures)
+    health, warp = watched.health, watched.link.client.warp
+    figures = {"round_trip_s": health.round_trip_s, "sessions": float(health.sessions), "warp": warp}
+    if health.fault:
+        return False, health.fault, figures
     if health.sessions > 1 or health.damaged:
         text = f"the connection was made {health.sessions} times, {health.damaged} times for damaged packets"
-        return CheckResult(name, False, f"{text}; find out why before you start", figures)
+        return False, f"{text}; find out why before you start", figures
     if not health.round_trip_s <= LONGEST_TRIP_S:
         text = f"a heartbeat takes {health.round_trip_s:.2f} s there and back, more than {LONGEST_TRIP_S:g} s"
-        return CheckResult(name, False, f"{text}; take a faster network, or run beside the MOOSDB", figures)
-    text = f"community {health.community}, warp {link.client.warp:g}, round trip {1e3 * health.round_trip_s:.1f} ms"
-    return CheckResult(name, True, text, figures)
+        return False, f"{text}; take a faster network, or run beside the MOOSDB", figures
+    return True, f"community {health.community}, warp {warp:g}, round trip {1e3 * health.round_trip_s:.1f} ms", figures
 
 
-def check_rates(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:
+def check_rates(watched: Watched) -> _Found:
     """NAV_* arrive, never late, and none is refused."""
-    name = f"rates:{link.boat}"
+    readings = watched.readings
     oldest = max((reading.age_s for reading in readings), default=math.inf)
     fixes = {reading.read_s - reading.position_age_s for reading in readings}
-    refused: dict[str, int] = {}
-    for reading in readings:
-        for kind in ("type_clash", "not_finite", "clock", "impossible", "frozen", "bad_report"):
-            refused[kind] = refused.get(kind, 0) + reading.faults.get(kind, 0)
+    refused = {kind: sum(r.faults.get(kind, 0) for r in readings) for kind in (*REFUSED, "bad_report")}
     figures = {"oldest_s": oldest, "refused": float(sum(refused.values())), "fixes": float(len(fixes))}
     if figures["refused"]:
-        said = next((text for reading in readings for text in reading.texts if "refused" in text), "")
+        said = next((text for reading in readings for text in reading.texts if "refused" in text), "see the log")
         kinds = ", ".join(f"{count} {kind}" for kind, count in refused.items() if count)
-        return CheckResult(name, False, f"refused while watched: {kinds}; {said or 'see the log'}", figures)
+        return False, f"refused while watched: {kinds}; {said}", figures
     if not oldest <= OLDEST_S:
         text = f"NAV_* were {oldest:.2f} s old, more than {OLDEST_S:g} s; raise the AppTick of what posts them to 10"
-        return CheckResult(name, False, text, figures)
-    return CheckResult(name, True, f"NAV_* never older than {oldest:.2f} s", figures)
+        return False, text, figures
+    return True, f"NAV_* never older than {oldest:.2f} s", figures
 
 
-def check_grid(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:
+def check_grid(watched: Watched) -> _Found:
     """NAV_X and NAV_Y, by the file's corner, are where NAV_LAT and NAV_LONG are, by its origin."""
-    name, place = f"grid:{link.boat}", link.place_deg()
-    position = readings[-1].position_m if readings else (math.nan, math.nan)
+    place, position = watched.link.place_deg(), watched.readings[-1].position_m
     if place is None:
-        return CheckResult(name, True, "nobody posts NAV_LAT and NAV_LONG, so the corner is taken on trust")
-    x, y = fleet.frame.to_field_m(*place)
+        return True, "nobody posts NAV_LAT and NAV_LONG, so the corner is taken on trust", {}
+    x, y = watched.fleet.frame.to_field_m(*place)
     apart = math.hypot(x - position[0], y - position[1])
     if not apart <= APART_M:
         text = (
             f"NAV_X, NAV_Y have it at ({position[0]:.0f}, {position[1]:.0f}) m in the field and NAV_LAT, NAV_LONG at "
             f"({x:.0f}, {y:.0f}); correct the link's corner_m or the field's origin"
         )
-        return CheckResult(name, False, text, {"apart_m": apart})
-    return CheckResult(name, True, f"local grid and geodetic position agree within {apart:.1f} m", {"apart_m": apart})
+        return False, text, {"apart_m": apart}
+    return True, f"local grid and geodetic position agree within {apart:.1f} m", {"apart_m": apart}
 
 
-def check_commanders(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:
+def check_commanders(watched: Watched) -> _Found:
     """Nobody else writes what our gate writes, and its variables are numbers."""
-    name, (other, seen_s) = f"commanders:{link.boat}", link.other_commander()
+    link = watched.link
+    (other, seen_s), outputs = link.other_commander(), " and ".join(link.gate.outputs)
     if math.isfinite(seen_s):
-        text = f"{other} also posts {' and '.join(link.gate.outputs)}; give it the prefix, or end it"
-        return CheckResult(name, False, text)
-    said = [text for reading in readings for text in reading.texts if "string" in text]
-    if said:
-        return CheckResult(name, False, said[0])
+        return False, f"{other} also posts {outputs}; give it the prefix, or end it", {}
+    if said := [text for reading in watched.readings for text in reading.texts if "string" in text]:
+        return False, said[0], {}
     wanting = {who for key in link.gate.inputs for who in link.writers.get(key, ())} - {client_name(link.boat)}
     text = f"nominal commands come from {', '.join(sorted(wanting))}" if wanting else "nobody commands it"
-    return CheckResult(name, True, f"{text}; nobody else writes {' and '.join(link.gate.outputs)}")
+    return True, f"{text}; nobody else writes {outputs}", {}
 
 
-def check_mission(link: MoosLink, readings: list[BoatReading], fleet: FleetFile) -> CheckResult:
+def check_mission(watched: Watched) -> _Found:
     """The boat's .moos file stops a boat whose gate died, and lets nobody past it."""
-    name, settings = f"mission:{link.boat}", fleet.boat(link.boat).link
-    if not isinstance(settings, MoosLinkSettings) or settings.mission is None:
+    settings, link = watched.settings, watched.link
+    if settings.mission is None:
         text = "thresholds of its PID are in no MOOSDB; give the link mission: FILE.moos, or accept this check"
-        return CheckResult(name, False, text)
+        return False, text, {}
     try:
-        mission = read_mission(settings.mission)
+        mission = watched.mission()
     except (OSError, ValueError) as error:
-        return CheckResult(name, False, f"cannot read {settings.mission} ({error}); correct the link's mission")
-    port, platform = int(settings.address.rpartition(":")[2]), fleet.platform_of[link.boat]
+        return False, f"cannot read {settings.mission} ({error}); correct the link's mission", {}
+    port, platform = int(settings.address.rpartition(":")[2]), watched.fleet.platform_of[link.boat]
     faults = mission_faults(mission, port, link.client.warp, platform, settings.gate, settings.prefix)
-    return CheckResult(name, not faults, "; ".join(faults) or "prefix, ticks, thresholds and gains fit")
+    return not faults, "; ".join(faults) or "prefix, ticks, thresholds and gains fit", {}
+
+
+def check_stop(watched: Watched) -> _Found:
+    """What is behind the gate when it dies, and after how long that stops the boat."""
+    settings, mission = watched.settings, watched.mission()
+    if settings.gate == "helm":
+        pids = [name for name in PIDS if name in mission]
+        seconds = number(mission, pids[0], "tardy_helm_threshold", LONGEST_S) if pids else LONGEST_S
+        source = f"{pids[0]} takes" if pids else "its PID, if set as the docs say, takes"
+        text = f"when the gate dies, {source} thrust off {seconds:g} s after the last command"
+        return True, text, {"stop_s": seconds}
+    keeps = [name for name in SIMULATORS if name in mission]
+    if settings.thrust_timeout_s is not None and keeps:
+        text = f"thrust_timeout_s is {settings.thrust_timeout_s:g}, but {keeps[0]} of its mission keeps its last thrust"
+        return False, f"{text} for ever; give nothing_stops_it: true instead, or take gate: helm", {}
+    if settings.thrust_timeout_s is not None:
+        text = f"when the gate dies, its actuators take thrust off after {settings.thrust_timeout_s:g} s, by the file"
+        return True, f"{text}: see that with your own eyes before a run", {"stop_s": settings.thrust_timeout_s}
+    text = "NOTHING stops it when the gate dies: its last thrust stays on, as the fleet file acknowledges"
+    return True, f"{text}; keep something at hand that cuts its power", {"stop_s": math.inf}
+
+
+def _spread(watched: Watched) -> _Found:
+    found = check_spread(watched.link.boat, watched.readings)
+    return found.passed, found.text, found.figures
+
+
+KINDS: Mapping[str, _Kind] = {
+    "moosdb": check_moosdb,
+    "rates": check_rates,
+    "spread": _spread,
+    "grid": check_grid,
+    "commanders": check_commanders,
+    "mission": check_mission,
+    "stop": check_stop,
+}
+"""The checks, by name."""

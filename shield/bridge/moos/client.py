@@ -54,16 +54,12 @@ class Health:
     """What a client knows of its connection.
 
     Attributes:
-        connected: whether the MOOSDB takes our posts and answers heartbeats.
-        fault: why not, in words; empty when connected.
+        fault: why the MOOSDB does not take our posts and answer heartbeats, in words; empty: it does.
         community: the MOOSDB's.
-        echo_age_s: since its last echo, real s; inf: none.
-        round_trip_s: of the last heartbeat, real s.
-        sessions: connections so far.
-        damaged: connections closed for damaged packets.
+        echo_age_s, round_trip_s: since its last echo, and of the last heartbeat, real s.
+        sessions, damaged: connections so far, and those closed for damaged packets.
     """
 
-    connected: bool
     fault: str
     community: str
     echo_age_s: float
@@ -72,14 +68,22 @@ class Health:
     damaged: int
 
 
+class _Ended(OSError):
+    """The connection is of no more use; its text says why."""
+
+
 class MoosClient:
     """Connects, registers, reads, beats, and does so again whenever the connection ends. Close it at the end.
+
+    Attributes:
+        warp: how many times faster than real time ``clock`` runs.
+        ahead_s: MOOS time less the loop's clock, s; NaN while it is not known.
 
     Args:
         name: its own; a MOOSDB takes one client of a name.
         host, port: of the MOOSDB.
         clock: the loop's, which runs as many times faster than real time as the community's MOOSTimeWarp says.
-        variables: what to register for, with the least time between two of them, MOOS s; 0: every write.
+        variables: what to register for: every write.
         hear: called for each mail with the time it came, s of ``clock``; in the client's thread.
         lost: called when a connection ends, in the client's thread.
     """
@@ -90,14 +94,14 @@ class MoosClient:
         host: str,
         port: int,
         clock: Clock,
-        variables: Mapping[str, float],
+        variables: Sequence[str],
         hear: Callable[[Message, float], None],
         lost: Callable[[], None] = lambda: None,
     ) -> None:
         self.name, self.address = name, f"{host}:{port}"
         self._place, self._clock = (host, port), clock
-        self.warp = float(getattr(clock, "speed", 1.0))
-        self._variables, self._hear, self._lost = dict(variables), hear, lost
+        self.warp, self.ahead_s = float(getattr(clock, "speed", 1.0)), math.nan
+        self._variables, self._hear, self._lost = tuple(variables), hear, lost
         self._lock = threading.Lock()
         self._socket: socket.socket | None = None
         self._waiting = bytearray()
@@ -105,7 +109,6 @@ class MoosClient:
         self._thread = threading.Thread(target=self._live, name=f"moos {self.address}", daemon=True)
         self._fault, self._said = f"MOOSDB {self.address} not asked yet", ""
         self._community = ""
-        self._ahead_s = math.nan
         self._beat_s = self._echo_s = -math.inf
         self._beats: dict[float, float] = {}
         self._trip_s = math.nan
@@ -125,26 +128,16 @@ class MoosClient:
     @property
     def connected(self) -> bool:
         """Whether posts reach a MOOSDB that answers."""
-        return self._socket is not None and math.isfinite(self._ahead_s)
+        return self._socket is not None and math.isfinite(self.ahead_s)
 
     def health(self) -> Health:
         """State of the connection now."""
-        age_s = time.monotonic() - self._echo_s
-        fault = "" if self.connected else self._fault
-        return Health(self.connected, fault, self._community, age_s, self._trip_s, self._sessions, self._damaged)
-
-    @property
-    def ahead_s(self) -> float:
-        """MOOS time less the loop's clock, s; NaN while it is not known."""
-        return self._ahead_s
-
-    def moos_s(self, now_s: float) -> float:
-        """MOOS time of the MOOSDB at a time of the loop's clock, s; NaN while it is not known."""
-        return now_s + self._ahead_s
+        fault, age_s = "" if self.connected else self._fault, time.monotonic() - self._echo_s
+        return Health(fault, self._community, age_s, self._trip_s, self._sessions, self._damaged)
 
     def clock_s(self, moos_s: float) -> float:
         """Time of the loop's clock at a MOOS time, s; NaN while that is not known."""
-        return moos_s - self._ahead_s
+        return moos_s - self.ahead_s
 
     def post(self, values: Mapping[str, float | str]) -> bool:
         """Post variables in one packet, stamped now; never waits.
@@ -155,10 +148,10 @@ class MoosClient:
         Raises:
             WireError: a number is not finite; nothing is posted.
         """
-        now_s = self.moos_s(self._clock.now_s())
-        if not self.connected or not math.isfinite(now_s):
+        moos_s = self._clock.now_s() + self.ahead_s
+        if not self.connected or not math.isfinite(moos_s):
             return False
-        return self._send([notify(key, value, self.name, now_s) for key, value in values.items()])
+        return self._send([notify(key, value, self.name, moos_s) for key, value in values.items()])
 
     def _send(self, messages: Sequence[Message]) -> bool:
         packet = pack_packet(messages)
@@ -166,15 +159,13 @@ class MoosClient:
             if self._socket is None or len(self._waiting) + len(packet) > MOST_WAITING:
                 return False
             self._waiting += packet
-            return self._flush()
+            return self._flush(self._socket)
 
-    def _flush(self) -> bool:
+    def _flush(self, wire: socket.socket) -> bool:
         """Send what waits, as far as it goes; the lock is held."""
-        if self._socket is None:
-            return False
         try:
             while self._waiting:
-                del self._waiting[: self._socket.send(self._waiting)]
+                del self._waiting[: wire.send(self._waiting)]
         except (BlockingIOError, InterruptedError):
             return True
         except OSError:
@@ -184,97 +175,92 @@ class MoosClient:
     def _live(self) -> None:
         while not self._ends.is_set():
             try:
-                self._session()
+                with socket.create_connection(self._place, DIAL_S) as wire:
+                    self._session(wire)
             except WireError as error:
                 self._damaged += 1
                 self._fault = f"MOOSDB {self.address} sent what is no MOOS: {error}; connection closed"
+            except _Ended as error:
+                self._fault = f"MOOSDB {self.address} {error}"
             except OSError as error:
                 why = error.strerror or str(error) or type(error).__name__
                 self._fault = f"MOOSDB {self.address}: {why}; start it, or correct the address"
-            finally:
-                self._drop()
-            self._tell()
+            with self._lock:
+                was, self._socket, self._waiting = self._socket, None, bytearray()
+            self.ahead_s, self._beats = math.nan, {}
+            if was is not None:
+                self._lost()
+            if self._fault != self._said and not self._ends.is_set():
+                self._said = self._fault
+                LOG.warning("%s", self._fault)
             self._ends.wait(RETRY_S)
 
-    def _session(self) -> None:
-        """One connection from beginning to end; `_fault` says how it ended."""
-        with socket.create_connection(self._place, DIAL_S) as wire:
-            wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            reader = PacketReader()
-            early = self._greet(wire, reader)
-            if early is None:
-                return
-            wire.setblocking(False)
-            with self._lock:
-                self._socket, self._waiting = wire, bytearray()
-            self._sessions += 1
-            self._echo_s, self._beat_s = time.monotonic(), -math.inf  # the welcome counts as a sign of life
-            now_s = time.time() * self.warp
-            if self._variables:
-                wanted = [register(key, self.name, now_s, period) for key, period in self._variables.items()]
-                self._send([timing(self._new_beat()), *wanted])
-            self._take(early)
-            self._fault = self._read_on(wire, reader)
+    def _session(self, wire: socket.socket) -> None:
+        """One connection until it is of no more use."""
+        wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        reader = PacketReader()
+        early = self._greet(wire, reader)
+        wire.setblocking(False)
+        with self._lock:
+            self._socket, self._waiting = wire, bytearray()
+        self._sessions += 1
+        self._echo_s = time.monotonic()  # the welcome counts as a sign of life
+        now_s = time.time() * self.warp
+        self._send([self._beat(), *(register(key, self.name, now_s) for key in self._variables)])
+        self._take(early)
+        self._read_on(wire, reader)
 
-    def _greet(self, wire: socket.socket, reader: PacketReader) -> list[Message] | None:
-        """Introduce ourselves; what came after the welcome, or None where we are not welcome."""
-        asked_s = time.time() * self.warp
-        wire.sendall(PROTOCOL + pack_packet([hello(self.name, asked_s)]))  # in one piece: a MOOSDB reads it only once
+    def _greet(self, wire: socket.socket, reader: PacketReader) -> list[Message]:
+        """Introduce ourselves; what came after the welcome."""
+        wire.sendall(PROTOCOL + pack_packet([hello(self.name, time.time() * self.warp)]))  # a MOOSDB reads it only once
         wire.settimeout(LOOK_S)
         end_s = time.monotonic() + WELCOME_S
         messages: list[Message] = []
         while not messages:
             if self._ends.is_set() or time.monotonic() > end_s:
-                self._fault = (
-                    f"MOOSDB {self.address} does not answer; it is frozen, or another client hangs in its door"
-                )
-                return None
+                raise _Ended("does not answer; it is frozen, or another client hangs in its door")
             with contextlib.suppress(TimeoutError):
-                data = wire.recv(1 << 16)
-                if not data:
-                    self._fault = f"MOOSDB {self.address} hangs up; it does not take us for a MOOS client"
-                    return None
+                if not (data := wire.recv(1 << 16)):
+                    raise _Ended("hangs up; it does not take us for a MOOS client")
                 messages = [message for packet in reader.feed(data) for message in packet]
         first = messages[0]
         if first.kind == POISON:
-            self._fault = f"MOOSDB {self.address} refuses {self.name!r}: {first.text}; end the other one"
-            return None
+            raise _Ended(f"refuses {self.name!r}: {first.text}; end the other one")
         if first.kind != WELCOME:
             raise WireError(f"it answers a hello with a message of kind {first.kind!r}")
         self._community = first.community
         return messages[1:]
 
-    def _read_on(self, wire: socket.socket, reader: PacketReader) -> str:
-        """Read and beat until the connection is of no more use; why."""
-        poll = select.poll()
+    def _read_on(self, wire: socket.socket, reader: PacketReader) -> None:
+        """Read and beat until we end it."""
         while not self._ends.is_set():
+            poll = select.poll()
             poll.register(wire, select.POLLIN | (select.POLLOUT if self._waiting else 0))
             poll.poll(1000.0 * LOOK_S)
-            try:
+            with contextlib.suppress(BlockingIOError, InterruptedError):
                 for _ in range(MOST_READS):
                     if not (data := wire.recv(1 << 16)):
-                        return f"MOOSDB {self.address} closed the connection"
+                        raise _Ended("closed the connection")
                     for packet in reader.feed(data):
                         self._take(packet)
-            except (BlockingIOError, InterruptedError):
-                pass
             with self._lock:
-                self._flush()
+                self._flush(wire)
             now_s = time.monotonic()
             if now_s - self._echo_s > DEAD_S:
-                return f"MOOSDB {self.address} echoes no heartbeat for {DEAD_S:g} s; connecting anew"
+                raise _Ended(f"echoes no heartbeat for {DEAD_S:g} s; connecting anew")
             if now_s - self._beat_s >= BEAT_S:
-                self._send([timing(self._new_beat())])
-            if fault := self._warp_fault():
-                return fault
-        return "closed by us"
+                self._send([self._beat()])
+            measured = (self._clock.now_s() + self.ahead_s) / time.time()
+            if abs(measured / self.warp - 1.0) >= WARP_OFF:
+                mend = f"give --speed {measured:.3g}, or the mission the other warp"
+                raise _Ended(f"runs at MOOSTimeWarp {measured:.3g} and this run at {self.warp:g}; {mend}")
 
-    def _new_beat(self) -> float:
-        """Time of a new heartbeat, MOOS s; its echo is known by it."""
+    def _beat(self) -> Message:
+        """A new heartbeat; its echo is known by its time, MOOS s."""
         self._beat_s = time.monotonic()
         stamp = time.time() * self.warp
         self._beats = {**dict(list(self._beats.items())[-4:]), stamp: self._clock.now_s()}
-        return stamp
+        return timing(stamp)
 
     def _take(self, messages: Sequence[Message]) -> None:
         now_s = self._clock.now_s()
@@ -292,30 +278,6 @@ class MoosClient:
         self._trip_s = (now_s - sent_s) / self.warp
         ahead_s = message.value - 0.5 * (sent_s + now_s)
         # a clock that was set is taken over at once, and jitter of single echoes is smoothed
-        smooth = abs(ahead_s - self._ahead_s) < 0.5 * self.warp
-        self._ahead_s = 0.9 * self._ahead_s + 0.1 * ahead_s if smooth else ahead_s
+        smooth = abs(ahead_s - self.ahead_s) < 0.5 * self.warp
+        self.ahead_s = 0.9 * self.ahead_s + 0.1 * ahead_s if smooth else ahead_s
         self._said = ""
-
-    def _warp_fault(self) -> str:
-        """Whether the community's time runs as fast as ours, in words; empty: it does, or it is not known."""
-        if not math.isfinite(self._ahead_s):
-            return ""
-        measured = self.moos_s(self._clock.now_s()) / time.time()
-        if abs(measured / self.warp - 1.0) < WARP_OFF:
-            return ""
-        return (
-            f"MOOSDB {self.address} runs at MOOSTimeWarp {measured:.3g} and this run at {self.warp:g}; "
-            f"give --speed {measured:.3g}, or the mission the other warp"
-        )
-
-    def _drop(self) -> None:
-        with self._lock:
-            was, self._socket, self._waiting = self._socket, None, bytearray()
-        self._ahead_s, self._beats = math.nan, {}
-        if was is not None:
-            self._lost()
-
-    def _tell(self) -> None:
-        if self._fault != self._said and not self._ends.is_set():
-            self._said = self._fault
-            LOG.warning("%s", self._fault)

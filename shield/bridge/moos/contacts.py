@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import threading
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 
 from ..frame import FieldFrame
 from ..messages import Alarm, Contact
@@ -14,10 +15,12 @@ LONGEST_CHARACTERS = 1 << 16
 MOST_CONTACTS = 256
 UNLISTED_S = 5.0
 """A boat that is not in the fleet file is told of for so long after its last report, s."""
+_FIELD = re.compile(r"(?:[^,{]|\{[^}]*\}?)+")
+"""What stands between two commas; those within braces belong to a value."""
 
 
 def parse_report(text: str) -> dict[str, str]:
-    """The fields of a NODE_REPORT, keys in capitals; in either of its forms, commas within braces belong to a value.
+    """The fields of a NODE_REPORT, keys in capitals; in either of its forms.
 
     Raises:
         ValueError: it is none.
@@ -26,16 +29,8 @@ def parse_report(text: str) -> dict[str, str]:
         raise ValueError(f"a report of {len(text)} characters")
     if text.lstrip().startswith("{"):
         content = json.loads(text)
-        if not isinstance(content, dict):
-            raise ValueError("a report in JSON that is no object")
         return {str(key).upper(): str(value) for key, value in content.items()}
-    fields, depth, start = [], 0, 0
-    for place, letter in enumerate(text):
-        depth += (letter == "{") - (letter == "}")
-        if letter == "," and depth <= 0:
-            fields.append(text[start:place])
-            start = place + 1
-    pairs = (field.partition("=") for field in [*fields, text[start:]])
+    pairs = (field.partition("=") for field in _FIELD.findall(text))
     return {key.strip().upper(): value.strip() for key, equals, value in pairs if equals}
 
 
@@ -43,7 +38,7 @@ class MoosContacts:
     """Takes reports from the links' threads, gives contacts to the loop; a `ContactSource` that can raise alarms.
 
     TIME in a report is the reporter's clock when it posted, not the age of the position: whether the position moves as
-    its speed says is watched where contacts of all sources are, see `Gate` there.
+    its speed says is watched where contacts of all sources are, see `contact_fusion`.
 
     Args:
         frame: of the field.
@@ -76,23 +71,29 @@ class MoosContacts:
         try:
             fields = parse_report(text)
             name = fields["NAME"]
-            values = [float(fields[key]) for key in ("HDG", "SPD", "TIME")]
-            position = self._place(fields)
-        except (KeyError, ValueError) as error:
+            heading_deg, speed_mps, moos_s = (float(fields[key]) for key in ("HDG", "SPD", "TIME"))
+            if "X" in fields and "Y" in fields:
+                east, north = float(fields["X"]) - self._corner_m[0], float(fields["Y"]) - self._corner_m[1]
+                position = self._frame.turn_to_field(east, north)
+            else:
+                latitude_deg, longitude_deg = float(fields["LAT"]), float(fields["LON"])
+                if not (abs(latitude_deg) <= 89.0 and abs(longitude_deg) <= 180.0):
+                    raise ValueError(f"latitude {latitude_deg}, longitude {longitude_deg}")
+                position = self._frame.to_field_m(latitude_deg, longitude_deg)
+        except (KeyError, ValueError, RecursionError) as error:
             return f"a NODE_REPORT cannot be read ({error}): {text[:80]!r}"
-        heading_deg, speed_mps, moos_s = values
-        if not all(map(math.isfinite, (*values, *position))):
+        if not all(map(math.isfinite, (heading_deg, speed_mps, moos_s, *position))):
             return f"a NODE_REPORT of {name[:32]} holds what is no number"
         heading = self._frame.heading_to_field_rad(math.radians(heading_deg))
         fixed_s = min(received_s, moos_s + to_clock)  # a reporter whose clock is ahead gains nothing by it
         source = f"moos:{heard_by}"
         with self._lock:
             self._now_s = received_s
-            if name not in self._names:
-                if len(self._unlisted_s) < MOST_CONTACTS:
-                    self._unlisted_s[name[:32]] = received_s
-                return ""
-            self._contacts[name, source] = Contact(name, position, heading, speed_mps, fixed_s, self._error_m, source)
+            if name in self._names:
+                contact = Contact(name, position, heading, speed_mps, fixed_s, self._error_m, source)
+                self._contacts[name, source] = contact
+            elif len(self._unlisted_s) < MOST_CONTACTS:
+                self._unlisted_s[name[:32]] = received_s
         return ""
 
     def read(self) -> tuple[Contact, ...]:
@@ -111,13 +112,3 @@ class MoosContacts:
 
     def close(self) -> None:
         """Nothing is held."""
-
-    def _place(self, fields: Mapping[str, str]) -> tuple[float, float]:
-        """Position in the field, m: by X and Y, or by latitude and longitude where these are left out."""
-        if "X" in fields and "Y" in fields:
-            east, north = float(fields["X"]) - self._corner_m[0], float(fields["Y"]) - self._corner_m[1]
-            return self._frame.turn_to_field(east, north)
-        latitude, longitude = float(fields["LAT"]), float(fields["LON"])
-        if not (abs(latitude) <= 89.0 and abs(longitude) <= 180.0):
-            raise ValueError(f"latitude {latitude}, longitude {longitude}")
-        return self._frame.to_field_m(latitude, longitude)

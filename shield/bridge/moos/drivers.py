@@ -94,14 +94,13 @@ class Drivers:
         if message.key in OVERRIDES:
             return self._hear_override(message)
         if message.key == ALLSTOP:
-            self.helm, before, self.allstop = message.source, self.allstop, message.text
-            told = before.lower() not in ("", self.allstop.lower()) or self.allstop.lower() != "clear"
+            self.helm, before, self.allstop = message.source, self.allstop.lower(), message.text
+            told = self.allstop.lower() != "clear" or before not in ("", "clear")
             return f"the helm says all-stop: {self.allstop}" if told else ""
         if message.key == STATE:
             self.helm, self.state = message.source, message.text
-            return ""
-        if message.key in self._outputs:
-            return self._hear_output(message, now_s) if live else self._hear_old(message)
+        elif message.key in self._outputs and (live or message.data != DOUBLE):
+            return self._hear_output(message, now_s, live)
         return ""
 
     def _hear_override(self, message: Message) -> str:
@@ -113,27 +112,23 @@ class Drivers:
             return f"{message.source or 'somebody'} took it by hand ({message.key}=true); nothing is sent"
         return f"given back by {message.source or 'somebody'} ({message.key}=false); commands go on"
 
-    def _hear_output(self, message: Message, now_s: float) -> str:
+    def _hear_output(self, message: Message, now_s: float, live: bool) -> str:
+        who = message.source or "somebody"
+        if not live:  # what stood there when we came: its type is what every later write must have
+            self.faults["type_clash"] += 1
+            return (
+                f"{message.key} is a string here, first written by {who}, so the MOOSDB drops our numbers; restart it, "
+                "and end who writes strings"
+            )
         if message.source == self._ours:
             self._echoed_s = now_s
             return ""
         if message.value == 0.0 and message.data == DOUBLE and (message.source == self.helm or self.overridden):
             return ""  # a helm that stops all writes zeros past its prefix, once; so does a PID under override
-        self.other, self.other_s = message.source or "somebody", now_s
+        self.other, self.other_s = who, now_s
         self.faults["second_commander"] += 1
         value = message.text[:20] if message.data != DOUBLE else f"{message.value:g}"
         remedy = f"set helm_prefix = {self._prefix} there" if message.source == self.helm else "end it"
         return (
-            f"a second commander, {self.other}, posts {message.key}={value}: {remedy}, two commanders undo each "
-            "other's safety"
-        )
-
-    def _hear_old(self, message: Message) -> str:
-        """The value that stood there when we came: its type is what every later write must have."""
-        if message.data == DOUBLE:
-            return ""
-        self.faults["type_clash"] += 1
-        return (
-            f"{message.key} is a string here, first written by {message.source or 'somebody'}, so the MOOSDB drops our "
-            "numbers; restart it, and end who writes strings"
+            f"a second commander, {who}, posts {message.key}={value}: {remedy}, two commanders undo each other's safety"
         )

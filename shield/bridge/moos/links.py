@@ -13,17 +13,16 @@ from ..clock import Clock
 from ..fleet_checks import MOOS, address_of
 from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
-from ..messages import Answer, Link, Snapshot
+from ..messages import Answer, Link, LinkMaker, WantedSource
 from .contacts import MoosContacts
-from .helm_gate import Gate, HelmGate
-from .pid_gate import PidGate
+from .gates import HelmGate, PidGate
 from .vehicle import MoosLink
 
 POLICY = "moos"
 """Name of the policy whose commands come from the boats' own communities."""
 
 
-class MoosLinks:
+class MoosLinks(LinkMaker):
     """A `LinkMaker`: a client in each boat's own MOOSDB, and one `ContactSource` for all of them.
 
     Args:
@@ -43,9 +42,7 @@ class MoosLinks:
             raise ValueError(f"boat {boat.name} has no link of MOOS")
         host, port = address_of(settings.address.removeprefix(MOOS), f"boat {boat.name!r}: link")
         frame, platform = self._fleet.frame, self._fleet.platform_of[boat.name]
-        gate: Gate = HelmGate(frame, settings.prefix)
-        if settings.gate == "pid":
-            gate = PidGate(platform, self._fleet.dt_s)
+        gate = PidGate(platform, self._fleet.dt_s) if settings.gate == "pid" else HelmGate(frame, settings.prefix)
         corner_m, prefix = settings.corner_m, settings.prefix
         error_m = self._fleet.shield_config.position_error_m
         contacts = self.contacts.setdefault(corner_m, MoosContacts(frame, corner_m, self._fleet.names, error_m))
@@ -56,14 +53,8 @@ class MoosLinks:
         """Who tells of other boats."""
         return tuple(self.contacts.values())
 
-    def open(self) -> None:
-        """Nothing is shared."""
 
-    def close(self) -> None:
-        """Nothing is shared."""
-
-
-class MoosNominal:
+class MoosNominal(WantedSource):
     """A policy that is somebody else's: what each boat's own community wants, through its gate.
 
     Args:
@@ -87,9 +78,6 @@ class MoosNominal:
         """Take commands from these links; until then nobody wants anything."""
         self._links = {name: link for name, link in links.items() if isinstance(link, MoosLink)}
 
-    def offer(self, snapshot: Snapshot) -> None:
-        """Who commands there sees the boats by himself."""
-
     def latest(self) -> Answer:
         """What is wanted now; a boat nobody commands is told to stop, which its link says in words."""
         values = np.full((len(self._names), 2), math.nan)
@@ -97,6 +85,3 @@ class MoosNominal:
             nominal = link.nominal()
             values[self._names.index(name)] = nominal.speed_mps, nominal.heading_rad
         return Answer(Commands.absolute_rad(values), 0.0)
-
-    def close(self) -> None:
-        """Nothing is held."""

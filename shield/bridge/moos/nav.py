@@ -1,10 +1,12 @@
-"""`Navigation`: what one boat's NAV_* say, each value with the time it was true, in the field's frame."""
+"""`Navigation`: what one boat's NAV_* say, each value with the time it was true, in the field's frame.
+
+Whether they move as the boat does is watched where boats of all links are, see `estimator` and `contact_fusion`.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 
 from ..frame import TWO_PI, FieldFrame
 from .wire import DOUBLE, Message
@@ -19,18 +21,15 @@ EARLY_S = 0.5
 """Stamps later than now by more than this, MOOS s, are of a clock that is wrong."""
 BACK_S = 2.0
 """Stamps that go back by more than this are of a source that started anew."""
-FASTEST_MPS, FARTHEST_M = 30.0, 50_000.0
-RUN_M = 0.25
-"""A position the same to the last digit while NAV_SPEED says the boat ran this far is frozen, whatever its stamp."""
-STILL_S = 1.5
-"""All four values the same to the last digit for so long, while the boat is told to move: the source is frozen."""
-TOLD_MPS = 0.3
-
-
-@dataclass(frozen=True)
-class _Value:
-    value: float
-    true_s: float
+FARTHEST = {"NAV_SPEED": 30.0, "NAV_HEADING": 2.0 * 360.0, "NAV_X": 50_000.0, "NAV_Y": 50_000.0}
+"""Values beyond are no boat's: m/s, deg, m."""
+REFUSED = {
+    "type_clash": "it is a string in this MOOSDB, so somebody wrote it as one first; restart the MOOSDB",
+    "not_finite": "its value is no number; restart the simulator or PID that posts it, it does not recover by itself",
+    "clock": "it is stamped in the future; set the clocks, or give all the same MOOSTimeWarp",
+    "impossible": "no boat is there, or goes that fast",
+}
+"""Kinds of what is wrong with a mail, and the remedy."""
 
 
 class Navigation:
@@ -57,14 +56,7 @@ class Navigation:
         self.speed_mps, self.speed_s = math.nan, -math.inf
         self.turn_rate_rads = math.nan
         self.source = ""
-        self._values: dict[str, _Value] = {}
-        self._place_s, self._run_m = -math.inf, 0.0
-        self._same_since_s, self._told_since_s, self._still = math.inf, math.inf, False
-
-    def told(self, speed_mps: float, now_s: float) -> None:
-        """The boat is told to go that fast."""
-        moving = abs(speed_mps) >= TOLD_MPS
-        self._told_since_s = min(self._told_since_s, now_s) if moving else math.inf
+        self._values: dict[str, tuple[float, float]] = {}
 
     def hear(self, message: Message, true_s: float, received_s: float) -> str:
         """Take one NAV_* in.
@@ -77,79 +69,49 @@ class Navigation:
         Returns:
             A text for the operator, mostly empty.
         """
-        if fault := self._refused(message, true_s, received_s):
+        if fault := _fault(message, true_s, received_s):
             self.faults[fault] += 1
-            return f"{message.key} of {message.source} is refused: {_WORDS[fault]}"
-        before = self._values.get(message.key)
-        text = ""
-        if before is not None and true_s <= before.true_s:
-            if before.true_s - true_s < BACK_S:
+            return f"{message.key} of {message.source} is refused: {REFUSED[fault]}"
+        before_s, text = self._values.get(message.key, (0.0, -math.inf))[1], ""
+        if true_s <= before_s:
+            if before_s - true_s < BACK_S:
                 return ""  # the same again, as after a registration, or one that came late
             self.forget()
             text = f"{message.source} started anew, or its clock was set: its {message.key} went back in time"
         self.source = message.source
-        self._note_same(message, before, true_s)
-        self._values[message.key] = _Value(message.value, min(true_s, received_s))
-        if message.key in VARIABLES and not self._is_still(true_s):
-            self._take(message.key)
+        self._values[message.key] = message.value, min(true_s, received_s)
+        if message.key == "NAV_SPEED":
+            self.speed_mps, self.speed_s = self._values[message.key]
+        elif message.key == "NAV_HEADING":
+            self._take_heading(*self._values[message.key])
+        elif message.key in VARIABLES:
+            self._take_place()
         return text
 
     def place_deg(self) -> tuple[float, float] | None:
         """Latitude and longitude told beside NAV_X and NAV_Y, deg; None: none."""
-        found = [self._values[key].value for key in PLACE if key in self._values]
+        found = [self._values[key][0] for key in PLACE if key in self._values]
         return (found[0], found[1]) if len(found) == len(PLACE) else None
 
-    def _refused(self, message: Message, true_s: float, received_s: float) -> str:
-        """Kind of what is wrong with a mail; written so that NaN is refused."""
-        if message.data != DOUBLE:
-            return "type_clash"
-        if not (math.isfinite(message.value) and math.isfinite(true_s)):
-            return "not_finite"
-        if not true_s <= received_s + EARLY_S:
-            return "clock"
-        limit = {"NAV_SPEED": FASTEST_MPS, "NAV_HEADING": 2.0 * 360.0}.get(message.key, FARTHEST_M)
-        return "" if abs(message.value) <= limit else "impossible"
+    def _take_heading(self, heading_deg: float, true_s: float) -> None:
+        heading, seconds = self._frame.heading_to_field_rad(math.radians(heading_deg)), true_s - self.heading_s
+        turned = (heading - self.heading_rad + math.pi) % TWO_PI - math.pi
+        self.turn_rate_rads = turned / seconds if 0.01 < seconds < 1.0 else math.nan
+        self.heading_rad, self.heading_s = heading, true_s
 
-    def _take(self, key: str) -> None:
-        value = self._values[key]
-        if key == "NAV_SPEED":
-            self.speed_mps, self.speed_s = value.value, value.true_s
-        elif key == "NAV_HEADING":
-            heading = self._frame.heading_to_field_rad(math.radians(value.value))
-            seconds = value.true_s - self.heading_s
-            turned = (heading - self.heading_rad + math.pi) % TWO_PI - math.pi
-            self.turn_rate_rads = turned / seconds if 0.01 < seconds < 1.0 else math.nan
-            self.heading_rad, self.heading_s = heading, value.true_s
-        else:
-            x, y = self._values.get("NAV_X"), self._values.get("NAV_Y")
-            if x is not None and y is not None and abs(x.true_s - y.true_s) <= MATCHED_S:
-                east, north = x.value - self._corner_m[0], y.value - self._corner_m[1]
-                self._take_place(self._frame.turn_to_field(east, north), min(x.true_s, y.true_s))
-
-    def _take_place(self, position_m: tuple[float, float], true_s: float) -> None:
-        """Take a position, unless it stays while the boat is under way."""
-        since_s, self._place_s = true_s - self._place_s, true_s
-        ran_m = abs(self.speed_mps) * min(since_s, 1.0) if math.isfinite(self.speed_mps) else 0.0
-        self._run_m = self._run_m + ran_m if position_m == self.position_m else 0.0
-        if self._run_m > RUN_M:
-            self.faults["frozen"] += 1
-        else:
-            self.position_m, self.position_s = position_m, true_s
-
-    def _note_same(self, message: Message, before: _Value | None, true_s: float) -> None:
-        if message.key in VARIABLES and (before is None or before.value != message.value):
-            self._same_since_s, self._still = true_s, False
-
-    def _is_still(self, true_s: float) -> bool:
-        """Once found frozen it stays so until something changes: told to stop for that very reason, it is no better."""
-        self._still = self._still or true_s - max(self._same_since_s, self._told_since_s) > STILL_S
-        self.faults["frozen"] += int(self._still)
-        return self._still
+    def _take_place(self) -> None:
+        (x, x_s), (y, y_s) = (self._values.get(key, (math.nan, math.nan)) for key in VARIABLES[:2])
+        if abs(x_s - y_s) <= MATCHED_S:
+            self.position_m = self._frame.turn_to_field(x - self._corner_m[0], y - self._corner_m[1])
+            self.position_s = min(x_s, y_s)
 
 
-_WORDS = {
-    "type_clash": "it is a string in this MOOSDB, so somebody wrote it as one first; restart the MOOSDB",
-    "not_finite": "its value is no number; restart the simulator or PID that posts it, it does not recover by itself",
-    "clock": "it is stamped in the future; set the clocks, or give all the same MOOSTimeWarp",
-    "impossible": "no boat is there, or goes that fast",
-}
+def _fault(message: Message, true_s: float, received_s: float) -> str:
+    """Kind of what is wrong with a mail; written so that NaN is refused."""
+    if message.data != DOUBLE:
+        return "type_clash"
+    if not (math.isfinite(message.value) and math.isfinite(true_s)):
+        return "not_finite"
+    if not true_s <= received_s + EARLY_S:
+        return "clock"
+    return "" if abs(message.value) <= FARTHEST.get(message.key, 360.0) else "impossible"

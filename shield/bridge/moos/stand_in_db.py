@@ -1,14 +1,13 @@
 """`StandInDb`: a small MOOSDB on this machine alone, for demonstrations and tests where MOOS is not installed.
 
-It keeps what clients can see of a real one: the handshake, mail to all who registered, periods, wildcards, the type of
-a variable fixed by its first write, heartbeats echoed, silent clients dropped.
+It keeps what clients of ours can see of a real one: the handshake, mail to all who registered, periods, the type of a
+variable fixed by its first write, heartbeats echoed, silent clients dropped.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
-import fnmatch
-import select
 import socket
 import threading
 import time
@@ -25,7 +24,6 @@ from .wire import (
     TIMING,
     UNREGISTER,
     WELCOME,
-    WILDCARD,
     Message,
     PacketReader,
     WireError,
@@ -38,19 +36,20 @@ MOST_WAITING = 1 << 20
 LOOK_S = 0.05
 
 
-@dataclass
+@dataclass(eq=False)
 class _Client:
     """One connection."""
 
-    wire: socket.socket
+    writer: asyncio.StreamWriter
     name: str = ""
-    opening: bytes = b""
-    reader: PacketReader = field(default_factory=PacketReader)
-    waiting: bytearray = field(default_factory=bytearray)
     periods: dict[str, float] = field(default_factory=dict)
     delivered_s: dict[str, float] = field(default_factory=dict)
-    patterns: list[tuple[str, str, float]] = field(default_factory=list)
     heard_s: float = field(default_factory=time.monotonic)
+
+    def send(self, message: Message) -> None:
+        self.writer.write(pack_packet([message]))
+        if self.writer.transport.get_write_buffer_size() > MOST_WAITING:
+            self.writer.transport.abort()  # it does not read
 
 
 class StandInDb:
@@ -67,7 +66,6 @@ class StandInDb:
         latest: last message of each variable.
         refused: posts dropped for their type, by variable.
         frozen: set: it neither reads nor writes, its sockets stay open.
-        lock: held while anything in it changes.
 
     Raises:
         OSError: the port is taken.
@@ -77,16 +75,16 @@ class StandInDb:
         self, community: str, port: int = 0, warp: float = 1.0, hear: Callable[[Message], None] = lambda message: None
     ) -> None:
         self.community, self.warp, self._hear = community, warp, hear
-        self._server = socket.create_server(("127.0.0.1", port))
-        self._server.setblocking(False)
-        self.port = int(self._server.getsockname()[1])
+        server = socket.create_server(("127.0.0.1", port))
+        self.port = int(server.getsockname()[1])
         self.latest: dict[str, Message] = {}
         self.refused: dict[str, int] = {}
-        self.frozen = threading.Event()
-        self.lock = threading.RLock()
-        self._clients: dict[int, _Client] = {}
-        self._ends = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name=f"moosdb {community}", daemon=True)
+        self.frozen, self._ends, self._lock = threading.Event(), threading.Event(), threading.RLock()
+        self._clients: set[_Client] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._serve(server)), name=f"moosdb {community}", daemon=True
+        )
         self._thread.start()
 
     def now_s(self) -> float:
@@ -95,24 +93,18 @@ class StandInDb:
 
     def clients(self) -> list[str]:
         """Names of who is connected."""
-        with self.lock:
-            return [client.name for client in self._clients.values() if client.name]
+        return [client.name for client in list(self._clients) if client.name]
 
     def post(self, key: str, value: float | str, source: str, time_s: float | None = None) -> None:
         """Write a variable as an app of this machine would."""
         stamp = self.now_s() if time_s is None else time_s
-        message = notify(key, 0.0 if not isinstance(value, str) else value, source, stamp)
+        message = notify(key, value if isinstance(value, str) else 0.0, source, stamp)
         self._write(message if isinstance(value, str) else replace(message, value=float(value)))  # NaN, too: as apps do
 
     def close(self) -> None:
         """End it; may be called again."""
         self._ends.set()
-        self.frozen.clear()
         self._thread.join()
-        with self.lock:
-            for client in list(self._clients.values()):
-                self._drop(client)
-            self._server.close()
 
     def __enter__(self) -> StandInDb:
         return self
@@ -120,147 +112,76 @@ class StandInDb:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _serve(self) -> None:
+    async def _serve(self, socket_: socket.socket) -> None:
+        self._loop = asyncio.get_running_loop()
+        server = await asyncio.start_server(self._talk, sock=socket_)
         while not self._ends.is_set():
-            if self.frozen.is_set():
-                time.sleep(LOOK_S)
-                continue
-            poll = select.poll()
-            poll.register(self._server, select.POLLIN)
-            with self.lock:
-                for number, client in self._clients.items():
-                    poll.register(number, select.POLLIN | (select.POLLOUT if client.waiting else 0))
-            ready = [number for number, _ in poll.poll(1000.0 * LOOK_S)]
-            if self.frozen.is_set():
-                continue
-            with self.lock:
-                self._turn(ready)
+            await asyncio.sleep(LOOK_S)
+            for client in list(self._clients):
+                if time.monotonic() - client.heard_s > SILENCE_S:
+                    client.writer.transport.abort()
+            while self.frozen.is_set() and not self._ends.is_set():
+                time.sleep(LOOK_S)  # all of it, as a process that is stopped
+        server.close()
+        for client in list(self._clients):
+            client.writer.transport.abort()
 
-    def _turn(self, ready: list[int]) -> None:
-        for number in ready:
-            if number == self._server.fileno():
-                self._accept()
-            elif number in self._clients:
-                self._read(self._clients[number])
-        for client in list(self._clients.values()):
-            if client.waiting:
-                self._flush(client)
-            if time.monotonic() - client.heard_s > SILENCE_S:
-                self._drop(client)
-
-    def _accept(self) -> None:
-        with contextlib.suppress(OSError):
-            wire, _ = self._server.accept()
-            wire.setblocking(False)
-            wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._clients[wire.fileno()] = _Client(wire)
-
-    def _read(self, client: _Client) -> None:
-        try:
-            data = client.wire.recv(1 << 16)
-            if not data:
-                self._drop(client)
-                return
-            if len(client.opening) < len(PROTOCOL):
-                data = client.opening + data
-                client.opening, data = data[: len(PROTOCOL)], data[len(PROTOCOL) :]
-                if client.opening.lower() != PROTOCOL.lower():
-                    self._drop(client)
-                    return
-            for packet in client.reader.feed(data):
-                client.heard_s = time.monotonic()
-                for message in packet:
-                    self._take(client, message)
-        except (BlockingIOError, InterruptedError):
-            return
-        except (OSError, WireError):
-            self._drop(client)
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        client, packets = _Client(writer), PacketReader()
+        self._clients.add(client)
+        with contextlib.suppress(OSError, asyncio.IncompleteReadError, WireError):  # it is gone, or no client of MOOS
+            if (await reader.readexactly(len(PROTOCOL))).lower() != PROTOCOL.lower():
+                raise WireError("another protocol")
+            while data := await reader.read(1 << 16):
+                for packet in packets.feed(data):
+                    client.heard_s = time.monotonic()
+                    for message in packet:
+                        self._take(client, message)
+        self._clients.discard(client)
+        writer.close()
 
     def _take(self, client: _Client, message: Message) -> None:
         if message.kind == DATA and not client.name:
             self._welcome(client, message)
             return
         if message.source:  # requests count for who is named in them, heartbeats for who sent them
-            client = next((other for other in self._clients.values() if other.name == message.source), client)
+            client = next((other for other in self._clients if other.name == message.source), client)
         if message.kind == TIMING:
-            self._send(client, replace(message, value=self.now_s(), value2=0.0))
+            client.send(replace(message, value=self.now_s(), value2=0.0))
         elif message.kind == NOTIFY:
-            self._write(replace(message, community=message.community or self.community))
+            self._write(message)
         elif message.kind == REGISTER and message.source:
-            self._subscribe(client, message.key, message.value)
+            client.periods[message.key] = message.value
+            if message.key in self.latest:
+                client.send(replace(self.latest[message.key], number=-1))
         elif message.kind == UNREGISTER:
             client.periods.pop(message.key, None)
-        elif message.kind == WILDCARD:
-            asked = dict(part.partition("=")[::2] for part in message.text.split(","))
-            pattern = (asked.get("AppPattern", "*"), asked.get("VarPattern", "*"), float(asked.get("Interval", 0.0)))
-            client.patterns.append(pattern)
-            for known in list(self.latest.values()):
-                self._match(client, known, pattern)
 
     def _welcome(self, client: _Client, message: Message) -> None:
         if message.text in self.clients():
-            text = f'A client of this name ("{message.text}") already exists'
-            self._send(client, Message(POISON, data=STRING, text=text))
-            self._drop(client)
-            return
-        client.name = message.text
-        skew_s = self.now_s() - message.time_s
-        welcome = Message(WELCOME, time_s=self.now_s(), value=skew_s, text="asynchronous", community=self.community)
-        self._send(client, replace(welcome, source_aux="hostname=stand-in"))
-
-    def _subscribe(self, client: _Client, key: str, period_s: float) -> None:
-        client.periods[key] = period_s
-        if key in self.latest:
-            self._send(client, replace(self.latest[key], number=-1))
-
-    def _match(self, client: _Client, message: Message, pattern: tuple[str, str, float]) -> None:
-        app, variable, period_s = pattern
-        if fnmatch.fnmatchcase(message.key, variable) and fnmatch.fnmatchcase(message.source, app):
-            self._subscribe(client, message.key, period_s)
+            client.send(Message(POISON, data=STRING, text=f'A client of this name ("{message.text}") already exists'))
+            raise WireError("a name that is taken")
+        client.name, now_s = message.text, self.now_s()
+        welcome = Message(WELCOME, time_s=now_s, value=now_s - message.time_s, text="asynchronous")
+        client.send(replace(welcome, community=self.community, source_aux="hostname=stand-in"))
 
     def _write(self, message: Message) -> None:
-        with self.lock:
+        message = replace(message, community=message.community or self.community)
+        with self._lock:
             known = self.latest.get(message.key)
             if known is not None and known.data != message.data:
                 self.refused[message.key] = self.refused.get(message.key, 0) + 1
                 return
-            if known is None:
-                for client in self._clients.values():
-                    for _, variable, period_s in client.patterns:
-                        if fnmatch.fnmatchcase(message.key, variable):
-                            client.periods.setdefault(message.key, period_s)
-            self.latest[message.key] = replace(message, community=message.community or self.community)
+            self.latest[message.key] = message
             self._hear(message)
-            for client in list(self._clients.values()):
-                self._deliver(client, self.latest[message.key])
+        with contextlib.suppress(RuntimeError):  # it was closed
+            if self._loop is not None:
+                self._loop.call_soon_threadsafe(self._deliver, message)
 
-    def _deliver(self, client: _Client, message: Message) -> None:
-        period_s = client.periods.get(message.key)
-        if period_s is None:
-            return
+    def _deliver(self, message: Message) -> None:
         now_s = self.now_s()
-        if period_s > 0.0 and now_s - client.delivered_s.get(message.key, -1e30) < period_s:
-            return
-        client.delivered_s[message.key] = now_s
-        self._send(client, message)
-
-    def _send(self, client: _Client, message: Message) -> None:
-        client.waiting += pack_packet([message])
-        self._flush(client)
-        if len(client.waiting) > MOST_WAITING:
-            self._drop(client)
-
-    def _flush(self, client: _Client) -> None:
-        if self.frozen.is_set():
-            return
-        try:
-            while client.waiting:
-                del client.waiting[: client.wire.send(client.waiting)]
-        except (BlockingIOError, InterruptedError):
-            return
-        except OSError:
-            client.waiting.clear()
-
-    def _drop(self, client: _Client) -> None:
-        self._clients.pop(client.wire.fileno(), None)
-        client.wire.close()
+        for client in list(self._clients):
+            period_s = client.periods.get(message.key)
+            if period_s is not None and not now_s - client.delivered_s.get(message.key, -1e30) < period_s:
+                client.delivered_s[message.key] = now_s
+                client.send(message)

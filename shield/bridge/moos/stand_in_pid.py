@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...platforms import Platform, fresh_state, step_boat
+from ...platforms import Platform
 from ...platforms import layout as L
 from .drivers import OVERRIDES
-from .pid_gate import SUFFIX, PidGate, check_actuated
+from .gates import SUFFIX, Autopilot, HelmGate, PidGate
 from .wire import DOUBLE, Message
 
 TARDY_S = 2.0
@@ -41,16 +41,11 @@ class StandInPid:
         """A variable was written at MOOS time ``now_s``."""
         if message.key in OVERRIDES:
             self.overridden = message.text.lower() == "true"
-        if message.key not in ("DESIRED_HEADING", "DESIRED_SPEED") or message.data != DOUBLE:
-            return
-        if not abs(now_s - message.time_s) < SKEW_S:
+        if message.key not in HelmGate.outputs or message.data != DOUBLE or not abs(now_s - message.time_s) < SKEW_S:
             return
         self.broken = self.broken or not math.isfinite(message.value)
         self.heard_s = now_s
-        if message.key == "DESIRED_HEADING":
-            self.heading_deg = message.value
-        else:
-            self.speed_mps = message.value
+        setattr(self, "heading_deg" if message.key == "DESIRED_HEADING" else "speed_mps", message.value)
 
     def command(self, now_s: float) -> tuple[float, float] | None:
         """Heading, deg true, and speed, m/s, that it steers by now; None: thrust off."""
@@ -75,20 +70,15 @@ class StandInActuators:
     """
 
     def __init__(self, platform: Platform, dt_s: float) -> None:
-        check_actuated(platform)
-        self._params, self._dt_s, self._row = platform.pack(), dt_s, fresh_state(0.0, 0.0, 0.0)
+        self._autopilot = Autopilot(platform, dt_s)
         self.rudder = self.thrust = 0.0
         self._heard_s = -math.inf
 
     def hear(self, message: Message, now_s: float) -> None:
         """A variable was written at MOOS time ``now_s``."""
-        if message.key not in PidGate.outputs or message.data != DOUBLE or not math.isfinite(message.value):
-            return
-        self._heard_s = now_s
-        if message.key == "DESIRED_RUDDER":
-            self.rudder = message.value
-        else:
-            self.thrust = message.value
+        if message.key in PidGate.outputs and message.data == DOUBLE and math.isfinite(message.value):
+            self._heard_s = now_s
+            setattr(self, "rudder" if message.key == "DESIRED_RUDDER" else "thrust", message.value)
 
     def is_driven(self, now_s: float) -> bool:
         """Whether somebody posts the plain names at this moment."""
@@ -102,12 +92,9 @@ class StandInActuators:
             heading_deg: of the boat, in the same frame.
             speed_mps: of the boat.
         """
-        row = self._row
+        values = (0.0, 0.0)
         if command is None:
-            row[L.THRUST] = row[L.RUDDER] = 0.0
+            self._autopilot.row[[L.RUDDER, L.THRUST]] = values
         else:
-            row[L.HEADING], row[L.SPEED] = (heading_deg + 180.0) % 360.0 - 180.0, abs(speed_mps)
-            error_deg = (command[0] - heading_deg + 180.0) % 360.0 - 180.0
-            step_boat(self._params, row, command[1], error_deg, self._dt_s)
-        values = (float(row[L.RUDDER]), float(row[L.THRUST]))
+            values = self._autopilot.step(*command, heading_deg, speed_mps)
         return {f"{name}{SUFFIX}": value for name, value in zip(PidGate.outputs, values, strict=True)}

@@ -8,18 +8,17 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from types import TracebackType
+from dataclasses import replace
 
-from ...compat import Self
 from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
-from ..messages import NEVER_S, BoatReading, Sent, never
+from ..messages import NEVER_S, BoatReading, Link, Sent, check_finite, never
 from . import drivers, nav
 from .client import Health, MoosClient
 from .contacts import MoosContacts
 from .drivers import Drivers
-from .helm_gate import Gate, Nominal
+from .gates import Gate, Nominal
 from .nav import Navigation
 from .wire import Message, WireError
 
@@ -41,8 +40,12 @@ def client_name(boat: str) -> str:
     return f"steerclear_{boat}"
 
 
-class MoosLink:
+class MoosLink(Link):
     """One boat behind its MOOSDB. `connect`, `prepare`, then `read` and `send` at the loop's rate, then `close`.
+
+    Attributes:
+        client: the connection.
+        writers: who was heard writing each variable, for the checks.
 
     Args:
         boat: its name.
@@ -50,7 +53,7 @@ class MoosLink:
         gate: where the shield sits in the community.
         frame: of the field.
         clock: the loop's; as many times faster than real time as the community's MOOSTimeWarp says.
-        contacts: takes the NODE_REPORTs that reach this boat; None: they are left.
+        contacts: takes the NODE_REPORTs that reach this boat.
         corner_m: the field's corner on the boat's local grid, m.
         prefix: what the helm puts before its own DESIRED_*, for words.
     """
@@ -63,13 +66,13 @@ class MoosLink:
         gate: Gate,
         frame: FieldFrame,
         clock: Clock,
-        contacts: MoosContacts | None = None,
+        contacts: MoosContacts,
         *,
         corner_m: tuple[float, float] = (0.0, 0.0),
         prefix: str = "RAW_",
     ) -> None:
         self.boat, self.gate = boat, gate
-        self._frame, self._clock, self._contacts = frame, clock, contacts
+        self._clock, self._contacts = clock, contacts
         self._lock = threading.Lock()
         self._navigation = Navigation(frame, corner_m)
         self._drivers = Drivers(client_name(boat), gate.outputs, prefix)
@@ -77,14 +80,11 @@ class MoosLink:
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._told_fault = ""
         self._said_s: dict[str, float] = {}
-        self._last_rad = math.nan
+        self._last_rad = 0.0
         self._prepared = self._closed = False
         self.writers: dict[str, set[str]] = {}
-        """Who was heard writing each variable, for the checks."""
         names = (*nav.VARIABLES, *nav.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
-        self.client = MoosClient(
-            client_name(boat), host, port, clock, dict.fromkeys(names, 0.0), self._hear, self._forget
-        )
+        self.client = MoosClient(client_name(boat), host, port, clock, names, self._hear, self._forget)
 
     def connect(self, timeout_s: float) -> None:
         """Find the MOOSDB, register, and hear where the boat is.
@@ -94,9 +94,12 @@ class MoosLink:
         """
         self.client.start()
         end_s = time.monotonic() + timeout_s
-        while self._unheard():
+        while unheard := self._unheard():
             if time.monotonic() > end_s:
-                raise LinkError(f"boat {self.boat}: {self._missing(timeout_s)}")
+                health = self.client.health()
+                what = f"nobody posts {', '.join(unheard)} in MOOSDB {self.client.address} ({health.community})"
+                what = "; ".join([f"{what} within {timeout_s:g} s; start its simulator or sensors", *self._texts])
+                raise LinkError(f"boat {self.boat}: {health.fault or what}")
             time.sleep(POLL_S)
 
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
@@ -108,11 +111,11 @@ class MoosLink:
             LinkRefused: asked for again while the boat is driven by hand: only who set the override may end it.
             LinkError: its MOOSDB does not answer.
         """
+        if fault := self.client.health().fault:
+            raise LinkError(f"boat {self.boat}: {fault}")
         with self._lock:
-            why, first = self._drivers.why_not(), not self._prepared
-        if not self.client.connected:
-            raise LinkError(f"boat {self.boat}: {self.client.health().fault}")
-        if why and not first:
+            why = self._drivers.why_not()
+        if why and self._prepared:
             raise LinkRefused(f"boat {self.boat}: {why}")
         self._prepared = True
 
@@ -123,28 +126,18 @@ class MoosLink:
             now_s = self._clock.now_s()
             if health.echo_age_s < ALIVE_S:
                 self._say(self._drivers.dropped(now_s), now_s)
-            seen = self._navigation
-            why_not = health.fault or self._drivers.why_not()
-            moving = abs(seen.speed_mps) >= 0.1
-            heading_rad = seen.heading_rad
             texts, self._texts = tuple(self._texts), deque(maxlen=MOST_TEXTS)
-            faults = self._take_faults()
-            return BoatReading(
-                boat=self.boat,
-                read_s=now_s,
-                position_m=seen.position_m,
-                position_age_s=_age(now_s, seen.position_s),
-                heading_rad=heading_rad,
-                heading_age_s=_age(now_s, seen.heading_s),
-                speed_mps=seen.speed_mps,
-                course_rad=(heading_rad + (math.pi if seen.speed_mps < 0.0 else 0.0)) % TWO_PI if moving else math.nan,
-                velocity_age_s=_age(now_s, seen.speed_s),
-                turn_rate_rads=seen.turn_rate_rads,
-                turn_rate_age_s=_age(now_s, seen.heading_s) if math.isfinite(seen.turn_rate_rads) else NEVER_S,
+            counters = (self._faults, self._navigation.faults, self._drivers.faults)
+            faults = {kind: count for counter in counters for kind, count in counter.items() if count}
+            for counter in counters:
+                counter.clear()
+            why_not = health.fault or self._drivers.why_not()
+            return replace(
+                self._reading(now_s),
                 mode=self._drivers.state or ("override" if self._drivers.overridden else "no helm"),
                 ready=not why_not,
                 why_not=why_not,
-                heartbeat_age_s=max(0.0, health.echo_age_s) * self.client.warp if health.connected else NEVER_S,
+                heartbeat_age_s=NEVER_S if health.fault else max(0.0, health.echo_age_s) * self.client.warp,
                 texts=texts,
                 faults=faults,
             )
@@ -154,9 +147,8 @@ class MoosLink:
 
         An all-stop of the helm is a stop at once.
         """
-        reading = self.read_quietly()
         with self._lock:
-            nominal = self.gate.nominal(reading)
+            nominal = self.gate.nominal(self._reading(self._clock.now_s()))
             allstop = self._drivers.allstop
             if allstop.lower() not in ("", "clear") and not nominal.fault:
                 nominal = Nominal(0.0, nominal.heading_rad, f"the helm stopped all: {allstop}")
@@ -166,41 +158,28 @@ class MoosLink:
                 self._told_fault = nominal.fault
             return nominal
 
-    def read_quietly(self) -> BoatReading:
-        """As `read`, without taking texts and faults away from the loop."""
-        with self._lock:
-            seen, now_s = self._navigation, self._clock.now_s()
-            return BoatReading(self.boat, now_s, heading_rad=seen.heading_rad, speed_mps=seen.speed_mps)
-
     def send(self, heading_rad: float, speed_mps: float) -> Sent:
         """Post a command as it is; never waits.
 
         Raises:
             LinkError: heading or speed is not finite; nothing is posted.
         """
-        if not (math.isfinite(heading_rad) and math.isfinite(speed_mps)):
-            raise LinkError(
-                f"boat {self.boat} was to be sent heading {heading_rad} rad and speed {speed_mps} m/s; "
-                "give finite numbers"
-            )
+        check_finite(self.boat, heading_rad, speed_mps)
         now_s = self._clock.now_s()
-        reading = self.read_quietly()
         with self._lock:
-            values = self.gate.encode(heading_rad, speed_mps, reading)
+            values = self.gate.encode(heading_rad, speed_mps, self._reading(now_s))
         delivered = self.client.post(values)
         with self._lock:
             self._last_rad = heading_rad
             if delivered:
                 self._drivers.posted(now_s)
-                self._navigation.told(speed_mps, now_s)
         return Sent(self.boat, now_s, heading_rad, speed_mps, " and ".join(self.gate.outputs), delivered)
 
     def stop(self) -> Sent:
         """Speed 0 on the present heading, or the last one sent; never waits, never raises."""
         with self._lock:
             heading = self._navigation.heading_rad
-        if not math.isfinite(heading):
-            heading = self._last_rad if math.isfinite(self._last_rad) else 0.0
+        heading = heading if math.isfinite(heading) else self._last_rad
         try:
             return self.send(heading, 0.0)
         except WireError as error:  # a platform whose numbers leave the finite: the PID stops for want of commands
@@ -214,11 +193,10 @@ class MoosLink:
         """
         if self._closed:
             return f"{self.boat}: its connection is closed"
-        self._closed = True
         try:
-            return f"{self.boat}: {self._leave()}"
+            return f"{self.boat}: {self._leave() if self._prepared else 'not prepared; nothing was sent'}"
         finally:
-            self.client.close()
+            self.release()
 
     def release(self) -> None:
         """End the connection without a word to the boat: for one that was only listened to."""
@@ -239,17 +217,26 @@ class MoosLink:
         with self._lock:
             return self._drivers.other, self._drivers.other_s
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        LOG.info("%s", self.close())
+    def _reading(self, now_s: float) -> BoatReading:
+        """Where the boat is; the lock is held."""
+        seen = self._navigation
+        backwards = math.pi if seen.speed_mps < 0.0 else 0.0
+        heading_age_s = max(0.0, now_s - seen.heading_s)
+        return BoatReading(
+            boat=self.boat,
+            read_s=now_s,
+            position_m=seen.position_m,
+            position_age_s=max(0.0, now_s - seen.position_s),
+            heading_rad=seen.heading_rad,
+            heading_age_s=heading_age_s,
+            speed_mps=seen.speed_mps,
+            course_rad=(seen.heading_rad + backwards) % TWO_PI if abs(seen.speed_mps) >= 0.1 else math.nan,
+            velocity_age_s=max(0.0, now_s - seen.speed_s),
+            turn_rate_rads=seen.turn_rate_rads,
+            turn_rate_age_s=heading_age_s if math.isfinite(seen.turn_rate_rads) else NEVER_S,
+        )
 
     def _leave(self) -> str:
-        if not self._prepared:
-            return "not prepared; nothing was sent"
         end_s = time.monotonic() + REST_S
         while True:
             reading = self.read()
@@ -279,12 +266,13 @@ class MoosLink:
             sources = self.writers.setdefault(key, set())
             if len(sources) < MOST_TEXTS:
                 sources.add(message.source)
+            is_place = key in nav.VARIABLES or key in nav.PLACE
             text = ""
-            if not math.isfinite(true_s) and key in (*nav.VARIABLES, *nav.PLACE, REPORT):
+            if not math.isfinite(true_s) and (is_place or key == REPORT):
                 return  # MOOS time is not known yet
-            if key in nav.VARIABLES or key in nav.PLACE:
+            if is_place:
                 text = self._navigation.hear(message, true_s, received_s)
-            elif key == REPORT and self._contacts is not None:
+            elif key == REPORT:
                 text = self._contacts.hear(message.text, self.boat, -self.client.ahead_s, received_s)
                 self._faults["bad_report"] += bool(text)
             elif key in self.gate.inputs:
@@ -308,13 +296,6 @@ class MoosLink:
             self._drivers.forget()
             self.gate.forget()
 
-    def _take_faults(self) -> dict[str, int]:
-        counters = (self._faults, self._navigation.faults, self._drivers.faults)
-        found = {kind: count for counter in counters for kind, count in counter.items() if count}
-        for counter in counters:
-            counter.clear()
-        return found
-
     def _unheard(self) -> list[str]:
         """What of the boat was never heard."""
         with self._lock:
@@ -322,16 +303,3 @@ class MoosLink:
             heard = {"NAV_X and NAV_Y of one moment": seen.position_s, "NAV_HEADING": seen.heading_s}
             heard["NAV_SPEED"] = seen.speed_s
         return [name for name, time_s in heard.items() if not math.isfinite(time_s)]
-
-    def _missing(self, timeout_s: float) -> str:
-        health = self.client.health()
-        if not health.connected:
-            return health.fault
-        with self._lock:
-            said = "; ".join(self._texts)
-        what = f"nobody posts {', '.join(self._unheard())} in MOOSDB {self.client.address} ({health.community})"
-        return f"{what} within {timeout_s:g} s; start its simulator or sensors" + (f"; {said}" if said else "")
-
-
-def _age(now_s: float, true_s: float) -> float:
-    return max(0.0, now_s - true_s)

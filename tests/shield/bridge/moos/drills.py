@@ -79,8 +79,7 @@ class Gate:
 
 def command(port, speed, heading_deg, speed_mps, ends=None):
     """A commander: RAW_DESIRED_* at 10 Hz until it is killed, or told to end."""
-    client = MoosClient("pCommander", "127.0.0.1", port, MonotonicClock(speed), {}, lambda message, time_s: None)
-    client._variables = {"DB_TIME": 0.0}
+    client = MoosClient("pCommander", "127.0.0.1", port, MonotonicClock(speed), (), lambda message, time_s: None)
     client.start()
     ends = ends or threading.Event()
     while not ends.wait(0.1 / speed):

@@ -38,7 +38,7 @@ def client_of(port, name="gate", variables=("A", "B"), warp=1.0, **more):
         "127.0.0.1",
         port,
         MonotonicClock(warp),
-        dict.fromkeys(variables, 0.0),
+        variables,
         lambda m, s: heard.append((m, s)),
         **more,
     )

@@ -125,6 +125,8 @@ def test_checks_tell_what_is_there_and_what_nobody_can_know(world):
     assert results["moosdb:blue_1"].passed, results["moosdb:blue_1"].text
     assert results["grid:blue_1"].passed, results["grid:blue_1"].text
     assert not results["mission:blue_1"].passed
+    assert results["stop:blue_1"].passed
+    assert "its PID, if set as the docs say, takes thrust off 2 s after" in results["stop:blue_1"].text
     assert "pBehave" in results["commanders:blue_1"].text
 
 
@@ -177,6 +179,12 @@ def test_commands_of_moos_need_links_of_moos():
         ("moos://127.0.0.1", "HOST:PORT"),
         ("{kind: moos, address: 'udpin:127.0.0.1:1'}", "moos://HOST:PORT"),
         ("{kind: moos, address: 'moos://127.0.0.1:9000', gate: rudder}", "gate"),
+        ("{kind: moos, address: 'moos://127.0.0.1:9000', gate: pid}", "no PID stops it when the gate dies"),
+        (
+            "{kind: moos, address: 'moos://127.0.0.1:9000', gate: pid, thrust_timeout_s: 1.0, nothing_stops_it: true}",
+            "thrust_timeout_s",
+        ),
+        ("{kind: moos, address: 'moos://127.0.0.1:9000', nothing_stops_it: true}", "are for gate: pid"),
     ],
 )
 def test_a_link_that_is_none_is_refused_with_its_form(link, word):

@@ -7,8 +7,11 @@ import time
 
 import pytest
 from drills import Gate
-from moos_boats import fleet_of, link_of, sim_of, until
+from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
 from steerclear.experiments.boats import SimFleet
+from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.moos.checks import moos_checks
+from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
@@ -81,3 +84,24 @@ def test_actuators_keep_what_they_were_told_and_take_no_number_that_is_none():
 def test_a_boat_without_rudder_and_thrust_is_refused():
     with pytest.raises(ConfigError, match="has no rudder and thrust"):
         SimFleet.from_file(fleet_of(1, 0, platform="blueboat", gate="pid"))
+
+
+@pytest.mark.parametrize(
+    ("answer", "simulator", "passed", "word"),
+    [
+        ("nothing_stops_it: true", True, True, "NOTHING stops it"),
+        ("thrust_timeout_s: 1.5", False, True, "take thrust off after 1.5 s"),
+        ("thrust_timeout_s: 1.5", True, False, "uSimMarine of its mission keeps its last thrust"),
+    ],
+)
+def test_preflight_says_what_stops_a_boat_whose_gate_died(tmp_path, answer, simulator, passed, word):
+    mission = tmp_path / "blue_one.moos"
+    mission.write_text("ProcessConfig = uSimMarine\n{\n}\n" if simulator else "")
+    text = fleet_text(1, 0, gate="pid").replace("nothing_stops_it: true", f"{answer}, mission: {mission}")
+    fleet = parse_fleet(text)
+    with sim_of(fleet) as boats, link_of(fleet) as (link, _):
+        assert boats
+        checks = [check for check in moos_checks({"blue_1": link}, fleet, 0.2) if check.name == "stop:blue_1"]
+        (found,) = run_checks(checks)
+    assert found.passed == passed
+    assert word in found.text

@@ -9,7 +9,7 @@ from steerclear.shield.bridge.contact_fusion import ContactFusion
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.moos.contacts import MoosContacts, parse_report
-from steerclear.shield.bridge.moos.nav import STILL_S, Navigation
+from steerclear.shield.bridge.moos.nav import Navigation
 from steerclear.shield.bridge.moos.wire import Message
 
 FRAME = FieldFrame(42.0, -71.0)
@@ -70,36 +70,6 @@ def test_a_string_and_a_stamp_of_tomorrow_are_told_in_words():
     assert "restart the MOOSDB" in navigation.hear(nav("NAV_X", -1.0, "S"), 5.0, 5.0)
     assert "MOOSTimeWarp" in navigation.hear(nav("NAV_X", 1.0), 50.0, 5.0)
     assert navigation.faults == {"type_clash": 1, "clock": 1}
-
-
-def test_a_source_that_says_the_same_while_the_boat_is_told_to_move_grows_old():
-    navigation = Navigation(FRAME)
-    for k in range(10):
-        fed(navigation, 0.1 * k)
-    assert navigation.position_s == pytest.approx(0.9)  # at rest it may be the same for ever
-    navigation.told(1.0, 1.0)
-    for k in range(10, 40):
-        fed(navigation, 0.1 * k)
-    assert navigation.position_s == pytest.approx(1.0 + STILL_S, abs=0.15)
-    navigation.told(0.0, 4.0)
-    fed(navigation, 4.1)
-    assert navigation.position_s < 3.0  # told to stop for that very reason it is no better
-    fed(navigation, 4.2, x=0.3)
-    fed(navigation, 4.3, x=0.4)
-    assert navigation.position_s == pytest.approx(4.3)
-
-
-@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
-def test_a_position_that_stays_while_the_boat_is_under_way_grows_old_within_a_second(speed):
-    navigation = Navigation(FRAME)
-    for k in range(10):
-        fed(navigation, 0.1 * k, x=0.1 * k * speed, speed=speed)
-    for k in range(10, 31):  # fresh stamps, the same place
-        fed(navigation, 0.1 * k, x=0.9 * speed, speed=speed)
-    assert navigation.position_s <= 0.9 + 0.25 / speed + 0.11
-    assert navigation.faults["frozen"] > 10
-    fed(navigation, 3.2, x=2.9, speed=speed)
-    assert navigation.position_s == pytest.approx(3.2)
 
 
 def contacts(corner_m=(0.0, 0.0)):

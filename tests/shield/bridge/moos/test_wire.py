@@ -29,7 +29,7 @@ SEEDS = [
     [hello("wirecli", 1.0)],
     [timing(2.0), register("NAV_X", "a", 2.0, 1.0), register("NODE_REPORT", "a", 2.0)],
     [notify("NAV_X", 1.25, "sim", 3.0), notify("NODE_REPORT", "NAME=red_1,X=1", "rep", 3.0)],
-    [Message(wire.WILDCARD, "a", wire.STRING, "a", 1.0, text="AppPattern=*,VarPattern=NAV_*,Interval=0")],
+    [Message("*", "a", wire.STRING, "a", 1.0, text="AppPattern=*,VarPattern=NAV_*,Interval=0")],
 ]
 
 
