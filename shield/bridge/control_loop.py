@@ -19,6 +19,7 @@ from .clock import Clock
 from .command_pipeline import CommandPipeline, Steered
 from .failsafe import Failsafe, Seen, Verdict, at_rest, nearing
 from .fleet_file import FleetFile
+from .game_state import GameSource, GameState
 from .messages import (
     Action,
     Alarm,
@@ -26,8 +27,6 @@ from .messages import (
     BoatReading,
     Contact,
     ContactSource,
-    GameSource,
-    GameState,
     Link,
     Snapshot,
     Tick,

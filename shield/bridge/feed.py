@@ -22,11 +22,12 @@ from types import TracebackType
 from ..compat import Self
 from ..exceptions import BridgeError, ConfigError, FeedError
 from .clock import Clock
-from .feed_packets import MAX_BYTES, SEAL_BYTES, Fix, Packet, Seal, game_state, is_sealed, parse_packet
+from .feed_packets import MAX_BYTES, SEAL_BYTES, Fix, Packet, Seal, is_sealed, parse_packet
 from .feed_sender import FeedSender, PositionPublisher, family_of, socket_address
 from .frame import FieldFrame
+from .game_state import BoatStatus, FlagStatus, GameState, game_state
 from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
-from .messages import TELEMETRY, Alarm, BoatStatus, Contact, FlagStatus, GameState
+from .messages import TELEMETRY, Alarm, Contact
 
 __all__ = [
     "BoatStatus",

@@ -11,11 +11,13 @@ from __future__ import annotations
 import hmac
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, NoReturn
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ..exceptions import ConfigError, FeedError
-from .messages import BoatStatus, FlagStatus, GameState
+from .game_state import MOST_BOATS, GameState, check_name, fault_of, game_state, short
 
 KEY_BYTES = 32
 PURPOSE = b"steerclear feed 1"
@@ -24,21 +26,6 @@ SEAL_BYTES = len(_MARK) + _DIGITS
 
 MAX_BYTES = 32768
 """Largest datagram taken."""
-MAX_BOATS, MAX_NAME, LARGEST = 64, 64, 1e9
-
-RANGES: Mapping[str, tuple[float, float]] = {
-    "latitude_deg": (-89.0, 89.0),
-    "longitude_deg": (-180.0, 180.0),
-    "heading_deg": (-360.0, 360.0),
-    "speed_mps": (-50.0, 50.0),
-    "age_s": (0.0, 3600.0),
-    "error_m": (0.0, 1000.0),
-    "time_s": (0.0, LARGEST),
-    "cooldown_s": (0.0, LARGEST),
-    "x_m": (-LARGEST, LARGEST),
-    "y_m": (-LARGEST, LARGEST),
-}
-"""What numbers may be, by key."""
 
 _FAR_OUT = frozenset({655.35, 6553.5, 65535.0})
 """16 bits of ones, in the units boats and receivers use: not available."""
@@ -67,12 +54,15 @@ class Fix:
     """
 
     boat: str
-    latitude_deg: float
-    longitude_deg: float
-    heading_deg: float
-    speed_mps: float
-    age_s: float
-    error_m: float
+    latitude_deg: Annotated[float, Field(strict=True, ge=-89.0, le=89.0)]
+    longitude_deg: Annotated[float, Field(strict=True, ge=-180.0, le=180.0)]
+    heading_deg: Annotated[float, Field(strict=True, ge=-360.0, le=360.0)]
+    speed_mps: Annotated[float, Field(strict=True, ge=-50.0, le=50.0)]
+    age_s: Annotated[float, Field(strict=True, ge=0.0, le=3600.0)]
+    error_m: Annotated[float, Field(strict=True, ge=0.0, le=1000.0)]
+
+
+_READER = TypeAdapter(Fix)
 
 
 @dataclass(frozen=True)
@@ -165,18 +155,19 @@ def parse_packet(data: bytes) -> Packet:
     try:
         content = json.loads(data, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise FeedError(f"packet is not JSON ({_short(error)})") from None
+        raise FeedError(f"packet is not JSON ({short(error)})") from None
     if not isinstance(content, dict) or content.get("steerclear") != 1 or isinstance(content["steerclear"], bool):
         raise FeedError('packet is not of this feed; begin it with {"steerclear": 1, ...')
-    sender, run, seq = _name(content, "sender"), _count("run", content.get("run", 0)), _count("seq", content.get("seq"))
-    stamp = _count("stamp", content["stamp"]) if "stamp" in content else None
+    sender, run, seq = check_name(content.get("sender"), "sender"), _count(content, "run", 0), _count(content, "seq")
+    stamp = _count(content, "stamp") if "stamp" in content else None
     if content.get("kind") == "game":
-        return Packet(sender, run, seq, game=game_state(content), stamp=stamp)
+        game = game_state(content)
+        return Packet(sender, run, seq, game=replace(game, note=game.note[:200]), stamp=stamp)
     if content.get("kind") != "positions":
-        raise FeedError(f"packet of kind {_short(content.get('kind'))}; kinds are positions and game")
+        raise FeedError(f"packet of kind {short(content.get('kind'))}; kinds are positions and game")
     contacts = content.get("contacts")
-    if not isinstance(contacts, list) or len(contacts) > MAX_BOATS:
-        raise FeedError(f"contacts is {_short(contacts)}; give a list, {MAX_BOATS} boats at most")
+    if not isinstance(contacts, list) or len(contacts) > MOST_BOATS:
+        raise FeedError(f"contacts is {short(contacts)}; give a list, {MOST_BOATS} boats at most")
     fixes: dict[str, Fix] = {}
     refused = []
     for entry in contacts:
@@ -192,89 +183,24 @@ def parse_packet(data: bytes) -> Packet:
     return Packet(sender, run, seq, fixes=tuple(fixes.values()), refused=tuple(refused), stamp=stamp)
 
 
-def game_state(content: Mapping[str, Any]) -> GameState:
-    """The state of a game from plain values under the packet's keys, the inverse of `GameState.as_dict`.
-
-    Raises:
-        FeedError: a value is missing or makes no sense.
-    """
-    boats, flags, note = content.get("boats"), content.get("flags"), content.get("note", "")
-    if not isinstance(boats, Mapping) or len(boats) > MAX_BOATS:
-        raise FeedError(f"boats is {_short(boats)}; give a dict by name, {MAX_BOATS} boats at most")
-    if not isinstance(flags, (list, tuple)) or len(flags) != 2:
-        raise FeedError(f"flags is {_short(flags)}; give blue's and red's")
-    if not isinstance(note, str):
-        raise FeedError(f"note is {_short(note)}; give a text")
-    blue, red = (FlagStatus(_number(f, "x_m"), _number(f, "y_m"), _truth(f, "taken")) for f in flags)
-    counts = {key: _pair(key, content.get(key)) for key in ("captures", "grabs", "tags")}
-    states = {_name({"boat": name}, "boat"): _boat_status(entry) for name, entry in boats.items()}
-    return GameState(
-        _number(content, "time_s"), states, (blue, red), **counts, over=_truth(content, "over"), note=note[:200]
-    )
-
-
-def _boat_status(entry: Any) -> BoatStatus:
-    truths = {key: _truth(entry, key) for key in ("tagged", "has_flag", "oob", "on_side", "driven")}
-    return BoatStatus(cooldown_s=_number(entry, "cooldown_s"), **truths)
-
-
 def _fix(entry: Any) -> Fix:
-    boat = _name(entry, "boat")
-    keys = ("latitude_deg", "longitude_deg", "heading_deg", "speed_mps", "age_s", "error_m")
+    boat = check_name(entry.get("boat") if isinstance(entry, dict) else entry, "boat")
+    for key, values in NOT_AVAILABLE.items():
+        if type(entry.get(key)) in (int, float) and entry[key] in values:
+            text = f'{key} is {entry[key]}, which means "not available"; leave the boat out until it is known'
+            raise FeedError(f"boat {boat}: {text}")
     try:
-        return Fix(boat, *(_number(entry, key) for key in keys))
-    except FeedError as error:
-        raise FeedError(f"boat {boat}: {error}") from None
+        return _READER.validate_python(entry)
+    except ValidationError as error:
+        raise FeedError(f"boat {boat}: {fault_of(error)}") from None
 
 
-def _get(entry: Any, key: str) -> Any:
-    if not isinstance(entry, Mapping):
-        raise FeedError(f"{_short(entry)} stands where {key} belongs; give an object")
-    return entry.get(key)
-
-
-def _number(entry: Any, key: str) -> float:
-    value, (low, high) = _get(entry, key), RANGES[key]
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        raise FeedError(f"{key} is {_short(value)}; give a number from {low:g} to {high:g}")
-    if value in NOT_AVAILABLE.get(key, ()):
-        raise FeedError(f'{key} is {_short(value)}, which means "not available"; leave the boat out until it is known')
-    if not low <= value <= high:
-        raise FeedError(f"{key} is {_short(value)}; give a number from {low:g} to {high:g}")
-    return float(value)
-
-
-def _count(key: str, value: Any) -> int:
+def _count(content: Mapping[str, Any], key: str, otherwise: Any = None) -> int:
+    value = content.get(key, otherwise)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-        raise FeedError(f"{key} is {_short(value)}; give a whole number >= 0")
-    return value
-
-
-def _pair(key: str, value: Any) -> tuple[int, int]:
-    if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise FeedError(f"{key} is {_short(value)}; give blue's and red's count")
-    return _count(key, value[0]), _count(key, value[1])
-
-
-def _truth(entry: Any, key: str) -> bool:
-    value = _get(entry, key)
-    if not isinstance(value, bool):
-        raise FeedError(f"{key} is {_short(value)}; give true or false")
-    return value
-
-
-def _name(entry: Any, key: str) -> str:
-    value = _get(entry, key)
-    if not isinstance(value, str) or not 0 < len(value) <= MAX_NAME or not value.isprintable():
-        raise FeedError(f"{key} is {_short(value)}; give a name of 1 to {MAX_NAME} characters")
+        raise FeedError(f"{key} is {short(value)}; give a whole number >= 0")
     return value
 
 
 def _refuse_constant(name: str) -> NoReturn:
     raise FeedError(f"{name} is no number of JSON")
-
-
-def _short(value: Any) -> str:
-    text = value if isinstance(value, str) else repr(value) if not isinstance(value, BaseException) else str(value)
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= 60 else text[:59] + "…"

@@ -13,8 +13,9 @@ from ..compat import Self
 from ..exceptions import ConfigError, FeedError
 from .feed_packets import Fix, Packet, Seal
 from .frame import FieldFrame
+from .game_state import GameState
 from .mavlink.signing import SigningClock
-from .messages import GameState, Tick
+from .messages import Tick
 
 LOG = logging.getLogger(__name__)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..surroundings import OPEN_WATER, Surroundings
 from .fleet_file import FleetFile
-from .messages import GameState
+from .game_state import GameState
 
 
 class StaticObstacles:

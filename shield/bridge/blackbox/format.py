@@ -25,8 +25,8 @@ from ...jit import Array
 from ...platforms import PLATFORMS, Gains, Platform
 from ...platforms import layout as L
 from ...surroundings import Surroundings
-from ..messages import Action, BoatReading, Contact, Sent, Tick
-from .records import BoatRecord, Record, SurroundingsRecord, TickRecord
+from ..messages import BoatReading, Contact, Sent, Tick
+from .records import BoatRecord, ReadingRecord, SurroundingsRecord, TickRecord
 
 _PLAIN_NAN = struct.pack(">d", math.nan)
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -287,30 +287,25 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
         due_s=record.due_s,
         began_s=record.began_s,
         sent_s=record.sent_s,
-        readings={row.boat: _of(BoatReading, row) for row in record.readings},
-        contacts=tuple(_of(Contact, row) for row in record.contacts),
+        readings={row.boat: _reading_of(row) for row in record.readings},
+        contacts=tuple(record.contacts),
         fleet=fleet,
         wanted=wanted,
         surroundings=around,
         decisions=decisions,
         shield_reset=record.shield_reset,
-        sent={row.boat: _of(Sent, row) for row in record.sent},
+        sent={row.boat: row for row in record.sent},
         policy_age_s=record.policy_age_s,
-        actions=tuple(_of(Action, row) for row in record.actions),
+        actions=tuple(record.actions),
         game=json.loads(record.game) if record.game else {},
     )
 
 
-def _of(kind: type[Any], row: Record) -> Any:
-    """The message that a record of the same fields is of."""
-    values = msgspec.structs.asdict(row)
-    if "position_m" in values:
-        x_m, y_m = values["position_m"]
-        values["position_m"] = (x_m, y_m)
-    if "faults" in values:
-        values["faults"] = {entry.kind: entry.count for entry in values["faults"]}
-        values["texts"] = tuple(values["texts"])
-    return kind(**values)
+def _reading_of(record: ReadingRecord) -> BoatReading:
+    values = msgspec.structs.asdict(record)
+    x_m, y_m = record.position_m
+    faults = {entry.kind: entry.count for entry in record.faults}
+    return BoatReading(**{**values, "position_m": (x_m, y_m), "faults": faults, "texts": tuple(record.texts)})
 
 
 def _platform(text: str, known: Mapping[str, Platform]) -> str | Platform:

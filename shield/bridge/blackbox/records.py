@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import math
+import dataclasses
 from typing import Any, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import UNSET, UnsetType
+
+from ..messages import Action, Contact, Sent
 
 Number = float | UnsetType
 Numbers = list[float]
@@ -102,39 +104,6 @@ class ReadingRecord(Record):
     failsafe_over: bool = False
 
 
-class ContactRecord(Record):
-    """A boat seen from outside."""
-
-    boat: str
-    position_m: Numbers
-    heading_rad: float
-    speed_mps: float
-    fixed_s: float
-    error_m: float
-    source: str
-
-
-class SentRecord(Record):
-    """What left for a boat."""
-
-    boat: str
-    sent_s: float
-    heading_rad: float
-    speed_mps: float
-    route: str
-    delivered: bool
-    limit_mps: float = math.inf
-
-
-class ActionRecord(Record):
-    """Declared and in effect."""
-
-    subject: str
-    condition: str
-    response: str
-    text: str
-
-
 class OddRecord(Record):
     """A number that is not finite: its place, and nan, inf, -inf or nan:BITS."""
 
@@ -160,9 +129,9 @@ class TickRecord(Record):
     boats: list[BoatRecord]
     surroundings: list[SurroundingsRecord]
     readings: list[ReadingRecord]
-    contacts: list[ContactRecord]
-    sent: list[SentRecord]
-    actions: list[ActionRecord]
+    contacts: list[Contact]
+    sent: list[Sent]
+    actions: list[Action]
     game: str
     odd: list[OddRecord] = []
 
@@ -205,21 +174,21 @@ class HeaderRecord(Record):
     chain: str
 
 
-def schema_of(kind: type[Record], title: str = "") -> Schema:
-    """JSON Schema of a record, in the forms that log viewers understand: plain values, lists, objects."""
+def schema_of(kind: type[Any], title: str = "") -> Schema:
+    """JSON Schema of a record, or of a message kept as it is, in the forms that log viewers understand."""
     plain = {float: "number", int: "integer", str: "string", bool: "boolean"}
 
     def of(hint: Any) -> Schema:
-        if get_origin(hint) is list:
+        if get_origin(hint) in (list, tuple):
             return {"type": "array", "items": of(get_args(hint)[0])}
-        if isinstance(hint, type) and issubclass(hint, Record):
+        if isinstance(hint, type) and (issubclass(hint, Record) or dataclasses.is_dataclass(hint)):
             return schema_of(hint)
         if hint in plain:
             return {"type": plain[hint]}
         return of(next(entry for entry in get_args(hint) if entry is not UnsetType))
 
     properties = {name: of(hint) for name, hint in get_type_hints(kind).items()}
-    description = " ".join((kind.__doc__ or "").split())
+    description = " ".join((kind.__doc__ or "").partition("Attributes:")[0].split())
     head = {"$schema": DIALECT, "title": title} if title else {}
     return {**head, "type": "object", "description": description, "properties": properties}
 
