@@ -16,6 +16,7 @@ from .fleet_settings import BoatSettings, FleetSettings, MoosLinkSettings
 
 LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 MOOS = "moos://"
+LEAST_MOOS_HZ = 5.0
 
 _HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
 _ADDRESS = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
@@ -186,6 +187,11 @@ def _check_links(fleet: FleetSettings) -> None:
         if boat.link is None:
             continue
         if isinstance(boat.link, MoosLinkSettings):
+            if fleet.rate_hz < LEAST_MOOS_HZ:
+                raise FleetFileError(
+                    f"rate_hz is {fleet.rate_hz:g} and boat {boat.name!r} runs MOOS, whose PIDs want commands at "
+                    f"{LEAST_MOOS_HZ:g} Hz: give {LEAST_MOOS_HZ:g} or more"
+                )
             _check_stop(boat.name, boat.link)
             address_of(boat.link.address.removeprefix(MOOS), f"boat {boat.name!r}: link address {MOOS}...")
             other = seen.setdefault((boat.link.address, 0), boat.name)

@@ -19,12 +19,13 @@ import time
 sys.path.insert(0, os.path.dirname(__file__))
 
 from moos_boats import fleet_text, sim_of, until
+from real_db import RealDb
+from steerclear.experiments.boats import moos as boats_of_moos
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
-from steerclear.shield.bridge.moos.stand_in_db import StandInDb
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import layout as L
 
@@ -321,7 +322,7 @@ def drill_moosdb_killed(speed=1.0):
         told = scene.response(began, lambda tick: bool(tick.readings["blue_1"].why_not))
         time.sleep(1.0)
         back = scene.now_s
-        aboard.db = StandInDb("blue_1", port, speed, hear)
+        aboard.db = type(aboard.db)("blue_1", port, speed, hear)
         again = scene.response(back, is_steered)
         return {"told after": told, "restarted, steered again after": again}
 
@@ -376,9 +377,8 @@ def say(text):
     sys.stdout.flush()
 
 
-def main():
+def drill_all(chosen):
     say("| drill | warp | response, s of boat's time |\n|---|---|---|")
-    chosen = sys.argv[1:]
     for name, drill in DRILLS.items():
         for warp in (1.0, 4.0, 5.0) if drill in (drill_commander_killed, drill_override, drill_nav_frozen) else (1.0,):
             if chosen and not any(word in name for word in chosen):
@@ -388,8 +388,17 @@ def main():
                 f"{what} {value:.2f}" if value is not None else f"{what}: never" for what, value in found.items()
             )
             say(f"| {name} | {warp:g} | {words} |")
+
+
+def main():
+    say("On the stand-in:")
+    drill_all(sys.argv[1:])
     if shutil.which("MOOSDB") is None:
         say("MOOSDB is not on the path: only the stand-in was drilled")
+        return
+    say("Beside MOOSDB:")
+    boats_of_moos.StandInDb = RealDb
+    drill_all(sys.argv[1:])
 
 
 if __name__ == "__main__":

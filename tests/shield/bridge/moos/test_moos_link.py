@@ -4,7 +4,7 @@ import math
 import time
 
 import pytest
-from moos_boats import fleet_of, link_of, sim_of, until
+from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.checks import moos_checks
@@ -192,6 +192,11 @@ def test_a_link_that_is_none_is_refused_with_its_form(link, word):
     text += "geofence: {xmin_m: 0, ymin_m: 0, xmax_m: 80, ymax_m: 40}\n"
     with pytest.raises(FleetFileError, match=word):
         parse_fleet(f"{text}boats:\n  - {{name: b, team: blue, platform: heron, link: {link}}}\n")
+
+
+def test_a_loop_too_slow_for_a_pid_of_moos_is_refused():
+    with pytest.raises(FleetFileError, match="rate_hz is 4 and boat 'blue_1' runs MOOS"):
+        parse_fleet(f"{fleet_text(1, 1)}\nrate_hz: 4.0\n")
 
 
 def test_what_is_said_while_a_boat_is_connected_is_kept_for_the_operator():
