@@ -10,11 +10,11 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from .attack.keys import ATTACK as _ATTACK
 from .deploy.deploy_keys import DEPLOY as _DEPLOY
 from .deploy.referee_keys import REFEREE as _REFEREE
 from .deploy.replay_keys import REPLAY as _REPLAY
-from .encounters.keys import ENCOUNTERS as _ENCOUNTERS
+from .encounters.attack import KEYS as _ATTACK
+from .encounters.figures import KEYS as _ENCOUNTERS
 from .metrics import GAME_COLUMNS, GOAL_KEYS, breach_column, columns_of, game_metrics_of, meanings_of
 from .tournament.keys import TOURNAMENT as _TOURNAMENT
 

@@ -8,10 +8,9 @@ from typing import Annotated
 import typer
 from steerclear.shield.exceptions import ConfigError
 
-from ..attack.campaign import experiment_of, passed, searches_table, write_all
-from ..attack.search import MOST_PLAYED, Search
-from ..encounters.guards import parse_guards
-from ..encounters.scenes import Conditions
+from ..baselines.registry import parse_guards
+from ..encounters.attack import MOST_PLAYED, Search, experiment_of, passed, searches_table, write_all
+from ..encounters.scene import Conditions
 from ..play.spec import check_count
 from ..result_files import write_json
 from ..runner import execute

@@ -10,11 +10,11 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import is_path
 
-from ..encounters.campaign import Pair, Settings
-from ..encounters.families import FAMILIES
-from ..encounters.guards import parse_guards
-from ..encounters.results import cells_table, heads_legend, results_of, write_all
-from ..encounters.scenes import Conditions
+from ..baselines.registry import parse_guards
+from ..encounters.report import cells_table, heads_legend, write_all
+from ..encounters.results import Pair, Settings, results_of
+from ..encounters.scenarios import FAMILIES
+from ..encounters.scene import Conditions
 from ..result_files import write_json
 from ..runner import Run, execute
 from ..tables import goals_table

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from steerclear.shield.exceptions import ConfigError
 
-from ..encounters.guards import NONE
-from ..encounters.measure import measure_chunk
-from ..encounters.play import play
-from ..encounters.replays import record_of
-from ..encounters.results import is_shield
-from ..encounters.scene_file import read_scene
+from ..baselines.registry import NONE, is_shield
+from ..encounters.outcomes import measure_chunk
+from ..encounters.replay import record_of
+from ..encounters.scene import read_scene
+from ..encounters.simulate import play
 from ..replay_html import write_replay
 from ..result_files import check_new
 from ..tables import number_text, titled
@@ -40,8 +39,8 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
             rows.append([path.name, guard, number_text(float(columns["closest_m"].min())), f"{hits}", f"{avoidable}"])
             passed = passed and not (avoidable and is_shield(guard))
             if folder is not None:
-                film, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
-                records.append(record_of(film, worst, f"{path.stem}, {guard}", guard != NONE))
+                played, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
+                records.append(record_of(played, worst, f"{path.stem}, {guard}", guard != NONE))
     out().print(titled("Scenes", ["file", "guard", "closest, m", "breaches", "avoidable"], rows))
     if replay is not None:
         _make(replay.parent)

@@ -7,23 +7,27 @@ From Python::
                       conditions=Conditions(radius_m=2.5))
     outcome.summary["breached"], outcome.columns["closest_m"].min()
 
-``draw`` gives the scenes alone, ``play`` plays them with any guard and returns every state. A guard decides in water
-and in the dark as the batched shield does: ``decide(state, wanted, ours) -> sent``, ``reason``, ``certificate_m``.
+``draw`` gives the scenes alone, ``play`` plays them with any guard (a safety filter) and returns every state. A guard
+decides in water and in the dark as the batched shield does: ``decide(state, wanted, ours) -> sent``, ``reason``,
+``certificate_m``.
 """
 
-from .families import FAMILIES, draw, get_family
-from .guards import build_guard, parse_guards
-from .measure import Outcome, measure
-from .play import Film, play
-from .scenes import DT_S, Conditions, Scenes
+from typing import Any
+from warnings import warn
+
+from ..baselines.registry import build_guard, parse_guards
+from .results import Outcome, measure
+from .scenarios import FAMILIES, draw, get_family
+from .scene import DT_S, Conditions, Scenes
+from .simulate import Trajectory, play
 
 __all__ = [
     "DT_S",
     "FAMILIES",
     "Conditions",
-    "Film",
     "Outcome",
     "Scenes",
+    "Trajectory",
     "build_guard",
     "draw",
     "get_family",
@@ -31,3 +35,10 @@ __all__ = [
     "parse_guards",
     "play",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name != "Film":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn("Film is called Trajectory", DeprecationWarning, stacklevel=2)
+    return Trajectory

@@ -1,4 +1,4 @@
-"""The report of a run of encounters: table, bars, distributions of the closest distance, worst encounters."""
+"""What a run of encounters shows: the files of its folder, the report, the table of the terminal."""
 
 from __future__ import annotations
 
@@ -7,51 +7,24 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
+from rich.console import Group
+from rich.text import Text
 
 from .. import plots
+from ..baselines.registry import NONE, is_shield
 from ..report import Plot, Report, Section, Table, Tile, made_of, plain
-from ..tables import number_text
-from .families import FAMILIES
-from .guards import NONE
+from ..runner import RESULTS_FILE, Run
+from ..tables import number_text, titled
+from .figures import FIGURES, WORST
+from .replay import replay_worst
+from .results import Settings
+from .scenarios import FAMILIES
 
-Cells = Sequence[Mapping[str, Any]]
+Cell = Mapping[str, Any]
+Cells = Sequence[Cell]
 MOST_M = 15.0
 """Distances beyond this are cut off: nobody is in danger there, m."""
-COLUMNS = (
-    ("guard", "guard"),
-    ("encounters", "n"),
-    ("breached", "breached"),
-    ("avoidable", "avoidable"),
-    ("avoidable_upper", "≤ at 95 %, %"),
-    ("unavoidable", "unavoidable"),
-    ("breaches_outside", "breached, started outside"),
-    ("closest_m", "closest, m"),
-    ("changed_percent", "changed, %"),
-    ("inactive_percent", "left alone when safe, %"),
-    ("heading_change_deg", "changed by, deg"),
-    ("speed_change_mps", "changed by, m/s"),
-    ("goal_time_ratio", "time to goal, ×"),
-    ("reached_percent", "goal reached, %"),
-    ("never_arrived_percent", "never arrived, %"),
-    ("deadlocked", "deadlocked"),
-    ("reversals_per_min", "reversals/min"),
-    ("decision_us", "decision, µs"),
-)
-PERCENT = ("avoidable_upper",)
-WORST_COLUMNS = (
-    ("guard", "guard"),
-    ("own", "own"),
-    ("other", "other"),
-    ("family", "family"),
-    ("number", "number"),
-    ("variant", "variant"),
-    ("closest_m", "closest, m"),
-    ("breaches", "breaches"),
-    ("avoidable", "avoidable"),
-    ("last_preventable_s", "until, s before"),
-    ("responsible", "last chance let pass by"),
-    ("start_certificate_m", "certificate at the start, m"),
-)
+SHOWN = {"guard": "guard", **{one.key: one.label for one in FIGURES if one.label}}
 NOTE = (
     "An encounter is breached when an own boat comes within the radius of any boat; avoidable when its own commands "
     "could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an avoidable breach "
@@ -61,6 +34,16 @@ NOTE = (
     "that never arrives counting with the whole length. Closest distances beyond 15 m are cut off; the dashed line "
     "marks the radius."
 )
+
+
+def write_all(run: Run, settings: Settings, results: dict[str, Any]) -> None:
+    """Write replay, report and results.json into the folder; names are noted under ``files``."""
+    results["files"] |= {"report": "report.html", "results": RESULTS_FILE}
+    if results["worst"] and not run.interrupted:
+        replay_worst(results["worst"], settings.conditions, settings.seed, run.folder / "replay.html")
+        results["files"]["replay"] = "replay.html"
+    write_encounter_report(results, run.folder / "report.html")
+    run.write(results)
 
 
 def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
@@ -73,56 +56,70 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     Raises:
         ConfigError: the file cannot be written.
     """
-    cells = results["cells"]
-    pairs = list(dict.fromkeys((cell["own"], cell["other"]) for cell in cells))
+    cells, settings = results["cells"], results["settings"]
     replay = results["files"].get("replay")
-    links = [{"path": replay, "label": "the worst encounters, with the guard and without"}] if replay else []
+    worst = [[_worst_text(row[name]) for name in WORST] for row in results["worst"]]
+    heads = [label for label, _ in WORST.values()]
+    pairs = dict.fromkeys((cell["own"], cell["other"]) for cell in cells)
     return Report(
         title="Encounters",
-        subtitle=subtitle(results),
-        tiles=_tiles(cells),
-        links=links,
+        subtitle=subtitle(settings),
+        tiles=[_tile(guard, cells) for guard in dict.fromkeys(cell["guard"] for cell in cells)],
+        links=[{"path": replay, "label": "the worst encounters, with the guard and without"}] if replay else [],
         goals=results["goals"],
         sections=[
-            *(_platform_section(pair, cells, results["settings"]) for pair in pairs),
-            Section("The worst encounters", [_worst_table(results["worst"])], NOTE, wide=True),
+            *(_platform_section(pair, cells, settings) for pair in pairs),
+            Section("The worst encounters", [Table("", heads, worst, numbers=False)], NOTE, wide=True),
             made_of(results),
         ],
     ).write(path)
 
 
-def subtitle(results: Mapping[str, Any]) -> str:
+def subtitle(settings: Mapping[str, Any]) -> str:
     """Conditions in one line."""
-    settings, conditions = results["settings"], results["settings"]["conditions"]
-    named = (("radius", "radius_m", "m"), ("delay", "delay_s", "s"), ("position error", "noise_m", "m"))
-    parts = [
-        f"{words} {conditions[name]:g} {unit}" for words, name, unit in (*named, ("current", "current_mps", "m/s"))
-    ]
+    conditions = settings["conditions"]
+    units = {"radius": ("radius_m", "m"), "delay": ("delay_s", "s"), "position error": ("noise_m", "m")}
+    units["current"] = ("current_mps", "m/s")
+    parts = [f"{words} {conditions[name]:g} {unit}" for words, (name, unit) in units.items()]
     return " · ".join([f"{settings['n']} encounters per cell", *parts, f"seed {settings['seed']}"])
 
 
-def _tiles(cells: Cells) -> list[Tile]:
-    tiles = []
-    for guard in dict.fromkeys(cell["guard"] for cell in cells):
-        own = [cell for cell in cells if cell["guard"] == guard]
-        n, breached, avoidable = (sum(c[name] for c in own) for name in ("encounters", "breached", "avoidable"))
-        judged = "no breach judged" if all(c["not_judged"] == c["breached"] for c in own) and breached else ""
-        words = judged or f"avoidable: {avoidable}"
-        tiles.append(Tile(f"{guard}: encounters breached", None, f"{breached} of {n:,}", words))
-    return tiles
+def _tile(guard: str, cells: Cells) -> Tile:
+    own = [cell for cell in cells if cell["guard"] == guard]
+    n, breached, avoidable = (sum(c[name] for c in own) for name in ("encounters", "breached", "avoidable"))
+    unjudged = breached and all(c["not_judged"] == c["breached"] for c in own)
+    words = "no breach judged" if unjudged else f"avoidable: {avoidable}"
+    return Tile(f"{guard}: encounters breached", None, f"{breached} of {n:,}", words)
 
 
 def _platform_section(pair: tuple[str, str], cells: Cells, settings: Mapping[str, Any]) -> Section:
     chosen = [cell for cell in cells if (cell["own"], cell["other"]) == pair]
     own, other = pair
     families = list(dict.fromkeys(cell["family"] for cell in chosen))
-    rows = [[family, *_figures(cell)] for family in families for cell in chosen if cell["family"] == family]
+    rows = [
+        [family, *(_report_text(cell, name) for name in SHOWN)]
+        for family in families
+        for cell in chosen
+        if cell["family"] == family
+    ]
     return Section(
         f"{own} meets {other}" if own != other else own,
-        [Table("", ["family", *(words for _, words in COLUMNS)], rows)],
+        [Table("", ["family", *SHOWN.values()], rows)],
         plots=[_family_plot(name, chosen, settings) for name in families],
         wide=True,
     )
+
+
+def _report_text(cell: Cell, name: str) -> str:
+    value = 100.0 * cell[name] if name == "avoidable_upper" else cell[name]
+    text = str(value) if isinstance(value, str | int) else number_text(value)
+    if name == "avoidable" and cell["not_judged"]:
+        text += f" (+{cell['not_judged']} not judged)"
+    return f"{text} of {cell['started_outside']}" if name == "breaches_outside" else text
+
+
+def _worst_text(value: Any) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else plain(value)
 
 
 def _family_plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:
@@ -136,13 +133,13 @@ def _family_plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot
         if cell["guard"] != NONE
     ]
     words = "closest distance, m: share that came closer"
-    series = [(name, colour, *_cut(quantiles)) for name, colour, quantiles in curves]
+    series = [(name, colour, *distribution(quantiles)) for name, colour, quantiles in curves]
     figure = plots.curves(series, settings["conditions"]["radius_m"], words)
     legend = [(colour, name) for name, colour, _ in curves]
     return Plot(family, Markup(plots.svg(figure, words)), legend, [("", FAMILIES[family].words)])
 
 
-def _cut(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
+def distribution(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
     """A distribution function from quantiles at equal steps of probability, up to `MOST_M`."""
     steps = max(1, len(quantiles) - 1)
     kept = [(value, k / steps) for k, value in enumerate(quantiles) if value < MOST_M]
@@ -151,22 +148,53 @@ def _cut(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
     return [value for value, _ in kept], [share for _, share in kept]
 
 
-def _figures(cell: Mapping[str, Any]) -> list[str]:
-    shown = []
-    for name, _ in COLUMNS:
-        value = 100.0 * cell[name] if name in PERCENT else cell[name]
-        text = str(value) if isinstance(value, str | int) else number_text(value)
-        if name == "avoidable" and cell["not_judged"]:
-            text += f" (+{cell['not_judged']} not judged)"
-        if name == "breaches_outside":
-            text += f" of {cell['started_outside']}"
-        shown.append(text)
-    return shown
+def _avoidable_text(cell: Cell) -> Text:
+    words = f"{cell['avoidable']}" + (f"+{cell['not_judged']}?" if cell["not_judged"] else "")
+    return Text(words, "red" if cell["avoidable"] and is_shield(cell["guard"]) else "")
 
 
-def _worst_table(worst: Cells) -> Table:
-    rows = [
-        [f"{row[name]:.2f}" if isinstance(row[name], float) else plain(row[name]) for name, _ in WORST_COLUMNS]
-        for row in worst
-    ]
-    return Table("", [words for _, words in WORST_COLUMNS], rows, numbers=False)
+HEADS = {
+    "bare": ("encounters breached without a guard", lambda c: f"{c['unshielded_breached']}"),
+    "hit": ("breached with it", lambda c: f"{c['breached']}"),
+    "avoid": ("of these avoidable in hindsight (+ not judged?)", _avoidable_text),
+    "<=%": (
+        "95 % upper limit of the avoidable ones, % of the encounters",
+        lambda c: number_text(100.0 * c["avoidable_upper"]),
+    ),
+    "unav": ("unavoidable, or begun inside the radius", lambda c: f"{c['unavoidable'] + c['started_inside']}"),
+    "out": (
+        "breached of those that started outside the unavoidable set",
+        lambda c: f"{c['breaches_outside']}/{c['started_outside']}",
+    ),
+    "near": ("closest distance, m", lambda c: number_text(c["closest_m"])),
+    "chg%": ("commands changed, %", lambda c: number_text(c["changed_percent"])),
+    "time": ("to the goal, over that without a guard", lambda c: number_text(c["goal_time_ratio"])),
+    "lost": (
+        "own boats not at their goal by the end that get there without a guard, %",
+        lambda c: number_text(c["never_arrived_percent"]),
+    ),
+    "dead": ("deadlocks", lambda c: f"{c['deadlocked']}"),
+    "rev": ("reversals per boat and minute", lambda c: number_text(c["reversals_per_min"])),
+    "us": ("microseconds per decision", lambda c: f"{c['decision_us']:.0f}"),
+}
+"""Columns of the terminal's table, and what they mean: of a thousand encounters they just fit 80 characters."""
+
+
+def heads_legend() -> str:
+    """What the columns of the terminal's table mean, in a sentence."""
+    return "; ".join(f"{head}: {words}" for head, (words, _) in HEADS.items())
+
+
+def cells_table(results: Mapping[str, Any]) -> list[Group]:
+    """Tables for the terminal, one per pair of platforms and guard."""
+    groups: dict[tuple[str, str, str], list[Cell]] = {}
+    for cell in results["cells"]:
+        groups.setdefault((cell["own"], cell["other"], cell["guard"]), []).append(cell)
+    return [_table(*names, cells) for names, cells in groups.items()]
+
+
+def _table(own: str, other: str, guard: str, cells: Cells) -> Group:
+    rows = [[cell["family"], *(text(cell) for _, text in HEADS.values())] for cell in cells]
+    counts = sorted({cell["encounters"] for cell in cells})
+    title = f"{own} meets {other}, guard {guard}, {'-'.join(f'{n}' for n in (*counts[:1], *counts[1:][-1:]))} each"
+    return titled(title, ["", *HEADS], rows)

@@ -1,4 +1,4 @@
-"""Oracle: was a breach avoidable, until when, and whose command made it?
+"""Post-hoc avoidability analysis: was a separation violation (breach) avoidable, until when, and who let that pass?
 
 It looks back at a recorded run with every other boat's actual track held fixed in time and searches the own boat's
 commands with a full model of boat and autopilot. It shares no code with the shield and never imports it: what it says
@@ -22,13 +22,10 @@ How to call it (all arrays float64, numpy)::
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
 
-from .boat import N_STATE, Boat, boats_of_rows
-from .errors import OracleError
-from .judge import judge
-from .motion import AT_ONCE, Motion
-from .settings import Settings
-from .sides import judge_breach, judge_breaches
-from .verdict import BreachVerdict, Outcome, Plan, Responsible, Verdict
+from .boat_model import N_STATE, Boat, boats_of_rows
+from .judge import judge, judge_breach, judge_breaches
+from .settings import AT_ONCE, Motion, Settings
+from .verdict import BreachVerdict, OracleError, Outcome, Plan, Responsible, Verdict
 
 __all__ = [
     "AT_ONCE",

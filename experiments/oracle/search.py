@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .boat import Array
+from .boat_model import DOWN, HOLD, UP, Array, command_of, step
 from .compiled import compiled
-from .model import DOWN, HOLD, UP, command_of, step
 
 N_SPEEDS = 3
 _TRIED = 3  # states of a layer from which simple courses are run to the end
@@ -266,15 +265,13 @@ def _trace(history: Array, layers: int, node: int, actions: Array) -> None:
 
 
 @compiled
-def commands_of(
-    p: Array, start: Array, actions: Array, lengths: Array, rudders: Array, dt_s: float, commands: Array
-) -> None:
+def commands_of(task: Task, start: Array, actions: Array, lengths: Array, commands: Array) -> None:
     """Turn actions into the commands (K, 2) that make the autopilot do them."""
-    s, k = start.copy(), 0
+    s, k, rudders = start.copy(), 0, task.rudders
     for n in range(lengths.size):
         for _ in range(lengths[n]):
             choice, rudder = actions[n] // rudders.size, rudders[actions[n] % rudders.size]
-            speed, error = command_of(p, s, choice, rudder, dt_s)
+            speed, error = command_of(task.p, s, choice, rudder, task.dt_s)
             commands[k, 0], commands[k, 1] = speed, error
-            step(p, s, speed, error, dt_s)
+            step(task.p, s, speed, error, task.dt_s)
             k += 1

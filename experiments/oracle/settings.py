@@ -1,11 +1,14 @@
-"""How far the oracle looks and how finely it searches."""
+"""How far the analysis looks, how finely it searches, and what else moved the boats of a record."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
 
-from .errors import OracleError
+import numpy as np
+
+from .boat_model import Array
+from .verdict import OracleError
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,13 @@ class Level:
     thrust: float
     rudders: tuple[float, ...]
     schedules: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        numbers = [getattr(self, one.name) for one in fields(self) if one.name not in ("rudders", "schedules")]
+        lengths_s = [length_s for first_s in self.schedules for length_s in first_s]
+        sound = all(value > 0 for value in (*numbers, *lengths_s)) and self.schedules and all(self.schedules)
+        if not (sound and self.rudders and all(-1 <= value <= 1 for value in self.rudders)):
+            raise OracleError(f"a search level needs positive sizes and rudders within [-1, 1]; got {self}")
 
 
 QUICK = Level(150, 0.5, 10.0, 0.25, 15.0, (-1.0, 0.0, 1.0), ((0.5, 0.5, 0.5, 1.0),))
@@ -63,8 +73,6 @@ class Settings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= low):
                 raise OracleError(f"{name} must be a number of seconds, at least {low:g}; got {value}")
-        for level in (self.quick, self.full):
-            _check(level)
 
     def refined(self, times: int = 2) -> Settings:
         """Return settings whose full search is finer: cells smaller and width larger by ``times``."""
@@ -73,14 +81,44 @@ class Settings:
         return replace(self, full=replace(full, width=full.width * times**2, **cells))
 
 
-def _check(level: Level) -> None:
-    numbers = [getattr(level, field.name) for field in fields(level) if field.name not in ("rudders", "schedules")]
-    sound = all(value > 0 for value in (*numbers, *(length_s for first_s in level.schedules for length_s in first_s)))
-    if not (
-        sound
-        and level.schedules
-        and all(level.schedules)
-        and level.rudders
-        and all(-1 <= value <= 1 for value in level.rudders)
-    ):
-        raise OracleError(f"a search level needs positive sizes and rudders within [-1, 1]; got {level}")
+@dataclass(frozen=True)
+class Motion:
+    """Physics of a record beside its boats.
+
+    Attributes:
+        current_mps: (east, north) speed at which the water carried every boat, m/s.
+        delay_steps: of each boat, steps from a command to its effect; empty: all act at once.
+
+    Raises:
+        OracleError: a current that is not finite, or a delay that is not a number of steps.
+    """
+
+    current_mps: tuple[float, float] = (0.0, 0.0)
+    delay_steps: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.current_mps) != 2 or not all(math.isfinite(speed) for speed in self.current_mps):
+            raise OracleError(f"current_mps is {self.current_mps}; give two finite speeds, east and north")
+        if not all(isinstance(steps, int | np.integer) and steps >= 0 for steps in self.delay_steps):
+            raise OracleError(f"delay_steps is {self.delay_steps}; give a whole number of steps, 0 or more, per boat")
+
+    def delay_of(self, boat: int, boats: int) -> int:
+        """Steps from a boat's command to its effect.
+
+        Raises:
+            OracleError: there are delays, but not one per boat.
+        """
+        if not self.delay_steps:
+            return 0
+        if len(self.delay_steps) != boats:
+            raise OracleError(f"delay_steps holds {len(self.delay_steps)} of {boats} boats; give one per boat")
+        return int(self.delay_steps[boat])
+
+    def way_m(self, states: int, dt_s: float) -> Array:
+        """Way (states, 2) that the water has gone from the first state to each, m."""
+        return np.arange(states)[:, None] * dt_s * np.array(self.current_mps)
+
+
+AT_ONCE = Motion()
+"""Still water and commands that act at once."""
+DEFAULT = Settings()

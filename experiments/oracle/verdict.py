@@ -1,4 +1,12 @@
-"""What the oracle says about a breach."""
+"""What the post-hoc analysis says about a separation violation, and who is responsible for it.
+
+Responsible is who had the last clear chance: each boat is judged with the other's actual track held fixed, and the boat
+whose last preventable step is the later one let the last chance pass, by the command of that step. When both had their
+last chance within one step of each other, both are responsible. Where commands take effect late, it is the moments at
+which they had to be given that are compared. When the game itself drove that boat in that step (a tagged boat on its
+way home), the game is. When neither could have avoided it, neither is; a pair that was inside when the record began is
+a matter of the start.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+class OracleError(ValueError):
+    """A record, boat or setting that cannot be judged; the text names the remedy."""
 
 
 class Outcome(str, Enum):
@@ -27,7 +39,7 @@ class Outcome(str, Enum):
 
 
 class Responsible(str, Enum):
-    """Whose command let the last chance pass, see `steerclear.experiments.oracle.sides`."""
+    """Whose command let the last chance pass."""
 
     __str__ = str.__str__
 
@@ -130,3 +142,19 @@ class BreachVerdict:
             Responsible.BOTH: (self.first.own, self.second.own),
         }
         return chosen.get(self.responsible, ())
+
+
+def responsible_of(first: Verdict, second: Verdict, driven: NDArray[np.bool_]) -> Responsible:
+    """Who let the later of both boats' last chances pass; ``driven`` (T, n): boats that the game drove in each step."""
+    if first.outcome is Outcome.STARTED_INSIDE or second.outcome is Outcome.STARTED_INSIDE:
+        return Responsible.START
+    if first.last_step is None and second.last_step is None:
+        return Responsible.NEITHER
+    lasts = [-2 if verdict.last_step is None else verdict.last_step for verdict in (first, second)]
+    late = [verdict for verdict, last in zip((first, second), lasts, strict=True) if last >= max(lasts) - 1]
+    free = [v for v in late if v.last_step is not None and not driven[v.last_step, v.own]]
+    if not free:
+        return Responsible.GAME
+    if len(free) == 2:
+        return Responsible.BOTH
+    return Responsible.FIRST if free[0] is first else Responsible.SECOND

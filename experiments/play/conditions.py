@@ -8,11 +8,18 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from steerclear.env.randomness import next_uniform
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array, copy_row
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracking.tracks import whole_steps
+
+from ..jit import kernel
 
 MOST = {"delay_s": 2.0, "noise_m": 5.0, "current_mps": 2.0}
 """Largest value of each: s, m, m/s."""
+NOISE_MEMORY_S = 2.0
+"""Time over which a position error is forgotten, s."""
 _WORDS = {"delay_s": "{:g} s delay", "noise_m": "{:g} m position noise", "current_mps": "{:g} m/s current"}
 
 
@@ -90,3 +97,34 @@ def draw(rng: np.random.Generator) -> tuple[tuple[float, float], int]:
 
 CALM = Conditions()
 """None of them."""
+
+
+@kernel
+def uniform(seeds: Array, b: int) -> float:
+    """Next number of game b's own stream in (0, 1): never 0, whose logarithm is asked for."""
+    return next_uniform(seeds, b) + 0.5 / 9007199254740992.0
+
+
+@kernel
+def observe(state: Array, error: Array, seeds: Array, bound_m: float, first: bool, dt_s: float, seen: Array) -> None:
+    """States as the own team knows them: positions off by a slowly changing error within ``bound_m``.
+
+    The error is a Gauss-Markov process, half the bound per axis, drawn back onto the circle where it leaves it.
+    """
+    keep = 0.0 if first else math.exp(-dt_s / NOISE_MEMORY_S)
+    fresh = 0.5 * bound_m * math.sqrt(1.0 - keep * keep)
+    for b in range(state.shape[0]):
+        for i in range(state.shape[1]):
+            copy_row(seen[b, i], state[b, i])
+            if bound_m <= 0.0:
+                continue
+            size = fresh * math.sqrt(-2.0 * math.log(uniform(seeds, b)))
+            angle = 2.0 * math.pi * uniform(seeds, b)
+            error[b, i, 0] = keep * error[b, i, 0] + size * math.cos(angle)
+            error[b, i, 1] = keep * error[b, i, 1] + size * math.sin(angle)
+            length = math.hypot(error[b, i, 0], error[b, i, 1])
+            if length > bound_m:
+                error[b, i, 0] *= bound_m / length
+                error[b, i, 1] *= bound_m / length
+            seen[b, i, L.X] += error[b, i, 0]
+            seen[b, i, L.Y] += error[b, i, 1]

@@ -17,9 +17,8 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers.mctf import MctfReader
 
-from ..encounters.motion import observe
 from ..oracle import Motion
-from .conditions import Conditions, draw
+from .conditions import Conditions, draw, observe
 
 _TAG = crc32(b"conditions")
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from steerclear.experiments.encounters import Conditions, draw, measure, play
-from steerclear.experiments.encounters.arrival import never_arrived
+from steerclear.experiments.encounters.outcomes import never_arrived
 
 USUAL = Conditions()
 NEVER = np.nan

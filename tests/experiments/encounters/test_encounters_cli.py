@@ -10,12 +10,11 @@ from steerclear.env.record import read_meta, validate
 from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.encounters import Conditions, campaign, draw, play
-from steerclear.experiments.encounters.replays import record_of, records_of
-from steerclear.experiments.encounters.report import MOST_M, _cut
-from steerclear.experiments.encounters.results import cells_table, goals_of
-from steerclear.experiments.encounters.scene_file import write_scene
-from steerclear.experiments.encounters.worst import worst_encounters
+from steerclear.experiments.encounters import Conditions, draw, play, results
+from steerclear.experiments.encounters.replay import record_of, records_of
+from steerclear.experiments.encounters.report import MOST_M, cells_table, distribution
+from steerclear.experiments.encounters.results import Cell, goals_of, worst_encounters
+from steerclear.experiments.encounters.scene import write_scene
 from typer.testing import CliRunner
 
 USUAL = Conditions()
@@ -54,7 +53,7 @@ def test_a_small_run_from_end_to_end_and_again():
 
 
 def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
-    whole, played = campaign.play_job, []
+    whole, played = results.play_job, []
 
     def stop_at_the_second(job):
         if played:
@@ -62,18 +61,18 @@ def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
         played.append(job)
         return whole(job)
 
-    monkeypatch.setattr(campaign, "play_job", stop_at_the_second)
+    monkeypatch.setattr(results, "play_job", stop_at_the_second)
     done = run(*SMALL, "--guard", "none", "--no-judge", "--out", "out")
     assert done.exit_code == ExitCode.INTERRUPTED
     assert "1 of 2 chunks of encounters kept" in done.output
     content = json.loads(Path("out/results.json").read_text())
     assert not content["complete"]
-    monkeypatch.setattr(campaign, "play_job", whole)
+    monkeypatch.setattr(results, "play_job", whole)
     assert run(*SMALL, "--guard", "none", "--no-judge", "--out", "out", "--resume").exit_code == ExitCode.OK
 
 
 def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):
-    monkeypatch.setattr(campaign, "measure_chunk", _breaching(campaign.measure_chunk))
+    monkeypatch.setattr(results, "measure_chunk", _breaching(results.measure_chunk))
     done = run(*SMALL, "--guard", "none,shield", "--no-judge", "--out", "out")
     assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     cells = json.loads(Path("out/results.json").read_text())["cells"]
@@ -159,7 +158,7 @@ def cell_columns(closest, avoidable):
 
 
 def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
-    shield, none = (campaign.Cell(guard, "heron", "heron", "head_on") for guard in ("shield", "none"))
+    shield, none = (Cell(guard, "heron", "heron", "head_on") for guard in ("shield", "none"))
     columns = {shield: cell_columns([2.0, 1.0, 3.0], [1.0, 0.0, 0.0]), none: cell_columns([0.0], [1.0])}
     assert [entry["closest_m"] for entry in worst_encounters(columns)] == [2.0, 1.0, 3.0]
     assert [entry["closest_m"] for entry in worst_encounters({none: columns[none]})] == [0.0]
@@ -171,7 +170,7 @@ def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
 )
 def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
     counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
-    cell = asdict(campaign.Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
+    cell = asdict(Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
     assert [goal["met"] for goal in goals_of([cell])] == expected
     assert goals_of([cell | {"guard": "parabolic"}]) == []
 
@@ -179,7 +178,7 @@ def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
 @pytest.mark.parametrize(("hits", "met"), [(0, True), (1, False)])
 def test_one_rammer_must_not_breach_what_started_outside(hits, met):
     counts = {"avoidable": 0, "unavoidable": 0, "not_judged": 1, "encounters": 100, "breaches_outside": hits}
-    cell = asdict(campaign.Cell("shield", "heron", "heron", "rammer_1")) | counts
+    cell = asdict(Cell("shield", "heron", "heron", "rammer_1")) | counts
     assert goals_of([cell])[1]["met"] is met
     assert len(goals_of([cell | {"other": "surveyor"}])) == 1
 
@@ -189,7 +188,7 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
     names = ("breached", "avoidable", "not_judged", "unavoidable", "started_inside", "breaches_outside", "deadlocked")
     means = dict.fromkeys(("closest_m", "goal_time_ratio"), 2.6) | {"avoidable_upper": 0.003}
     means |= dict.fromkeys(("changed_percent", "reversals_per_min"), 10.6)
-    cell = asdict(campaign.Cell("shield", "heron", "heron", "crossing_right")) | dict.fromkeys(names, 0)
+    cell = asdict(Cell("shield", "heron", "heron", "crossing_right")) | dict.fromkeys(names, 0)
     console = Console(width=80)
     with console.capture() as shown:
         console.print(*cells_table({"cells": [cell | counts | means | {"encounters": 1000}]}))
@@ -200,8 +199,8 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
 
 
 def test_a_distribution_ends_at_the_edge_and_never_falls():
-    values, shares = _cut([2.0, 3.0, 40.0])
+    values, shares = distribution([2.0, 3.0, 40.0])
     assert all(a <= b for a, b in pairwise(values))
     assert all(a <= b for a, b in pairwise(shares))
     assert (values[0], shares[0], values[-1], shares[-1]) == (2.0, 0.0, MOST_M, 0.5)
-    assert _cut([40.0, 50.0]) == ([MOST_M, MOST_M], [0.0, 0.0])
+    assert distribution([40.0, 50.0]) == ([MOST_M, MOST_M], [0.0, 0.0])

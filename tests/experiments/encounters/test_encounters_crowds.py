@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.encounters.families import draw
-from steerclear.experiments.encounters.play import play
-from steerclear.experiments.encounters.scenes import Conditions, join
+from steerclear.experiments.encounters import Conditions, draw, play
+from steerclear.experiments.encounters.scene import join
 from steerclear.shield import Reason
 from steerclear.shield.platforms import layout as L
 
@@ -33,7 +32,7 @@ def test_a_boat_is_not_let_off_by_what_a_team_mate_far_away_cannot_keep(number):
     """Three encounters with a hit by an opponent of a boat that had 2 m to spare a few seconds before."""
     film = film_of(number)
     assert gaps_of(film).min() >= 2.5
-    reason, told_m = film.reason[:, 0, :OWN], film.certificate_m[:, 0, :OWN]
+    reason, told_m = film.reason[:, 0, :OWN], film.safety_margin_m[:, 0, :OWN]
     both = (reason == Reason.BEST_EFFORT).any(axis=1, keepdims=True) & (reason == Reason.BACKUP)
     assert both.any()  # some keep everything by their backup where others cannot
     assert (told_m[both] >= 0.0).all()

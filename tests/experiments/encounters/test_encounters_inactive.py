@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from steerclear.experiments.baselines.registry import NoGuard
 from steerclear.experiments.encounters import Conditions, draw, measure, play
-from steerclear.experiments.encounters.guards import NoGuard
-from steerclear.experiments.encounters.inactive import inactive_columns, safe_boats
-from steerclear.experiments.encounters.summary import summarise
-from steerclear.experiments.encounters.tally import tally
+from steerclear.experiments.encounters.figures import summarise
+from steerclear.experiments.encounters.outcomes import inactive_columns, safe_boats, tally
 from steerclear.shield.platforms import layout as L
 
 USUAL = Conditions()

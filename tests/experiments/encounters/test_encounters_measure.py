@@ -5,14 +5,21 @@ import numpy as np
 import pytest
 from scipy import stats
 from steerclear.env.record import find_breaches
-from steerclear.experiments.encounters import Conditions, draw, measure, play, verdicts
-from steerclear.experiments.encounters.measure import chunks, measure_chunk, worst_games
-from steerclear.experiments.encounters.scene_file import read_scene, write_scene
-from steerclear.experiments.encounters.start import start_certificate_m
-from steerclear.experiments.encounters.summary import summarise, upper_bound
-from steerclear.experiments.encounters.tally import tally
-from steerclear.experiments.encounters.verdicts import SIDES, VERDICT_COLUMNS, judge_game, judge_worst
+from steerclear.experiments.encounters import Conditions, draw, measure, outcomes, play
+from steerclear.experiments.encounters.figures import summarise
+from steerclear.experiments.encounters.outcomes import (
+    NO_VERDICT,
+    SIDES,
+    judge_game,
+    judge_worst,
+    measure_chunk,
+    start_certificate_m,
+    tally,
+    worst_games,
+)
+from steerclear.experiments.encounters.scene import read_scene, write_scene
 from steerclear.experiments.game_metrics import count_reversals
+from steerclear.experiments.statistics import upper_bound
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
@@ -41,15 +48,15 @@ def test_reversals_are_those_of_the_games(crowd_film):
     counted = tally(crowd_film)["reversals_per_min"] * 45.0 / 60.0 * 3
     for game in range(3):
         heading = crowd_film.state[:-1, game, :3, L.HEADING]
-        command = heading + crowd_film.sent[:, game, :3, 1]
+        command = heading + crowd_film.filtered[:, game, :3, 1]
         assert counted[game] == pytest.approx(count_reversals(command, heading))
 
 
 def test_changes_are_counted_and_averaged_over_changed_steps():
     scenes = dataclasses.replace(draw("head_on", "heron", "heron", USUAL, 0, 0, 1), length_s=2.0)
     film = play(scenes, "none", USUAL)
-    film.sent[:5, 0, 0, 1] += 355.0
-    film.sent[5:10, 0, 0, 0] -= 0.5
+    film.filtered[:5, 0, 0, 1] += 355.0
+    film.filtered[5:10, 0, 0, 0] -= 0.5
     counted = tally(film)
     assert counted["changed_share"][0] == pytest.approx(0.5)
     assert counted["heading_change_deg"][0] == pytest.approx(2.5)
@@ -68,11 +75,14 @@ def test_the_worst_variant_of_each_encounter_counts():
     np.testing.assert_array_equal(columns["variant"], every.argmin(axis=1))
 
 
-def test_encounters_are_split_into_chunks_without_loss():
-    parts = list(chunks("rammer_1", "heron", "heron", USUAL, 0, 10, 230))
-    assert np.concatenate([part.number for part in parts]).tolist() == list(range(10, 240))
+def test_encounters_are_split_into_chunks_without_loss(monkeypatch):
+    monkeypatch.setattr(outcomes, "MOST_PER_CHUNK", 3)
+    columns = measure("head_on", "none", n=8, first=10, judge=False).columns
+    assert columns["number"].tolist() == list(range(10, 18))
+    whole = measure("head_on", "none", n=3, first=13, judge=False).columns
+    np.testing.assert_array_equal(columns["closest_m"][3:6], whole["closest_m"])
     with pytest.raises(ConfigError, match="at least 1"):
-        next(chunks("rammer_1", "heron", "heron", USUAL, 0, 0, 0))
+        measure("head_on", "none", n=0)
 
 
 def test_an_unguarded_head_on_breach_is_judged_avoidable():
@@ -95,7 +105,7 @@ def test_a_current_does_not_change_the_verdict():
     game = int(tally(film)["closest_m"].argmin())
     found = judge_game(film, game)
     assert found["avoidable"] == 1.0
-    assert set(found) == set(VERDICT_COLUMNS)
+    assert set(found) == set(NO_VERDICT)
     assert SIDES[int(found["responsible"])] in ("own", "both", "opponent")
 
 
@@ -112,7 +122,7 @@ def test_a_late_command_has_to_be_given_so_much_earlier():
 
 
 def verdict(**counts):
-    return verdicts.NO_VERDICT | counts
+    return NO_VERDICT | counts
 
 
 def test_another_variant_counts_when_its_breach_was_avoidable(monkeypatch):
@@ -125,11 +135,11 @@ def test_another_variant_counts_when_its_breach_was_avoidable(monkeypatch):
         asked.append(game)
         return verdict(avoidable=float(game == 7), unavoidable=float(game != 7))
 
-    monkeypatch.setattr(verdicts, "judge_game", judged)
+    monkeypatch.setattr(outcomes, "judge_game", judged)
     games, found = judge_worst(film, counted, np.array([0, 12]))
     assert (asked, games.tolist()) == ([0, 5, 7], [7, 12])
     assert [entry["avoidable"] for entry in found] == [1.0, 0.0]
-    monkeypatch.setattr(verdicts, "judge_game", lambda film, game: verdict(unavoidable=1.0))
+    monkeypatch.setattr(outcomes, "judge_game", lambda film, game: verdict(unavoidable=1.0))
     games, found = judge_worst(film, counted, np.array([0, 12]))
     assert games.tolist() == [0, 12]
     assert [entry["unavoidable"] for entry in found] == [1.0, 0.0]
@@ -141,7 +151,7 @@ def test_the_certificate_at_the_start_is_the_one_of_the_first_decision():
     scenes = dataclasses.replace(scenes, length_s=0.1)
     film = play(scenes, "shield", USUAL)
     found = start_certificate_m(film)
-    np.testing.assert_array_equal(found.astype(np.float32), film.certificate_m[0, :, 0])
+    np.testing.assert_array_equal(found.astype(np.float32), film.safety_margin_m[0, :, 0])
     np.testing.assert_array_equal(found, start_certificate_m(play(scenes, "none", USUAL)))
     assert found[0] < 0.0
     assert (found[1:] > 0.0).all()

@@ -3,11 +3,11 @@ import math
 
 import numpy as np
 import pytest
+from steerclear.experiments.baselines.registry import NoGuard, build_guard, check_guard, parse_guards, split_name
 from steerclear.experiments.encounters import DT_S, Conditions, draw, play
 from steerclear.experiments.encounters import script as S
-from steerclear.experiments.encounters.guards import NoGuard, build_guard, check_guard, parse_guards, split_name
-from steerclear.experiments.encounters.motion import observe
-from steerclear.experiments.encounters.steering import meeting_s, next_phase
+from steerclear.experiments.encounters.simulate import meeting_s, next_phase
+from steerclear.experiments.play.conditions import observe
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.platforms import layout as L
@@ -40,15 +40,15 @@ def test_the_same_film_whatever_else_is_in_the_batch():
     scenes = short(draw("rammer_2", "heron", "heron", conditions, 5, 0, 6))
     whole, alone = play(scenes, "none", conditions), play(scenes.take([4]), "none", conditions)
     np.testing.assert_array_equal(whole.state[:, 4], alone.state[:, 0])
-    np.testing.assert_array_equal(whole.wanted[:, 4], alone.wanted[:, 0])
+    np.testing.assert_array_equal(whole.nominal[:, 4], alone.nominal[:, 0])
 
 
 def test_a_shielded_film_repeats_bit_for_bit():
     scenes = short(draw("rammer_1", "heron", "heron", USUAL, 5, 0, 3), 8.0)
     films = [play(scenes, "shield", USUAL) for _ in range(2)]
     np.testing.assert_array_equal(films[0].state, films[1].state)
-    assert (films[0].sent != films[0].wanted).any()
-    np.testing.assert_array_equal(films[0].sent[:, :, 1], films[0].wanted[:, :, 1])
+    assert (films[0].filtered != films[0].nominal).any()
+    np.testing.assert_array_equal(films[0].filtered[:, :, 1], films[0].nominal[:, :, 1])
 
 
 def test_goals_are_reached_and_rammers_hit():

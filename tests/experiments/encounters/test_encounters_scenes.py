@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.experiments.encounters import FAMILIES, Conditions, draw
 from steerclear.experiments.encounters import script as S
-from steerclear.experiments.encounters.cast import Cast
+from steerclear.experiments.encounters.builder import SceneBuilder
 from steerclear.shield.exceptions import ConfigError, PlatformError
 from steerclear.shield.platforms import layout as L
 
@@ -132,7 +132,7 @@ def test_unknown_names_and_empty_ranges_are_refused():
 
 
 def test_a_turned_cast_keeps_all_distances_and_bearings():
-    cast = Cast("heron", "heron", USUAL, 0, "any", 0)
+    cast = SceneBuilder("heron", "heron", USUAL, 0, "any", 0)
     cast.add_own(1.0, 2.0, 30.0, 1.0, (5.0, 9.0))
     row = S.script(S.phase(S.AIM_HEADING, 1.0, angle_deg=170.0))
     cast.add_other(4.0, 6.0, 170.0, 1.0, row)

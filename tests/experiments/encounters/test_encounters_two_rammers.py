@@ -1,9 +1,8 @@
 """Encounters of a heron and two rammers, one on each quarter, that who takes them to hold their course loses."""
 
 import numpy as np
-from steerclear.experiments.encounters.families import draw
-from steerclear.experiments.encounters.play import play
-from steerclear.experiments.encounters.scenes import Conditions, join
+from steerclear.experiments.encounters import Conditions, draw, play
+from steerclear.experiments.encounters.scene import join
 from steerclear.shield.platforms import layout as L
 
 NUMBERS = (173, 189, 253, 397, 403, 437, 480, 498, 503, 627)

@@ -7,8 +7,8 @@ import pytest
 from oracle_runs import DT_S, driven_track, first_breach, random_run, straight_track
 from steerclear.env.record import find_breaches
 from steerclear.experiments.oracle import Outcome, Responsible, Settings, judge, judge_breach, judge_breaches
-from steerclear.experiments.oracle.judge import _runs
-from steerclear.experiments.oracle.sides import _responsible
+from steerclear.experiments.oracle.judge import runs
+from steerclear.experiments.oracle.verdict import responsible_of
 from steerclear.shield.platforms import fresh_state, get_platform
 
 RADIUS_M = 2.5
@@ -125,7 +125,7 @@ def test_stretches_end_where_the_pair_meets_or_any_boat_enters():
     inside = np.zeros((12, 2), dtype=bool)
     inside[3:5, 0] = True
     inside[8:10, 1] = True
-    assert _runs(inside, 0, 100) == [(100, 102), (105, 107), (108, 111)]
+    assert runs(inside, 0, 100) == [(100, 102), (105, 107), (108, 111)]
 
 
 def test_a_chance_after_an_earlier_contact_counts_alone():
@@ -159,7 +159,7 @@ class TestSides:
         step = first_breach(states, RADIUS_M)
         one = judge(states, rows, 0, step, RADIUS_M)
         one, other = replace(one, last_step=first), replace(one, own=1, other=0, last_step=second)
-        assert _responsible(one, other, np.zeros((200, 2), dtype=bool)) is expected
+        assert responsible_of(one, other, np.zeros((200, 2), dtype=bool)) is expected
 
     def test_the_one_with_the_last_chance(self):
         # the other cannot turn or brake: a point on a rail, so its last chance is none

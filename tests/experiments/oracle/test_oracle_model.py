@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.env.trace import load_trace
 from steerclear.experiments.oracle import Boat, OracleError, boats_of_rows
-from steerclear.experiments.oracle.model import DOWN, HOLD, UP, command_of, step
+from steerclear.experiments.oracle.boat_model import DOWN, HOLD, UP, command_of, step
 from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 

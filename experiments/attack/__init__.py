@@ -1,1 +1,0 @@
-"""The search for opponents that cause breaches."""

@@ -1,0 +1,280 @@
+"""PL-CBF: a library of fallback policies rolled out, one row of a quadratic program for the mode taken. Compiled.
+
+Source: Kim, Okamoto, Hoxha, Fainekos, Panagou, "Policy Library CBF: Finite-Horizon Safety at Runtime via Parallel
+Rollouts" (arXiv 2605.16588), and the code its authors published (github.com/tkkim-robot/plcbf). The value of a policy
+m is the least clearance of its rollout, V_m(x) = min over t in [0, T] of h(x_m(t)). Of the policies with V_m > 0 the
+least invasive is taken, where there is none that of the greatest value, and the program is
+
+    minimise |u - u_wanted|^2   subject to   dV_m/dt >= -alpha V_m,   limits of u.
+
+Where it has no answer, or one that does not keep the row, the boat follows the policy itself, as in the authors' code.
+The row is held against the boat's own model: of a boat whose rudder swings from side to side a line says too little.
+
+What the paper leaves to the user, and what stands here:
+
+| left open | here |
+| --- | --- |
+| library | the wanted command held; the mode taken last, anchored as it was; `rollouts.library` from the heading now |
+| inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
+| dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
+| its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
+| least invasive | the row that leaves the largest part of the inputs, as in the authors' code; or the nearest answer |
+| several agents | opponents hold course; team-mates hold what they were told last, or in this step if decided for |
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.step import step_boat
+from steerclear.shield.platforms.usv import wrap_degrees
+
+from ..jit import kernel
+from . import rollouts as R
+from .base import Games
+from .unicycle import TOLERANCE, command_of_inputs, holds, inputs_of_command
+
+PASSED, CHANGED, POLICY = 0, 1, 2
+WANTED, LAST, BEFORE = 0, 1, 2
+"""The first modes, and how many come before the library's.
+
+The mode taken last stays among them, in columns 1 and 2 of a plan: the library turns with the boat, and what was safe
+would otherwise be lost in the next step.
+"""
+CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
+DIFFERENCE = 0.1
+SLACK_M = 1e-3
+"""How far an answer may miss its row by the boat's model, m in a step."""
+SAME = 1e-9
+"""Inputs this near to the wanted ones are the wanted ones."""
+
+
+class Inputs(NamedTuple):
+    """The wanted inputs ``z0`` (2,), the largest turn rate, rad/s, and the least and greatest of both inputs (2, 2)."""
+
+    z0: Array
+    unit: float
+    box: Array
+
+
+@kernel
+def share_left(row: Array, need: float, box: Array) -> float:
+    """Share in [0, 1] of the box (2, 2; least and greatest of each input) in which ``row z >= need``.
+
+    A box without width in an input is measured in the other; one that is a single point counts as all or nothing.
+    """
+    if box[0, 1] <= box[0, 0] or box[1, 1] <= box[1, 0]:
+        return _share_of_line(row, need, box)
+    kept, count = np.empty((8, 2)), 0
+    for c in range(4):
+        here, there = CORNERS[c], CORNERS[(c + 1) % 4]
+        x, y, u, v = box[0, here[0]], box[1, here[1]], box[0, there[0]], box[1, there[1]]
+        a, b = row[0] * x + row[1] * y - need, row[0] * u + row[1] * v - need
+        if a >= 0.0:
+            kept[count, 0], kept[count, 1] = x, y
+            count += 1
+        if (a >= 0.0) != (b >= 0.0):
+            part = a / (a - b)
+            kept[count, 0], kept[count, 1] = x + part * (u - x), y + part * (v - y)
+            count += 1
+    twice = 0.0
+    for k in range(count):
+        after = (k + 1) % count
+        twice += kept[k, 0] * kept[after, 1] - kept[after, 0] * kept[k, 1]
+    return 0.5 * abs(twice) / ((box[0, 1] - box[0, 0]) * (box[1, 1] - box[1, 0]))
+
+
+@kernel
+def _share_of_line(row: Array, need: float, box: Array) -> float:
+    low = row[0] * box[0, 0] + row[1] * box[1, 0] - need
+    high = row[0] * box[0, 1] + row[1] * box[1, 1] - need
+    if (low >= 0.0) == (high >= 0.0):
+        return 1.0 if low >= 0.0 else 0.0
+    return max(low, high) / abs(high - low)
+
+
+@kernel
+def value_of(setup: R.Setup, i: int, start: Array, k: int, speed: float, heading: float, around: R.Around) -> float:
+    """V of a policy, a command held from step k on in the state ``start``: least clearance over the horizon, m."""
+    row = start.copy()
+    least = R.gap_at(setup, around, k, row[L.X], row[L.Y])
+    for t in range(1, setup.steps + 1):
+        R.advance(setup, i, row, speed, heading)
+        least = min(least, R.gap_at(setup, around, k + t, row[L.X], row[L.Y]))
+    return least
+
+
+@kernel
+def _next_states(setup: R.Setup, i: int, state: Array, z0: Array, unit: float, box: Array, later: Array) -> Array:
+    """Write the states (3, N_STATE) after the wanted inputs and with either of them shifted; returns the shifts."""
+    shift = np.empty(2)
+    for k in range(2):
+        shift[k] = DIFFERENCE if z0[k] + DIFFERENCE <= box[k, 1] else -DIFFERENCE
+    params, limits = setup.params[i], setup.limits[i]
+    for k in range(3):
+        z = z0.copy()
+        if k > 0:
+            z[k - 1] += shift[k - 1]
+        speed, turn = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
+        later[k] = state
+        step_boat(params, later[k], speed, turn, setup.dt_s)
+    return shift
+
+
+@kernel
+def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
+    """Write the nearest inputs to ``z0`` within the box that meet ``row z >= need``; whether there are any."""
+    z[:] = z0
+    length = math.hypot(row[0], row[1])
+    if row[0] * z0[0] + row[1] * z0[1] >= need:
+        return True
+    if not length > 1e-12:
+        return False
+    C, d = np.zeros((5, 2)), np.empty(5)
+    for k in range(2):
+        C[2 * k, k], d[2 * k] = 1.0, box[k, 0]
+        C[2 * k + 1, k], d[2 * k + 1] = -1.0, -box[k, 1]
+    C[4, 0], C[4, 1], d[4] = row[0] / length, row[1] / length, need / length
+    return project(C, d, z0, z) == OPTIMAL and holds(C, d, z, TOLERANCE)
+
+
+@kernel
+def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, wanted: Array, plan: Array) -> tuple[float, float]:
+    """Speed and absolute heading of mode m: the wanted command held, the mode taken last, then the library."""
+    if m == WANTED:
+        return wanted[0], wrap_degrees(state[L.HEADING] + wanted[1])
+    if m == LAST:
+        return plan[1], plan[2]
+    return R.command_of(setup, i, m - BEFORE, state)
+
+
+@kernel
+def _row_of(
+    setup: R.Setup,
+    i: int,
+    state: Array,
+    later: Array,
+    shift: Array,
+    z0: Array,
+    command: tuple[float, float],
+    around: R.Around,
+    row: Array,
+) -> tuple[float, float]:
+    """Write a mode's row over the inputs; returns its right-hand side and the mode's value V, m."""
+    values = np.empty(4)
+    for k in range(4):
+        start = state if k == 0 else later[k - 1]
+        values[k] = value_of(setup, i, start, min(k, 1), command[0], command[1], around)
+    for k in range(2):
+        row[k] = (values[k + 2] - values[1]) / (shift[k] * setup.dt_s)
+    have = (values[1] - values[0]) / setup.dt_s + setup.alpha_per_s * values[0]
+    return row[0] * z0[0] + row[1] * z0[1] - have, values[0]
+
+
+@kernel
+def _pleases(setup: R.Setup, row: Array, need: float, box: Array, z0: Array, z: Array) -> float:
+    """How little a mode takes away: the share of the inputs it leaves, or less the change of the wanted ones."""
+    if setup.pick == R.AREA:
+        return share_left(row, need, box)
+    if not answer_of(row, need, box, z0, z):
+        return -math.inf
+    return -math.hypot(z[0] - z0[0], z[1] - z0[1])
+
+
+@kernel
+def _most(setup: R.Setup) -> float:
+    """What a mode that takes nothing away scores, to rounding."""
+    return (1.0 if setup.pick == R.AREA else 0.0) - SAME
+
+
+@kernel
+def _better(value: float, score: float, best_value: float, best_score: float) -> bool:
+    """Whether a mode goes before the best so far: a safe one before others, then by its score, then by its value."""
+    if value > 0.0 and best_value > 0.0:
+        return score > best_score + SAME or (score >= best_score - SAME and value > best_value)
+    return value > best_value
+
+
+@kernel
+def take_mode(
+    setup: R.Setup, i: int, state: Array, wanted: Array, plan: Array, inputs: Inputs, around: R.Around, row: Array
+) -> tuple[int, float, float]:
+    """The mode taken, its row (written), right-hand side and value; safe ones first, by what pleases, then V."""
+    z0, unit, box = inputs
+    later, trial, z = np.empty((3, L.N_STATE)), np.empty(2), np.empty(2)
+    shift = _next_states(setup, i, state, z0, unit, box, later)
+    best, best_need, best_value, best_score = -1, 0.0, -math.inf, -math.inf
+    for m in range(setup.library.shape[0] + BEFORE):
+        command = _command_of_mode(setup, i, m, state, wanted, plan)
+        need, value = _row_of(setup, i, state, later, shift, z0, command, around, trial)
+        score = _pleases(setup, trial, need, box, z0, z) if value > 0.0 else -math.inf
+        if best < 0 or _better(value, score, best_value, best_score):
+            best, best_need, best_value, best_score = m, need, value, score
+            row[:] = trial
+        if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= _most(setup):
+            break  # takes nothing away: no other mode can do better
+    return best, best_need, best_value
+
+
+@kernel
+def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: Array, sent: Array) -> tuple[int, float]:
+    """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
+    params, limits = setup.params[i], setup.limits[i]
+    box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
+    unit = inputs_of_command(params, limits, state, sent, setup.dt_s, z0, box)
+    m, need, value = take_mode(setup, i, state, sent, plan, Inputs(z0, unit, box), around, row)
+    plan[1], plan[2] = _command_of_mode(setup, i, m, state, sent, plan)
+    if answer_of(row, need, box, z0, z):
+        same = abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME
+        if not same:
+            sent[0], sent[1] = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
+        after = state.copy()
+        step_boat(params, after, sent[0], sent[1], setup.dt_s)
+        then = value_of(setup, i, after, 1, plan[1], plan[2], around)
+        if then >= (1.0 - setup.alpha_per_s * setup.dt_s) * value - SLACK_M:
+            return PASSED if same else CHANGED, value
+    sent[0], sent[1] = plan[1], wrap_degrees(plan[2] - state[L.HEADING])
+    return POLICY, value
+
+
+@kernel
+def decide_game(
+    setup: R.Setup, state: Array, ours: BoolArray, plan: Array, sent: Array, reason: IntArray, clear_m: Array
+) -> None:
+    """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
+    n, steps = state.shape[0], setup.steps + 1
+    path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
+    around = R.Around(near, path, grow)
+    R.predict_all(setup, state, ours, plan, path, grow)
+    for i in range(n):
+        if not ours[i]:
+            continue
+        if plan[i, 0] == R.NO_PLAN:
+            plan[i, 1], plan[i, 2] = state[i, L.SPEED], state[i, L.HEADING]
+        if R.mark_near(setup, i, state, steps, near):
+            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], around, plan[i], sent[i])
+        plan[i, 0], plan[i, 3] = 0.0, sent[i, 0]
+        plan[i, 4] = wrap_degrees(state[i, L.HEADING] + sent[i, 1])
+        R.roll_plan(setup, i, state[i], plan[i], path[i])
+
+
+@kernel
+def decide_games(setup: R.Setup, games: Games) -> None:
+    """`decide_game` for every game; arrays carry a leading games axis, and the memory is the boats' plans."""
+    state, _, ours, plan, sent, reason, clear_m = games
+    for b in range(len(state)):
+        decide_game(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])
+
+
+class PolicyLibrary(R.RolloutGuard):
+    """PL-CBF."""
+
+    kind = R.LibrarySettings
+
+    def _decide(self, games: Games) -> None:
+        decide_games(self._setup, games)

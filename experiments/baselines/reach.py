@@ -1,0 +1,430 @@
+"""`ReachGuard`: a safety filter of the reachability value tables alone, in the place where the shield stands.
+
+Margins of pairs of boats are h_ij = V(x_i, x_j) - R, V the distance that can be kept from now on by the value tables:
+against the worst an opponent can do for as long as it is feared, or with the help of a team-mate. Within a step, of
+which the tables say nothing, opponents move in each of three ways, and the least of the three values counts.
+
+One decision for all boats of ours in a game: screen, program, exact check, else the rudder of greatest value. The
+inputs of boat i are z_t = turn / full turn of this step and z_s = sqrt(speed_weight) * speed command / top speed.
+With x+ the state after a candidate, the least change meets, for each pair and each way an opponent may move,
+
+    V(x+) + dV/dpsi (psi - psi+) + dV/dv (v - v+) >= R + target,   target = max(0, e^(-response dt) min(h(x), cap)),
+
+with the same terms of a team-mate decided for together. It counts when h(x+) >= target after it by the full model.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import permutations
+from typing import Any, NamedTuple
+
+import numpy as np
+from steerclear.shield.config import ShieldConfig
+from steerclear.shield.exceptions import ConfigError, TableError
+from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
+from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
+from steerclear.shield.platforms import Platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.actuator import actuate, command_for_turn, thrust_after
+from steerclear.shield.platforms.step import step_boat
+from steerclear.shield.platforms.usv import clamp, turn_of_rudder
+from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
+from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.settings import OtherMay
+
+from ..jit import kernel
+from .base import BatchGuard, Games
+
+WAYS = 3
+"""Ways an opponent may move in a step: straight on, and with full rudder to port and to starboard."""
+
+
+class Setup(NamedTuple):
+    """Constants of n boats: tables, that of each pair (n, n), platform rows, teams, full turns (n,) deg; settings."""
+
+    tables: Tables
+    table: IntArray
+    params: Array
+    team: IntArray
+    full_deg: Array
+    radius_m: float
+    decay: float
+    cap_m: float
+    dt_s: float
+    fear_s: float
+    speed_weight: float
+    look: int
+
+
+@kernel
+def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
+    """Pairs (m, 4) within their table's range: boat i of ours, boat j, and which of j's states of `ahead` count.
+
+    These are, from the first to before the last: the one under its commands, if both are decided for together (which
+    is a pair once), every way of an opponent, and the first of another team-mate.
+    """
+    pairs, m = np.zeros((setup.table.size, 4), np.int64), 0
+    for i, j in np.ndindex(setup.table.shape):
+        mates = setup.team[i] == setup.team[j]
+        if i == j or not ours[i] or (mates and ours[j] and j < i):
+            continue
+        gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+        if gap <= table_range_m(setup.tables, int(setup.table[i, j])):
+            first, last = (WAYS, WAYS + 1) if mates and ours[j] else (0, 1 if mates else WAYS)
+            pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3] = i, j, first, last
+            m += 1
+    return pairs[:m]
+
+
+@kernel
+def ahead(setup: Setup, state: Array, ours: BoolArray, commands: Array, steps: int) -> Array:
+    """States (n, WAYS + 1, N_STATE) of boats after some steps: as opponents, and, of ours, under their commands."""
+    x = np.empty((len(state), WAYS + 1, L.N_STATE))
+    for j, way in np.ndindex(x.shape[:2]):
+        params = setup.params[j]
+        copy_row(x[j, way], state[j])
+        turn = float(setup.full_deg[j]) * (0.0 if way == 0 else 2.0 * way - 3.0)
+        speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
+        for _ in range(steps):
+            if way < WAYS:
+                actuate(params, x[j, way], speed, turn, setup.dt_s)
+            elif ours[j]:
+                step_boat(params, x[j, way], commands[j, 0], commands[j, 1], setup.dt_s)
+    return x
+
+
+@kernel
+def seen(own: Array, other: Array) -> tuple[float, float, float, float, float, float]:
+    """What a table is asked with: offset of the other boat, m, both headings, rad, and speeds, m/s."""
+    x, y = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
+    return x, y, math.radians(own[L.HEADING]), math.radians(other[L.HEADING]), own[L.SPEED], other[L.SPEED]
+
+
+@kernel
+def margins(setup: Setup, pairs: IntArray, x: Array) -> Array:
+    """Margins (m,) of pairs in the states ``x`` of `ahead`, m."""
+    h = np.full(len(pairs), np.inf)
+    for r in range(len(pairs)):
+        i, j, first, last = pairs[r, 0], pairs[r, 1], pairs[r, 2], pairs[r, 3]
+        for other in x[j, first:last]:
+            value = table_value(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
+            margin = value - setup.radius_m
+            if math.isnan(margin) or margin < h[r]:
+                h[r] = margin
+    return h
+
+
+@kernel
+def least(pairs: IntArray, h: Array, boats: int) -> Array:
+    """Least (n,) of what is given of pairs, (m,), for the boats of ours in them."""
+    low = np.full(boats, np.inf)
+    for r in range(len(pairs)):
+        for i in pairs[r, : 2 if pairs[r, 2] == WAYS else 1]:
+            if math.isnan(h[r]) or h[r] < low[i]:
+                low[i] = h[r]
+    return low
+
+
+@kernel
+def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> None:
+    """Mark (B, n) own boats whose pairs all have a value of at least the radius.
+
+    Args:
+        setup: tables and radius.
+        state: (B, n, N_STATE).
+        ours: (n,) own boats.
+        safe: (B, n) written; False for others.
+    """
+    for b in range(len(state)):
+        pairs = near_pairs(setup, state[b], ours)
+        h = margins(setup, pairs, ahead(setup, state[b], ours, np.empty((len(ours), 2)), 0))
+        low = least(pairs, h, len(ours))
+        for i in range(len(ours)):
+            safe[b, i] = ours[i] and low[i] >= 0.0
+
+
+ROUNDS, SWEEPS = 2, 2
+"""Times the program is linearised and solved; times the boats choose backups, each knowing the others' choices."""
+AIM_M, SAME = 0.01, 1e-6
+"""Rows aim this much beyond the target, for the curvature of V; smaller changes of inputs are none."""
+HYSTERESIS_M = 0.3
+"""Value, m, by which a backup to the other side must be better."""
+
+BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0, 1.0) for k in range(-4, 0)])
+"""Rudder to starboard as a share of full, and speed as a share of top speed; the first of the best is taken."""
+
+
+@kernel
+def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z: Array) -> tuple[float, float]:
+    """Write boat i's z (2,) and return the full turn of this step, deg, and d(v)/d(z_s), m/s."""
+    params, top, row, root = setup.params[i], setup.params[i, L.MAX_SPEED], state.copy(), math.sqrt(setup.speed_weight)
+    rudder = min(params[L.MAX_RUDDER], 100.0)
+    full = abs(turn_of_rudder(params, thrust_after(params, state, command[0], setup.dt_s), rudder, setup.dt_s))
+    full, turn = max(full, 1e-6), (later[L.HEADING] - state[L.HEADING] + 180.0) % 360.0 - 180.0
+    z[0], z[1] = clamp(turn / full, -1.0, 1.0), root * clamp(command[0] / top, 0.0, 1.0)
+    step = -0.1 * top if command[0] > 0.5 * top else 0.1 * top
+    step_boat(params, row, command[0] + step, command[1], setup.dt_s)
+    return full, (row[L.SPEED] - later[L.SPEED]) / step * top / root
+
+
+@kernel
+def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array, z: Array) -> tuple[Array, Array]:
+    """Rows C z >= d, of unit length: of pairs V >= ``need_m`` (m,), and the limits of the inputs."""
+    C, d, r = np.zeros((WAYS * len(pairs) + 2 * len(z), len(z))), np.zeros(WAYS * len(pairs) + 2 * len(z)), 0
+    for m in range(len(pairs)):
+        i, j, first, last = pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3]
+        for other in x[j, first:last]:
+            slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
+            row = C[r]
+            for c in range(len(z)):
+                row[c] = 0.0
+            row[2 * i], row[2 * i + 1] = slope.own_heading * math.radians(effect[i, 0]), slope.own_speed * effect[i, 1]
+            if first == WAYS:
+                row[2 * j], row[2 * j + 1] = (
+                    slope.other_heading * math.radians(effect[j, 0]),
+                    slope.other_speed * effect[j, 1],
+                )
+            square, lack, most = 0.0, need_m[m] - slope.value_m, 0.0
+            for c in range(len(z)):
+                square += row[c] * row[c]
+            length = math.sqrt(square)
+            d[r] = lack
+            for c in range(len(z)):
+                d[r] += row[c] * z[c]
+                most += abs(row[c]) * (2.0 if c % 2 == 0 else math.sqrt(setup.speed_weight))
+            if length >= 1e-9 and lack + most >= 0.0:  # else no inputs can break or change it
+                d[r] /= length
+                for c in range(len(z)):
+                    row[c] /= length
+                r += 1
+    for c in range(len(z)):
+        for k in range(len(z)):
+            C[r, k] = C[r + 1, k] = 0.0
+        C[r, c], C[r + 1, c] = 1.0, -1.0
+        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -math.sqrt(setup.speed_weight))
+        r += 2
+    return C[:r, : len(z)], d[:r]
+
+
+@kernel
+def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: Array, h: Array) -> bool:
+    """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
+    state, ours, sent, n = game.state, game.ours, game.sent, len(game.ours)
+    z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
+    need = np.zeros(len(target))
+    for attempt in range(ROUNDS):
+        x = ahead(setup, state, ours, sent, 1)
+        for i in range(n):
+            if not ours[i]:
+                continue
+            found = _effects(setup, int(i), state[i], sent[i], x[i, WAYS], now[2 * i : 2 * i + 2])
+            effect[i, 0], effect[i, 1] = found
+        if attempt == 0:
+            copy_row(z0, now)
+        for m in range(len(target)):
+            need[m] = setup.radius_m + target[m] + AIM_M
+        C, d = _rows(setup, pairs, need, x, effect, now)
+        if project(C, d, z0, z) != OPTIMAL:
+            return False
+        for i in range(n):
+            if not ours[i]:
+                continue
+            copy_row(sent[i], asked[i])
+            if max(abs(z[2 * i] - z0[2 * i]), abs(z[2 * i + 1] - z0[2 * i + 1])) > SAME:
+                speed = clamp(z[2 * i + 1] / math.sqrt(setup.speed_weight), 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
+                turn = z[2 * i] * effect[i, 0]
+                sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
+        copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
+        kept = True
+        for m in range(len(target)):
+            kept = kept and h[m] >= target[m]
+        if kept:
+            return True
+    return False
+
+
+@kernel
+def _follow(setup: Setup, i: int, backup: Array, row: Array) -> tuple[float, float]:
+    """Move boat i's state on by ``look`` steps of a backup; returns its first command."""
+    params, speed, first = setup.params[i], backup[1] * setup.params[i, L.MAX_SPEED], 0.0
+    for step in range(setup.look):
+        heading = command_for_turn(params, row, speed, backup[0] * setup.full_deg[i], setup.dt_s)
+        first = heading if step == 0 else first
+        step_boat(params, row, speed, heading, setup.dt_s)
+    return speed, first
+
+
+@kernel
+def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray) -> None:
+    """Give the movers (n,) the backups of greatest value after ``look`` steps; others go by their commands.
+
+    A boat changes the side it turns to, which is kept of it, only for what is clearly better.
+    """
+    state, sent, side = game.state, game.sent, game.memory[:, 0]
+    x = ahead(setup, state, game.ours, sent, setup.look)
+    for sweep in range(SWEEPS):
+        for i in range(len(movers)):
+            if not movers[i]:
+                continue
+            best, chosen = -math.inf, 0
+            mine, many = np.empty_like(pairs), 0
+            for m in range(len(pairs)):
+                if pairs[m, 0] == i or (pairs[m, 1] == i and pairs[m, 2] == WAYS):
+                    for c in range(4):
+                        mine[many, c] = pairs[m, c]
+                    many += 1
+            mine = mine[:many]
+            for k in range(len(BACKUPS)):
+                copy_row(x[i, WAYS], state[i])
+                _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
+                value = math.inf
+                for margin in margins(setup, mine, x):
+                    value = min(value, margin)
+                value -= HYSTERESIS_M if BACKUPS[k, 0] * side[i] < 0.0 else 0.0
+                if value > best:
+                    best, chosen = value, k
+            copy_row(x[i, WAYS], state[i])
+            speed, heading = _follow(setup, int(i), BACKUPS[chosen], x[i, WAYS])
+            if sweep == SWEEPS - 1:
+                turn = BACKUPS[chosen, 0]
+                sent[i, 0], sent[i, 1] = speed, heading
+                side[i] = 1.0 if turn > 0.0 else (-1.0 if turn < 0.0 else 0.0)
+
+
+@kernel
+def _short(pairs: IntArray, h: Array, target: Array, movers: BoolArray) -> bool:
+    """Add the boats that fall short of a target to the movers; whether there were any."""
+    left, more = h.copy(), False
+    for m in range(len(h)):
+        left[m] -= target[m]
+    low = least(pairs, left, len(movers))
+    for i in range(len(movers)):
+        if not movers[i] and not low[i] >= 0.0:
+            movers[i] = more = True
+    return more
+
+
+@kernel
+def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of rows, in loops that compile quickly
+    """Decide for the boats of ours in one game, (n, ...) each."""
+    state, wanted, ours, memory, sent, reason, certificate_m = game
+    n = len(ours)
+    for i in range(n):
+        reason[i] = PASSED if ours[i] else NOT_COVERED
+        if ours[i] and not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
+            sent[i, 0] = sent[i, 1] = 0.0
+            reason[i] = HELD
+    asked, pairs = sent.copy(), near_pairs(setup, state, ours)
+    target = margins(setup, pairs, ahead(setup, state, ours, sent, 0))
+    for m in range(len(target)):
+        target[m] = max(0.0, setup.decay * min(target[m], setup.cap_m))
+    h = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
+    movers = np.zeros(n, np.bool_)
+    moved = _short(pairs, h, target, movers)
+    if moved and _program(setup, game, pairs, target, asked, h):
+        for i in range(n):
+            movers[i] = False
+            if ours[i] and (sent[i, 0] != asked[i, 0] or sent[i, 1] != asked[i, 1]):
+                reason[i] = QP
+    elif moved:
+        for i in range(n):
+            copy_row(sent[i], asked[i])
+        while moved:  # who falls short by what others do now backs away, too
+            _take_backups(setup, game, pairs, movers)
+            copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
+            moved = _short(pairs, h, target, movers)
+    copy_row(certificate_m, least(pairs, h, n))
+    for i in range(n):
+        if not ours[i]:
+            continue
+        if movers[i]:
+            reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
+        elif reason[i] != QP:
+            for c in range(memory.shape[1]):
+                memory[i, c] = 0.0
+
+
+@kernel
+def decide_games(setup: Setup, games: Games) -> None:
+    """`decide_game` for every game; arrays carry a leading games axis."""
+    state, wanted, ours, memory, sent, reason, certificate_m = games
+    for b in range(len(state)):
+        decide_game(setup, Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], certificate_m[b]))
+
+
+NAME = "reach"
+SETTINGS = ("response_per_s", "margin_cap_m", "speed_weight", "adversary_s", "profile", "buffer_m")
+"""Settings of `ShieldConfig` that may be given with the name; separation, position error and step count too."""
+
+
+def check_settings(settings: dict[str, Any]) -> None:
+    """Check settings given with the name.
+
+    Raises:
+        ConfigError: one that this guard has no use for, or a bad value.
+    """
+    for key in settings:
+        if key not in SETTINGS:
+            raise ConfigError(f"guard {NAME!r} has no setting {key!r}; it knows {', '.join(SETTINGS)}")
+    ShieldConfig.of(**settings)
+
+
+class ReachGuard(BatchGuard):
+    """Commands kept where the value tables promise the separation; what is not said here is as in `BatchGuard`.
+
+    Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 backup, 4 best effort (no rudder and no
+    braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``certificate_m`` is the
+    least value after this step less the radius kept, m, inf where nobody is within the tables' range. Static
+    constraints and the field's edge are not kept clear of.
+
+    Raises:
+        ConfigError: a pair of boats without a table, a fleet that does not fit, a radius the tables cannot tell, or a
+            delay.
+    """
+
+    columns, needs_commands = 1, False
+
+    def __init__(
+        self, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
+    ) -> None:
+        super().__init__(NAME, config, games, platforms, team)
+        tables, index = _tables(self._platforms, team)
+        cap_m = min((table.card.make_grid().cap_m for table in tables), default=math.inf)
+        if self.radius_m >= cap_m:
+            raise ConfigError(
+                f"the radius to keep is {self.radius_m:g} m with buffer and position error, and the value tables tell "
+                f"distances up to {cap_m:g} m; choose a smaller separation_m"
+            )
+        rudders = [(row, row[L.MAX_THRUST], min(row[L.MAX_RUDDER], 100.0)) for row in self.params]
+        self.setup = Setup(
+            tables=stack_tables(tables),
+            table=index,
+            params=self.params,
+            team=np.array(team, dtype=np.int64),
+            full_deg=np.array([abs(turn_of_rudder(*rudder, config.dt_s)) for rudder in rudders]),
+            radius_m=self.radius_m,
+            decay=math.exp(-config.response_per_s * config.dt_s),
+            cap_m=min(config.margin_cap_m, cap_m - self.radius_m),
+            dt_s=config.dt_s,
+            fear_s=min(config.feared_s, WHOLE_S),
+            speed_weight=config.speed_weight,
+            look=max((round(table.card.dt_s / config.dt_s) for table in tables), default=1),
+        )
+
+    def _decide(self, games: Games) -> None:
+        decide_games(self.setup, games)
+
+
+def _tables(platforms: list[Platform], team: tuple[int, ...]) -> tuple[list[ValueTable], IntArray]:
+    """Tables of all pairs, each once, and which is whose."""
+    index, found = np.full((len(team), len(team)), -1), dict[tuple[Platform, Platform, OtherMay], ValueTable]()
+    for i, j in permutations(range(len(team)), 2):
+        key = platforms[i], platforms[j], OtherMay.COOPERATIVE if team[i] == team[j] else OtherMay.WORST_CASE
+        try:
+            found.setdefault(key, load_table(*key))
+        except TableError as error:
+            raise ConfigError(f"guard {NAME!r}: {error}") from error
+        index[i, j] = list(found).index(key)
+    return list(found.values()), index

@@ -1,0 +1,129 @@
+"""Games of encounters as records, which replays, films and pictures are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
+from steerclear.shield.decision import Reason
+from steerclear.shield.platforms import layout as L
+
+from ..baselines.registry import NONE
+from ..replay_html import write_replay
+from .builder import wrapped
+from .scenarios import draw
+from .scene import DT_S, Conditions, Scenes
+from .simulate import Trajectory, play
+
+EDGE_M = 5.0
+"""Water around open-water encounters, m."""
+SHAPE = 1.6
+"""Width over height of its picture."""
+Water = tuple[tuple[float, float], tuple[float, float]]
+"""Lower left corner and size of what a replay shows, m."""
+
+
+def records_with_and_without(scenes: Scenes, guard: str, conditions: Conditions, name: str) -> list[Record]:
+    """The first game of some scenes, played with a guard and without, as records."""
+    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))]
+    return records_of(played, 0, name)
+
+
+def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:
+    """Play the worst encounters again, with their guard and without, into one replay."""
+    records = []
+    for entry in worst:
+        scenes = draw(entry["family"], entry["own"], entry["other"], conditions, seed, entry["number"], 1)
+        name = f"{entry['family']} {entry['number']}, {entry['own']} and {entry['other']}"
+        records += records_with_and_without(scenes.take([entry["variant"]]), entry["guard"], conditions, name)
+    return write_replay(records, path, title="The worst encounters")
+
+
+def records_of(played: Sequence[tuple[Trajectory, str]], game: int, name: str) -> list[Record]:
+    """One game, played with different guards, as records that show the same water.
+
+    Args:
+        played: what was played, and the name of the guard.
+        game: which of the games.
+        name: of the encounter.
+    """
+    water = _water_of(played[0][0], [one.state[:, game, :, :2] for one, _ in played])
+    return [record_of(one, game, f"{name}, {guard}", guard != NONE, water) for one, guard in played]
+
+
+def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: Water | None = None) -> Record:
+    """One game as the record that replays, films and pictures are made of.
+
+    Args:
+        played: what was played.
+        game: which of its games.
+        title: shown as the game's name.
+        guarded: whether its commands passed a guard.
+        water: what the picture shows; around what happens when left out.
+    """
+    scenes, steps, n = played.scenes, played.scenes.steps, len(played.scenes.team)
+    state, margin_m = played.state[:, game], played.safety_margin_m[:, game]
+    corner, bounds = water or _water_of(played, [state[:, :, :2]])
+    position, heading = state[:, :, :2] - np.array(corner), state[:, :, L.HEADING]
+    own = np.broadcast_to(scenes.own & guarded, (steps, n))
+    nominal, filtered = (of[:, game].copy() for of in (played.nominal, played.filtered))
+    changed = (nominal != filtered).any(axis=2)
+    for commands in (nominal, filtered):
+        commands[..., 1] = wrapped(commands[..., 1] + heading[:-1])
+    found = find_breaches(position, played.conditions.radius_m)
+    meta = _meta(played, bounds, title, guarded)
+    return make_record(
+        meta,
+        position=position,
+        heading_deg=wrapped(heading),
+        speed_mps=state[:, :, L.SPEED],
+        **{name: np.zeros((steps + 1, n), bool) for name in ("has_flag", "is_tagged", "oob")},
+        flag_position=np.tile(np.array(meta["flag_home"]), (steps + 1, 1, 1)),
+        captures=np.zeros((steps + 1, 2), np.int64),
+        wanted=nominal,
+        sent=filtered,
+        reason=np.where(own, played.reason[:, game], NOT_COVERED).astype(np.uint8),
+        intervened=own & changed,
+        certificate_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
+        breaches=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
+    )
+
+
+def _water_of(played: Trajectory, positions: Sequence[np.ndarray]) -> Water:
+    """The field; in open water what is around all positions (T+1, n, 2), wider than high."""
+    field = played.scenes.field
+    if field is not None:
+        return (field[0], field[1]), (field[2] - field[0], field[3] - field[1])
+    low = np.min([places.min(axis=(0, 1)) for places in positions], axis=0) - EDGE_M
+    high = np.max([places.max(axis=(0, 1)) for places in positions], axis=0) + EDGE_M
+    size, middle = high - low, 0.5 * (low + high)
+    size = np.maximum(size, [SHAPE * size[1], size[0] / SHAPE])
+    corner = middle - 0.5 * size
+    return (float(corner[0]), float(corner[1])), (float(size[0]), float(size[1]))
+
+
+def _meta(played: Trajectory, bounds: tuple[float, float], title: str, guarded: bool) -> dict[str, Any]:
+    scenes, names = played.scenes, [f"agent_{k}" for k in range(len(played.scenes.team))]
+    return {
+        "dt_s": DT_S,
+        "env_bounds_m": bounds,
+        "team_size": int(scenes.own.sum()),
+        "agent_ids": names,
+        "team": scenes.team.tolist(),
+        "flag_home": [[-1e4, -1e4], [-1e4, -1e4]],  # an encounter has no flags: out of sight
+        "scrimmage": [[bounds[0], 0.0], [bounds[0], bounds[1]]],
+        "catch_radius_m": 0.0,
+        "flag_keepout_m": 0.0,
+        "agent_radius_m": played.conditions.radius_m / 2.0,
+        "separation_m": played.conditions.radius_m,
+        "preset": scenes.family,
+        "policies": {"blue": "goals", "red": "scripts"},
+        "shielded": [name for name, own in zip(names, scenes.own, strict=True) if own and guarded],
+        "seed": None,
+        "reason_names": [reason.name for reason in Reason],
+        "platforms": list(scenes.platforms),
+        "title": title,
+    }

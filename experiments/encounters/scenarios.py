@@ -1,0 +1,453 @@
+"""The families of encounters as a table, their geometry, and drawing encounters of them.
+
+A seed and a number always give the same encounter. A family puts the boats of one encounter into a `SceneBuilder`; in
+families in a field with pursuers, these are at 0.5, 0.7, 0.9 or all of their top speed. One that is slower never needs
+to drive a boat out of a field; one as fast as the boat does in the end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array
+
+from . import script as S
+from .builder import FAR_M, Point, SceneBuilder, ahead, bearing, within
+from .scene import Box, Conditions, Scenes
+
+TURN_MOMENTS = (0.0, 0.3, 0.5, 0.65, 0.78, 0.9)
+"""Moments of a sudden turn that are tried, as shares of the time until the boats would be closest."""
+CLUSTER = 5
+CIRCLE_OFF_DEG = 10.0
+"""How far boats round a circle are off even angles at most, deg."""
+SPEED_SHARES = (0.5, 0.7, 0.9, 1.0)
+MOST_TRIES = MOST_DRAWS = 200
+
+
+def hold(build: SceneBuilder, heading_deg: float, share: float) -> Array:
+    """Script of an opponent that holds course and speed."""
+    return S.script(S.phase(S.AIM_HEADING, share * build.top(build.other), angle_deg=heading_deg))
+
+
+def onwards(build: SceneBuilder, way_m: float) -> tuple[Point, Point]:
+    """Goals of an own boat that starts at the origin towards north: one so far ahead, then on for ever."""
+    return (0.0, way_m), (0.0, FAR_M)
+
+
+def head_on(build: SceneBuilder) -> None:
+    """Two boats on nearly opposite courses."""
+    gap, share = build.range_m(), build.uniform(0.6, 1.0)
+    way = onwards(build, gap + 10.0 * build.scale)
+    build.add_own(0.0, 0.0, build.uniform(-5.0, 5.0), build.uniform(0.6, 1.0), *way)
+    heading = 180.0 + build.uniform(-8.0, 8.0)
+    build.add_other(build.uniform(-1.5, 1.5) * build.radius_m, gap, heading, share, hold(build, heading, share))
+
+
+def crossing(build: SceneBuilder, side: float) -> None:
+    """The other comes from the left (1) or the right (-1) to where the own boat will be, give or take a second."""
+    own_mps, heading = build.top(build.own), side * build.uniform(40.0, 140.0)
+    share, other_mps = build.uniform(0.6, 1.0), build.top(build.other)
+    gap, meet_s = 0.0, 0.0
+    while not build.nearest_m < gap < 1.5 * build.farthest_m:
+        meet_s = build.uniform(4.0, 15.0) * (1.0 if build.scale < 1.5 else 1.4)
+        back = share * other_mps * (meet_s + build.uniform(-1.5, 1.5))
+        x, y = ahead(0.0, own_mps * meet_s, heading + 180.0, back)
+        gap = math.hypot(x, y)
+    build.add_own(0.0, 0.0, 0.0, 1.0, *onwards(build, own_mps * meet_s + 10.0 * build.scale))
+    build.add_other(x, y, heading, share, hold(build, heading, share))
+
+
+def overtaking(build: SceneBuilder) -> None:
+    """The own boat comes up behind a slower one."""
+    gap = build.uniform(build.nearest_m, 0.7 * build.farthest_m)
+    own_mps, other_mps = build.top(build.own), build.top(build.other)
+    share = build.uniform(0.15, 0.55) * min(1.0, own_mps / other_mps)
+    run_m = gap / (1.0 - share * other_mps / own_mps)
+    build.add_own(0.0, 0.0, 0.0, 1.0, *onwards(build, run_m + 10.0 * build.scale))
+    heading = build.uniform(-10.0, 10.0)
+    build.add_other(build.uniform(-1.2, 1.2) * build.radius_m, gap, heading, share, hold(build, heading, share))
+
+
+def corner(build: SceneBuilder) -> None:
+    """The own boat goes into a corner of the field and out again; the other comes to the same place, straight."""
+    _, _, width, height = build.field()
+    inset, other_mps = build.uniform(2.0, 5.0) * build.scale, build.top(build.other)
+    place = (width - inset, height - inset)
+    start = (width - build.uniform(10.0, 30.0) * build.scale, height - build.uniform(5.0, 30.0) * build.scale)
+    build.add_own(*start, bearing(start, place), build.uniform(0.5, 1.0), place, (0.4 * width, 0.4 * height))
+    share, offset = build.uniform(0.6, 1.0), build.radius_m
+    aim = (place[0] + build.uniform(-offset, offset), place[1] + build.uniform(-offset, offset))
+    arrives_s = math.dist(start, place) / build.top(build.own) + build.uniform(-1.0, 4.0)
+    way_m = max(build.nearest_m, arrives_s * share * other_mps)
+    begin, tries = ahead(*aim, build.uniform(180.0, 270.0), way_m), 0
+    while not (build.is_clear(*begin, build.nearest_m) and min(begin) > 1.0) and tries < MOST_TRIES:
+        begin, tries = ahead(*aim, build.uniform(180.0, 270.0), build.uniform(0.8, 1.2) * way_m), tries + 1
+    row = S.to_goals(share * other_mps, 2.0 * build.scale)
+    build.add_other(*begin, bearing(begin, aim), share, row, aim, (0.3 * width, aim[1]))
+
+
+def sudden_turn(build: SceneBuilder) -> None:
+    """The other passes at a few radii and turns hard at some moment, to some side: every one tried is a game."""
+    own_mps, gap = build.top(build.own), 0.0
+    while not build.nearest_m < gap < 1.5 * build.farthest_m:
+        share, heading = build.uniform(0.7, 1.0), float(build.rng.choice((180.0, 180.0, 0.0, 90.0, -90.0)))
+        heading, other_mps = heading + build.uniform(-15.0, 15.0), share * build.top(build.other)
+        pass_s = build.uniform(3.0, 12.0) * (1.0 if build.scale < 1.5 else 1.5)
+        x, y = ahead(0.0, own_mps * pass_s, heading + 180.0, other_mps * pass_s)
+        x, y = ahead(x, y, heading + 90.0, build.side() * build.uniform(1.5, 4.0) * build.radius_m)
+        gap = math.hypot(x, y)
+    build.add_own(0.0, 0.0, 0.0, 1.0, *onwards(build, own_mps * pass_s + 12.0 * build.scale))
+    other = build.add_other(x, y, heading, share, hold(build, heading, share))
+    angle, hard = build.uniform(60.0, 150.0), build.chance(0.5)
+    for moment in TURN_MOMENTS:
+        for side in (-1.0, 1.0):
+            turned, top = heading + side * angle, build.top(build.other)
+            row = S.script(
+                S.phase(S.AIM_HEADING, other_mps, angle_deg=heading),
+                S.phase(S.AIM_HEADING, top, angle_deg=turned, at_s=moment * pass_s),
+                authority=hard,
+            )
+            build.variants.append((other, row))
+
+
+def converging(build: SceneBuilder, boats: int) -> None:
+    """Team-mates whose straight ways cross at one place at about the same time; mixed fleets alternate platforms."""
+    first, names = build.uniform(-180.0, 180.0), (build.own, build.other)
+    lead_s = build.uniform(5.0, 12.0) * (1.0 if build.scale < 1.5 else 1.4)
+    spread = build.uniform(20.0, 180.0) if boats == 2 else 360.0 / boats
+    for k in range(boats):
+        heading = first + k * spread + build.uniform(-15.0, 15.0)
+        name = names[k % 2]
+        back = build.top(name) * (lead_s + build.uniform(-1.0, 1.0))
+        x, y = ahead(build.uniform(-1.0, 1.0), build.uniform(-1.0, 1.0), heading + 180.0, back)
+        goal = ahead(x, y, heading, back + build.uniform(8.0, 15.0) * build.scale)
+        build.add_own(x, y, heading, 1.0, goal, ahead(x, y, heading, FAR_M), name=name)
+
+
+def circle(build: SceneBuilder, boats: int) -> None:
+    """Team-mates all round a circle, each with its goal at the opposite point: they all come to the middle at once.
+
+    Two that turned away there may end up side by side, each wanting to turn to where the other is. In mixed fleets
+    platforms alternate, and each starts as far out as its speed calls for.
+    """
+    crossing_s, names = build.uniform(15.0, 25.0), (build.own, build.other)
+    for k in range(boats):
+        heading, name = k * 360.0 / boats + build.uniform(-CIRCLE_OFF_DEG, CIRCLE_OFF_DEG), names[k % 2]
+        across_m = build.top(name) * crossing_s
+        x, y = ahead(0.0, 0.0, heading + 180.0, 0.5 * across_m)
+        build.add_own(x, y, heading, 1.0, ahead(x, y, heading, across_m), ahead(x, y, heading, FAR_M), name=name)
+
+
+def doorway(build: SceneBuilder) -> None:
+    """Two others lie before the flag; one own boat goes in between them, one comes out."""
+    _, _, width, height = build.field()
+    flag, door_x = (7.0 / 8.0 * width, height / 2.0), 7.0 / 8.0 * width - 12.0 * build.scale
+    opening = build.uniform(2.6, 4.0) * build.radius_m + build.scale
+    middle = height / 2.0 + build.uniform(-4.0, 4.0)
+    inside = (flag[0] + build.uniform(0.0, 3.0), flag[1] + build.uniform(-6.0, 6.0))
+    outside = (door_x - build.uniform(15.0, 25.0) * build.scale, middle + build.uniform(-10.0, 10.0) * build.scale)
+    home = (0.25 * width, middle + build.uniform(-6.0, 6.0))
+    build.add_own(*outside, bearing(outside, (door_x, middle)), build.uniform(0.5, 1.0), flag, home)
+    build.add_own(*inside, bearing(inside, (door_x, middle)), build.uniform(0.0, 0.7), home, flag)
+    for side in (-1.0, 1.0):
+        build.add_other(door_x, middle + side * opening / 2.0, 90.0, 0.0, S.script(S.phase(S.AIM_NOWHERE)))
+
+
+def cluster(build: SceneBuilder) -> None:
+    """Others lie still in the way, some of them too close together to pass between."""
+    room = 2.2 * build.radius_m * math.sqrt(CLUSTER)
+    far = build.range_m() + room
+    way = onwards(build, far + room + 10.0)
+    build.add_own(0.0, 0.0, build.uniform(-10.0, 10.0), build.uniform(0.5, 1.0), *way)
+    for _ in range(CLUSTER):
+        x, y = build.free_place((-room, far - room, room, far + room), 1.2 * build.radius_m)
+        build.add_other(x, y, build.uniform(-180.0, 180.0), 0.0, S.script(S.phase(S.AIM_NOWHERE)))
+
+
+def ram(build: SceneBuilder, reach: float = 1.0) -> None:
+    """Add a rammer: pure pursuit, lead pursuit, something between, a feint to one side, or a wait ahead of the bow.
+
+    It starts up to ``reach`` times as far away as others do.
+    """
+    kind, top = float(build.rng.random()), build.top(build.other)
+    attack: dict[str, Any] = {"aim": S.AIM_TARGET, "speed_mps": top}
+    close = build.uniform(4.0, 12.0) * build.scale + build.radius_m - 2.5
+    if kind < 0.2:
+        phases = [S.phase(**attack)]
+    elif kind < 0.55:
+        phases = [S.phase(**attack, lead=1.0)]
+    elif kind < 0.7:
+        phases = [S.phase(**attack, lead=build.uniform(0.3, 1.4))]
+    else:
+        if kind < 0.85:
+            begin = S.phase(**attack, lead=1.0, angle_deg=build.side() * build.uniform(15.0, 60.0))
+        else:
+            begin = S.phase(**attack, lead=0.5, standoff_m=build.uniform(0.5, 1.5) * close)
+        phases = [begin, S.phase(**attack, lead=1.0, within_m=close, at_s=build.uniform(5.0, 30.0))]
+    gap = build.uniform(build.nearest_m, reach * build.farthest_m)
+    x, y = ahead(0.0, 0.0, build.uniform(-180.0, 180.0), gap)
+    while not build.is_clear(x, y, build.radius_m + 1.0):
+        x, y = ahead(0.0, 0.0, build.uniform(-180.0, 180.0), gap)
+    heading = bearing((x, y), (0.0, 0.0)) + build.uniform(-90.0, 90.0)
+    row = S.script(*phases, authority=build.chance(0.5))
+    build.add_other(x, y, heading, build.uniform(0.3, 1.0), row)
+
+
+def rammers(build: SceneBuilder, own: int, others: int) -> None:
+    """Own boats go round waypoints, rammers go for the nearest of them."""
+    room = 25.0 * build.scale
+    for k in range(own):
+        x, y = ahead(0.0, 0.0, 360.0 * k / own, 0.0 if own == 1 else 6.0 * build.scale)
+        goals = [build.place_in((-room, -room, room, room)) for _ in range(4)]
+        build.add_own(x, y, bearing((x, y), goals[0]), build.uniform(0.5, 1.0), *goals)
+    for _ in range(others):
+        ram(build)
+
+
+def at_rest(build: SceneBuilder) -> None:
+    """One rammer, at times from far away, against a boat that lies still and wants to stay for a while."""
+    waits_s, room = build.uniform(10.0, 60.0), 25.0 * build.scale
+    goal = build.place_in((-room, -room, room, room))
+    go = S.phase(S.AIM_GOALS, build.top(build.own), at_s=waits_s)
+    boat = build.add_own(0.0, 0.0, build.uniform(-180.0, 180.0), 0.0, goal, (0.0, 0.0))
+    build.script[boat] = S.script(S.phase(S.AIM_NOWHERE), go, reached_m=build.reached_m(build.own))
+    ram(build, reach=2.0)
+
+
+def crowd(build: SceneBuilder, own: int, others: int) -> None:
+    """Boats all over the field, each going round its own waypoints; the others give way to nobody."""
+    box = within(build.field(own + others), 3.0 * build.scale)
+    for k in range(own + others):
+        x, y = build.free_place(box, 0.75 * build.nearest_m)
+        goals = [build.place_in(box) for _ in range(6)]
+        heading, speed = bearing((x, y), goals[0]) + build.uniform(-30.0, 30.0), build.uniform(0.1, 0.5)
+        if k < own:
+            build.add_own(x, y, heading, speed, *goals)
+        else:
+            row = S.to_goals(build.uniform(0.6, 1.0) * build.top(build.other), build.reached_m(build.other))
+            build.add_other(x, y, heading, speed, row, *goals)
+
+
+def pursue(build: SceneBuilder, x: float, y: float, heading_deg: float) -> None:
+    """Add a pursuer that steers for the meeting point, at one of the shares of its top speed."""
+    share = SPEED_SHARES[int(build.uniform(0.0, len(SPEED_SHARES)))]
+    attack = S.phase(S.AIM_TARGET, share * build.top(build.other), lead=1.0)
+    build.add_other(x, y, heading_deg, share * build.uniform(0.3, 1.0), S.script(attack))
+
+
+def pursued_along_edge(build: SceneBuilder) -> None:
+    """A boat goes along an edge of its field, a pursuer behind it."""
+    _, _, width, height = build.field()
+    side, low = build.side(), build.side()
+    y, x = 0.5 * height - low * (0.5 * height - build.uniform(2.0, 6.0) * build.scale), build.uniform(0.4, 0.6) * width
+    goals = [((0.5 + side * 0.45) * width, y), ((0.5 - side * 0.45) * width, y), (0.5 * width, 0.5 * height)]
+    build.add_own(x, y, side * 90.0, build.uniform(0.5, 1.0), *goals)
+    behind = x - side * build.uniform(1.0, 2.0) * build.nearest_m, y + low * build.uniform(0.0, 6.0) * build.scale
+    pursue(build, *behind, bearing(behind, (x, y)))
+
+
+def pursued_into_corner(build: SceneBuilder) -> None:
+    """A boat is on its way into a corner of its field, a pursuer behind it."""
+    _, _, width, height = build.field()
+    corner_at, middle = (0.0, 0.0), (0.5 * width, 0.5 * height)
+    inwards = bearing(corner_at, middle) + build.uniform(-10.0, 10.0)
+    place = ahead(*corner_at, inwards, build.uniform(10.0, 18.0) * build.scale)
+    goal = ahead(*corner_at, bearing(corner_at, middle), 3.0 * build.scale)
+    build.add_own(*place, inwards + 180.0, build.uniform(0.5, 1.0), goal, middle)
+    behind = ahead(*place, inwards + build.uniform(-20.0, 20.0), build.uniform(1.0, 1.6) * build.nearest_m)
+    pursue(build, *behind, bearing(behind, place))
+
+
+def chased(build: SceneBuilder, pursuers: int) -> None:
+    """A boat goes about its field, so many pursuers after it."""
+    box = within(build.field(), 5.0 * build.scale)
+    place = build.place_in(box)
+    goals = [build.place_in(box) for _ in range(6)]
+    build.add_own(*place, bearing(place, goals[0]), build.uniform(0.5, 1.0), *goals)
+    for _ in range(pursuers):
+        spot = build.free_place(box, 1.1 * build.nearest_m)
+        pursue(build, *spot, build.uniform(-180.0, 180.0))
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of encounter.
+
+    Attributes:
+        name: of the family.
+        words: what happens in it, a sentence.
+        others: how many boats the own team does not command.
+        build: puts the boats of one encounter into a builder.
+        numbers: what ``build`` takes beside it.
+        field_for: number of boats that its field is made for; 0 is open water.
+        lasts: how many times as long as others it lasts.
+    """
+
+    name: str
+    words: str
+    others: int
+    build: Callable[..., None]
+    numbers: tuple[float, ...] = ()
+    field_for: int = 0
+    lasts: float = 1.0
+
+    def field_of(self, build: SceneBuilder) -> Box | None:
+        """The field of an encounter, None for open water."""
+        return build.field(self.field_for) if self.field_for else None
+
+
+_LEFT = "The other comes from the left to the place where the own boat will be, give or take a second or two."
+_TURN = "The other passes at a few radii and turns hard at some moment, to some side: every one tried is a game."
+_REST = "One rammer, at times from far away, against a boat that lies still and wants to stay for a while."
+_CORNER = "The own boat goes into a corner of the field and out again; the other comes to the same place, straight."
+FAMILIES: dict[str, Family] = {
+    family.name: family
+    for family in (
+        Family("head_on", "The two meet on nearly opposite courses, some widths to the side.", 1, head_on),
+        Family("crossing_left", _LEFT, 1, crossing, (1.0,)),
+        Family("crossing_right", "The other comes from the right.", 1, crossing, (-1.0,)),
+        Family("overtaking", "The own boat comes up behind a slower one.", 1, overtaking),
+        Family("converging_2", "Two team-mates.", 0, converging, (2,)),
+        Family("converging_3", "Three team-mates.", 0, converging, (3,)),
+        Family(
+            "circle_3",
+            "Three team-mates all round a circle, each on its way to the opposite point.",
+            0,
+            circle,
+            (3,),
+            0,
+            2.0,
+        ),
+        Family(
+            "circle_6",
+            "Six team-mates all round a circle, each on its way to the opposite point.",
+            0,
+            circle,
+            (6,),
+            0,
+            2.0,
+        ),
+        Family(
+            "doorway",
+            "Two others lie before the flag; one own boat goes in between them, one comes out.",
+            2,
+            doorway,
+            (),
+            4,
+        ),
+        Family(
+            "cluster", "Others lie still in the way, some of them too close together to pass between.", CLUSTER, cluster
+        ),
+        Family("corner", _CORNER, 1, corner, (), 2),
+        Family("sudden_turn", _TURN, 1, sudden_turn),
+        Family("rammer_1", "One rammer against one boat.", 1, rammers, (1, 1)),
+        Family("at_rest", _REST, 1, at_rest),
+        Family("rammer_2", "Two rammers against one boat.", 2, rammers, (1, 2)),
+        Family("rammer_3", "Three rammers against one boat.", 3, rammers, (1, 3)),
+        Family("rammer_3v3", "Three rammers against three boats.", 3, rammers, (3, 3)),
+        Family("crowd_6", "Three against three.", 3, crowd, (3, 3), 6),
+        Family("crowd_12", "Six against six.", 6, crowd, (6, 6), 12),
+        Family("crowd_40", "Twenty against twenty.", 20, crowd, (20, 20), 40),
+        Family("crowd_40_own", "Forty team-mates.", 0, crowd, (40, 0), 40),
+        Family(
+            "pursued_along_edge",
+            "A boat goes along an edge of its field, a pursuer behind it.",
+            1,
+            pursued_along_edge,
+            (),
+            2,
+            2.7,
+        ),
+        Family(
+            "pursued_into_corner",
+            "A boat is on its way into a corner of its field, a pursuer behind it.",
+            1,
+            pursued_into_corner,
+            (),
+            2,
+            2.7,
+        ),
+        Family("chased_in_box", "One pursuer chases a boat about its field.", 1, chased, (1,), 2, 2.7),
+        Family("chased_in_box_2", "Two pursuers chase a boat about its field.", 2, chased, (2,), 3, 2.7),
+        Family("chased_in_box_3", "Three pursuers chase a boat about its field.", 3, chased, (3,), 4, 2.7),
+    )
+}
+
+
+def get_family(name: str) -> Family:
+    """The family of that name.
+
+    Raises:
+        ConfigError: there is none; the message names the nearest, or all.
+    """
+    if name not in FAMILIES:
+        near = get_close_matches(name, FAMILIES, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(FAMILIES)}"
+        raise ConfigError(f"unknown family {name!r}; {hint}")
+    return FAMILIES[name]
+
+
+def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, first: int, count: int) -> Scenes:
+    """Draw the encounters ``first`` .. ``first + count - 1`` of a family.
+
+    Args:
+        family: its name.
+        own: platform of the own boats.
+        other: platform of the others.
+        conditions: of the run; only the radius and the noise have a say in where boats start.
+        seed: of the run.
+        first: number of the first encounter.
+        count: how many.
+
+    Raises:
+        SteerclearError: an unknown name, or an encounter that cannot be drawn with this radius.
+    """
+    kind = get_family(family)
+    if first < 0 or count < 1:
+        raise ConfigError(f"encounters {first} to {first + count - 1} cannot be drawn; ask for at least one, from 0 on")
+    built = []
+    for number in range(first, first + count):
+        build = SceneBuilder(own, other, conditions, seed, family, number)
+        _arrange(kind, build, 1.1 * conditions.radius_m + 2.0 * conditions.noise_m)
+        built += [(build, scripts) for scripts in build.scripts()]
+    one = built[0][0]
+    return Scenes(
+        family=family,
+        platforms=tuple(one.platforms),
+        team=np.array(one.team, dtype=np.int64),
+        state=np.array([build.state for build, _ in built], dtype=np.float64),
+        script=np.array([scripts for _, scripts in built], dtype=np.float64),
+        goals=np.array([_even(build.goals) for build, _ in built], dtype=np.float64),
+        current=np.array([build.current for build, _ in built]),
+        noise_seed=np.array([build.noise_seed for build, _ in built], dtype=np.uint64),
+        number=np.array([build.number for build, _ in built], dtype=np.int64),
+        field=kind.field_of(one),
+        length_s=kind.lasts * (30.0 + 15.0 * min(one.scale, 4.0)),
+    )
+
+
+def _arrange(kind: Family, build: SceneBuilder, gap_m: float) -> None:
+    """Draw until no two boats start too close, and none outside the field."""
+    for _ in range(MOST_DRAWS):
+        build.clear()
+        kind.build(build, *kind.numbers)
+        box = kind.field_of(build)
+        inside = box is None or all(box[0] <= x <= box[2] and box[1] <= y <= box[3] for x, y, *_ in build.state)
+        if build.closest_m() > gap_m and inside:
+            if box is None:
+                build.turn(build.uniform(-180.0, 180.0))
+            build.settle()
+            return
+    raise ConfigError(f"no encounter of {kind.name} fits a radius of {build.radius_m:g} m; choose a smaller one")
+
+
+def _even(goals: list[list[Point]]) -> Array:
+    """Goals of all boats, (n, G, 2): boats with fewer stay at their last one."""
+    most = max(len(line) for line in goals)
+    return np.array([[*line, *[line[-1]] * (most - len(line))] for line in goals], dtype=np.float64)

@@ -1,0 +1,289 @@
+"""Playing a batch of scenes, every state kept: what boats want, what they see, how they move. Compiled."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+from warnings import warn
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.shield.exceptions import FleetError
+from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.platforms import get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.actuator import command_for_turn
+from steerclear.shield.platforms.usv import wrap_degrees
+from steerclear.shield.tracking.tracks import whole_steps
+
+from ..baselines.registry import Guard, GuardMaker, build_guard
+from ..jit import kernel
+from ..play.conditions import observe
+from . import script as S
+from .scene import DT_S, Conditions, Scenes
+
+LONGEST_LEAD_S = 20.0
+"""A hunter looks no further ahead than this, s."""
+
+
+@kernel
+def bearing_deg(x: float, y: float, to_x: float, to_y: float) -> float:
+    """Direction from one place to another, deg clockwise from north."""
+    return math.degrees(math.atan2(to_x - x, to_y - y))
+
+
+@kernel
+def meeting_s(px: float, py: float, vx: float, vy: float, speed_mps: float) -> float:
+    """Time until a pursuer can meet a target at relative place p that moves with v, or the longest lead, s."""
+    a = vx * vx + vy * vy - speed_mps * speed_mps
+    b = px * vx + py * vy
+    c = px * px + py * py
+    best = LONGEST_LEAD_S
+    if abs(a) < 1e-9:
+        if b < 0.0:
+            best = min(best, -c / (2.0 * b))
+        return best
+    root = b * b - a * c
+    if root < 0.0:
+        return best
+    for sign in (-1.0, 1.0):
+        time_s = (-b + sign * math.sqrt(root)) / a
+        if 0.0 < time_s < best:
+            best = time_s
+    return best
+
+
+@kernel
+def nearest_foe(state: Array, team: IntArray, i: int) -> int:
+    """The nearest boat of another team, or -1."""
+    found, best = -1, math.inf
+    for j in range(state.shape[0]):
+        if team[j] != team[i]:
+            gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+            if gap < best:
+                found, best = j, gap
+    return found
+
+
+@kernel
+def hunt_deg(me: Array, target: Array, lead: float, standoff_m: float, speed_mps: float) -> float:
+    """Bearing of a point ahead of the target's bow, moved on by ``lead`` of the way to where it will be."""
+    course = math.radians(target[L.HEADING])
+    east, north = math.sin(course), math.cos(course)
+    x, y = target[L.X] + standoff_m * east, target[L.Y] + standoff_m * north
+    vx, vy = target[L.SPEED] * east, target[L.SPEED] * north
+    ahead_s = lead * meeting_s(x - me[L.X], y - me[L.Y], vx, vy, speed_mps)
+    return bearing_deg(me[L.X], me[L.Y], x + vx * ahead_s, y + vy * ahead_s)
+
+
+@kernel
+def next_phase(row: Array, now: int, time_s: float, gap_m: float) -> int:
+    """The phase a script is in, given the one it was in."""
+    while now + 1 < S.PHASES:
+        begin = S.PHASE + (now + 1) * S.N_PHASE
+        if time_s + 1e-9 < row[begin + S.AT_S] and not gap_m < row[begin + S.WITHIN_M]:
+            break
+        now += 1
+    return now
+
+
+@kernel
+def steer(
+    params: Array, row: Array, now: int, me: Array, target: Array, hunts: bool, goal: Array, nominal: Array
+) -> None:
+    """The command of one boat in a phase of its script: speed m/s and relative heading deg into ``nominal`` (2,)."""
+    begin = S.PHASE + now * S.N_PHASE
+    aim, speed, angle = int(row[begin + S.AIM]), row[begin + S.SPEED_MPS], row[begin + S.ANGLE_DEG]
+    nominal[0], nominal[1] = speed, 0.0
+    if aim == S.AIM_NOWHERE or (aim == S.AIM_TARGET and not hunts):
+        nominal[0] = 0.0
+        return
+    heading = angle
+    if aim == S.AIM_GOALS:
+        heading = angle + bearing_deg(me[L.X], me[L.Y], goal[0], goal[1])
+    elif aim == S.AIM_TARGET:
+        heading = angle + hunt_deg(me, target, row[begin + S.LEAD], row[begin + S.STANDOFF_M], speed)
+    error = wrap_degrees(heading - me[L.HEADING])
+    nominal[1] = error
+    if row[S.AUTHORITY] > 0.0:
+        nominal[1] = command_for_turn(params, me, speed, error, DT_S)
+
+
+class World(NamedTuple):
+    """What changes and what stays while B games of n boats are played.
+
+    ``params`` (n, N_PARAM) and ``team`` (n,) of the boats, ``scripts`` (B, n, N_SCRIPT), ``goals`` (B, n, G, 2) m and
+    ``current_mps`` (B, 2) stay. ``state`` (B, n, N_STATE) is true, ``seen`` what the own team knows of it, off by
+    ``error`` (B, n, 2) m, drawn from the games' ``seeds`` (B,); ``goal_at`` and ``phase_at`` (B, n) are where boats are
+    in their goals and scripts, ``first_goal_s`` (B, n) when they reached the first, ``queue`` (D, B, n, 2) commands of
+    own boats as absolute headings that wait for their effect.
+    """
+
+    params: Array
+    team: IntArray
+    scripts: Array
+    goals: Array
+    current_mps: Array
+    state: Array
+    seen: Array
+    error: Array
+    seeds: Array
+    goal_at: IntArray
+    phase_at: IntArray
+    first_goal_s: Array
+    queue: Array
+
+
+@kernel
+def want(world: World, time_s: float, nominal: Array) -> None:
+    """Write commands (B, n, 2) of all boats; own boats (team 0) steer by what is seen, the others by what is true."""
+    for b in range(world.state.shape[0]):
+        for i in range(world.state.shape[1]):
+            row, known = world.scripts[b, i], world.state[b]
+            if world.team[i] == 0:
+                known = world.seen[b]
+            foe = int(row[S.TARGET])
+            if foe < 0:
+                foe = nearest_foe(known, world.team, i)
+            gap = math.inf
+            if foe >= 0:
+                gap = math.hypot(known[foe, L.X] - known[i, L.X], known[foe, L.Y] - known[i, L.Y])
+            now = next_phase(row, world.phase_at[b, i], time_s, gap)
+            world.phase_at[b, i] = now
+            goal = world.goals[b, i, world.goal_at[b, i]]
+            steer(world.params[i], row, now, known[i], known[max(foe, 0)], foe >= 0, goal, nominal[b, i])
+
+
+@kernel
+def move(world: World, filtered: Array, step: int) -> None:
+    """One step of all boats, in place, and on to the next goal where one was reached.
+
+    Commands of own boats wait in the queue for D steps; with D = 0 they are obeyed at once, bit for bit. A command is
+    relative to the heading seen when it was given. The current carries all boats.
+    """
+    delayed, goals = world.queue.shape[0], world.goals
+    for b in range(world.state.shape[0]):
+        for i in range(world.state.shape[1]):
+            boat, speed, error = world.state[b, i], filtered[b, i, 0], filtered[b, i, 1]
+            if delayed > 0 and world.team[i] == 0:
+                place = world.queue[step % delayed, b, i]
+                speed, error, given = place[0], wrap_degrees(place[1] - boat[L.HEADING]), error
+                place[0], place[1] = filtered[b, i, 0], world.seen[b, i, L.HEADING] + given
+            step_boat(world.params[i], boat, speed, error, DT_S)
+            boat[L.X] += world.current_mps[b, 0] * DT_S
+            boat[L.Y] += world.current_mps[b, 1] * DT_S
+            goal = goals[b, i, world.goal_at[b, i]]
+            if math.hypot(goal[0] - boat[L.X], goal[1] - boat[L.Y]) <= world.scripts[b, i, S.REACHED_M]:
+                world.goal_at[b, i] = (world.goal_at[b, i] + 1) % goals.shape[2]
+                if math.isnan(world.first_goal_s[b, i]):
+                    world.first_goal_s[b, i] = (step + 1) * DT_S
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What happened in B games of T steps.
+
+    Attributes:
+        scenes: what was played.
+        conditions: under which.
+        state: (T+1, B, n, N_STATE) true states, index 0 the start.
+        nominal: (T, B, n, 2) what boats wanted: speed m/s, relative heading deg.
+        filtered: (T, B, n, 2) what they were told; those of other boats are what they wanted.
+        reason: (T, B, n) reason codes of the guard.
+        safety_margin_m: (T, B, n) float32, of the guard.
+        first_goal_s: (B, n) when the first goal was reached, NaN where it was not.
+        decision_us: (T,) time of the guard's call for a step, per game.
+    """
+
+    scenes: Scenes
+    conditions: Conditions
+    state: Array
+    nominal: Array
+    filtered: Array
+    reason: NDArray[np.int8]
+    safety_margin_m: NDArray[np.float32]
+    first_goal_s: Array
+    decision_us: Array
+
+    def __getattr__(self, name: str) -> Any:
+        """Names until 0.8.0, for one more release."""
+        names = {"wanted": "nominal", "sent": "filtered", "certificate_m": "safety_margin_m"}
+        if name not in names:
+            raise AttributeError(f"a trajectory has no {name!r}")
+        warn(f"{name} of a trajectory is called {names[name]}", DeprecationWarning, stacklevel=2)
+        return getattr(self, names[name])
+
+
+def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions) -> Trajectory:
+    """Play scenes with a guard for the own boats.
+
+    Args:
+        scenes: the games.
+        guard: a name, what makes a guard, or a guard made for just these games.
+        conditions: delay, noise and current.
+
+    Returns:
+        Everything that happened. The same scenes, guard and conditions give the same trajectory, and that of a game
+        does not depend on what else is in the batch.
+
+    Raises:
+        SteerclearError: the guard cannot be made, or what it sends is not finite.
+    """
+    keeper = build_guard(guard, scenes, conditions) if isinstance(guard, str) or not hasattr(guard, "decide") else guard
+    world, steps, shape = _world(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
+    ours = np.broadcast_to(scenes.own, shape).copy()
+    played = Trajectory(
+        scenes=scenes,
+        conditions=conditions,
+        state=np.empty((steps + 1, *shape, L.N_STATE)),
+        nominal=np.empty((steps, *shape, 2)),
+        filtered=np.empty((steps, *shape, 2)),
+        reason=np.zeros((steps, *shape), np.int8),
+        safety_margin_m=np.full((steps, *shape), np.nan, np.float32),
+        first_goal_s=world.first_goal_s,
+        decision_us=np.zeros(steps),
+    )
+    played.state[0] = world.state
+    for step in range(steps):
+        nominal, filtered = played.nominal[step], played.filtered[step]
+        observe(world.state, world.error, world.seeds, conditions.noise_m, step == 0, DT_S, world.seen)
+        want(world, step * DT_S, nominal)
+        started = time.perf_counter()
+        answer = keeper.decide(world.seen, nominal, ours)
+        played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
+        filtered[:] = nominal
+        np.copyto(filtered, answer, where=ours[..., None])
+        if not np.isfinite(filtered).all():
+            b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
+            raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
+        played.reason[step], played.safety_margin_m[step] = keeper.reason, keeper.certificate_m
+        move(world, filtered, step)
+        played.state[step + 1] = world.state
+    return played
+
+
+def _world(scenes: Scenes, conditions: Conditions) -> World:
+    shape, delayed = (scenes.games, len(scenes.team)), delay_steps(conditions)
+    held = scenes.state[:, :, [L.SPEED, L.HEADING]]
+    return World(
+        params=np.array([get_platform(name).pack() for name in scenes.platforms]),
+        team=scenes.team,
+        scripts=scenes.script,
+        goals=scenes.goals,
+        current_mps=scenes.current * conditions.current_mps,
+        state=scenes.state.copy(),
+        seen=scenes.state.copy(),
+        error=np.zeros((*shape, 2)),
+        seeds=scenes.noise_seed.copy(),
+        goal_at=np.zeros(shape, np.int64),
+        phase_at=np.zeros(shape, np.int64),
+        first_goal_s=np.full(shape, np.nan),
+        queue=np.tile(held, (delayed, 1, 1, 1)).reshape(delayed, *shape, 2),
+    )
+
+
+def delay_steps(conditions: Conditions) -> int:
+    """Steps from a command of an own boat to its effect."""
+    return whole_steps(conditions.delay_s, DT_S)

@@ -1,0 +1,126 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from steerclear.experiments import cli
+from steerclear.experiments import docs_keys as keys
+from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.encounters import Conditions, play
+from steerclear.experiments.encounters.attack import N_GENES, Duel, Search, _Hunt, run_search
+from steerclear.experiments.encounters.outcomes import NO_VERDICT, SIDES, measure_chunk
+from steerclear.experiments.encounters.scene import read_scene, scenes_of
+from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
+
+FOUND = sorted((Path(__file__).parents[2] / "data" / "encounters").glob("*.json"))
+OPEN: set[str] = set()
+"""Found scenes that the shield does not hold yet; a fix takes its scene out of here."""
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize(("own", "attackers", "own_boats"), [("heron", 1, 1), ("surveyor", 3, 2)])
+def test_no_attacker_starts_near_an_own_boat(own, attackers, own_boats):
+    duel = Duel(own, own, attackers, own_boats, Conditions(), 0, 0)
+    scenes = duel.scenes(np.random.default_rng(0).random((200, duel.genes)))
+    assert duel.genes == attackers * N_GENES
+    places = scenes.state[:, :, :2]
+    gaps = np.linalg.norm(places[:, :own_boats, None] - places[:, None, own_boats:], axis=-1)
+    assert gaps.min() > duel.build.nearest_m - 1e-9
+
+
+def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_again():
+    search = Search(guard="none", population=8, generations=2)
+    answer = run_search(search)
+    assert answer["breached"] > 0
+    assert answer["judged"][-1]["avoidable"] > 0
+    assert answer["judged"][-1]["start_certificate_m"] > 0.0
+    assert answer["judged"][-1]["responsible"] in SIDES
+    scenes, conditions = scenes_of(json.loads(json.dumps(answer["scene"])))
+    columns = measure_chunk(scenes, "none", conditions, judge=False)
+    assert columns["closest_m"][0] == answer["judged"][-1]["closest_m"]
+    assert run_search(search) == answer
+
+
+def test_a_search_goes_on_while_nothing_is_found(monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.encounters.attack.judge_game", lambda film, game: NO_VERDICT)
+    answer = run_search(Search(guard="none", population=8, generations=3))
+    assert (answer["tried"], len(answer["history"]), answer["scene"]) == (24, 3, None)
+    assert 3 < len(answer["judged"]) <= 9  # at most three a generation
+    assert answer["history"] == sorted(answer["history"], reverse=True)
+
+
+def test_an_opponent_whose_breach_nobody_could_avoid_is_no_success(monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.encounters.attack.judge_game", lambda film, game: NO_VERDICT)
+    hunt = _Hunt(Search(guard="none"))
+    merits = hunt.merits(np.random.default_rng(0).random((hunt.duel.genes, 20)))
+    closest = np.sort([entry["closest_m"] for entry in hunt.judged])
+    assert len(closest) == 3
+    assert closest[-1] < 2.5
+    assert (merits == 2.5 + 1.0).sum() == 3
+    assert merits.min() > closest[-1]
+
+
+def test_an_attack_from_end_to_end_and_its_replay():
+    arguments = ["attack", "--guard", "none", "--restarts", "2", "--population", "8", "--generations", "1"]
+    arguments += ["--workers", "1", "--out", "out"]
+    done = run(*arguments, "--json", "copy.json")
+    assert done.exit_code == ExitCode.OK, done.output  # only a shield is held to the bar
+    content = json.loads(Path("copy.json").read_text())
+    assert keys.undocumented(content, keys.ATTACK) == []
+    assert content["found"] == 2
+    scene = Path("out") / content["searches"][0]["scene"]
+    assert run("attack", "--guard", "none", "--replay", scene).exit_code == ExitCode.OK
+    resumed = run(*arguments, "--resume", "--json", "again.json")
+    assert resumed.exit_code == ExitCode.OK
+    assert json.loads(Path("again.json").read_text())["searches"] == content["searches"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--attackers", "4"], "--attackers must be from 1 to 3"),
+        (["--own", "0"], "--own must be from 1 to 6"),
+        (["--population", "3"], "--population must be at least 8"),
+        (["--platform", "canoe"], "unknown platform"),
+        (["--platform", "heron,surveyor"], "one --platform"),
+        (["--guard", "none,shield"], "one at a time"),
+        (["--replay", "missing.json"], "cannot read"),
+        (["--resume"], "--resume needs"),
+    ],
+)
+def test_bad_input(arguments, words):
+    done = run("attack", *arguments)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in done.output
+
+
+def test_numbers_out_of_range_are_refused():
+    with pytest.raises(ConfigError, match="--generations must be at least 1"):
+        Search(generations=0)
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_what_was_found_once_hits_a_boat_without_a_shield(path):
+    scenes, conditions = read_scene(path)
+    film = play(scenes, "none", conditions)
+    own, others = film.state[:, :, scenes.own, :2], film.state[:, :, ~scenes.own, :2]
+    assert np.linalg.norm(own - others, axis=-1).min() < conditions.radius_m
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_the_shield_keeps_clear_of_what_was_found_once(path, request):
+    if path.stem in OPEN:
+        request.applymarker(pytest.mark.xfail(reason="found by the search, not yet held", strict=True))
+    scenes, conditions = read_scene(path)
+    columns = measure_chunk(scenes, "shield", conditions, judge=False)
+    assert columns["closest_m"].min() > conditions.radius_m
