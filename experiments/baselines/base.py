@@ -13,6 +13,8 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import Platform, get_platform
 from steerclear.shield.platforms import layout as L
 
+from ..jit import kernel
+
 
 class Games(NamedTuple):
     """What is decided about, and what is written, of B games of n boats, or of one of them; see `BatchGuard`."""
@@ -24,6 +26,13 @@ class Games(NamedTuple):
     sent: Array
     reason: IntArray
     certificate_m: Array
+
+
+@kernel
+def game_of(games: Games, b: int) -> Games:
+    """One of the games: arrays without the leading games axis."""
+    state, wanted, ours, memory, sent, reason, certificate_m = games
+    return Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], certificate_m[b])
 
 
 class BatchGuard(ABC):

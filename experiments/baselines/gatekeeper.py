@@ -25,13 +25,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
 from . import rollouts as R
-from .base import Games
+from .base import Games, game_of
 
 PASSED, BACKUP, GOES_ON = 0, 1, 2
 
@@ -106,10 +106,9 @@ def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: A
 
 
 @kernel
-def decide_game(
-    setup: R.Setup, state: Array, ours: BoolArray, plan: Array, sent: Array, reason: IntArray, clear_m: Array
-) -> None:
+def decide_game(setup: R.Setup, game: Games) -> None:
     """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
+    state, _, ours, plan, sent, reason, clear_m = game
     n, steps = state.shape[0], setup.switches[0] + setup.steps
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
     around = R.Around(near, path, grow)
@@ -132,9 +131,8 @@ def decide_game(
 @kernel
 def decide_games(setup: R.Setup, games: Games) -> None:
     """`decide_game` for every game; arrays carry a leading games axis, and the memory is the boats' plans."""
-    state, _, ours, plan, sent, reason, clear_m = games
-    for b in range(len(state)):
-        decide_game(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])
+    for b in range(len(games.state)):
+        decide_game(setup, game_of(games, b))
 
 
 class Gatekeeper(R.RolloutGuard):

@@ -29,14 +29,14 @@ from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.filter.active_set import OPTIMAL, project
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
 from . import rollouts as R
-from .base import Games
+from .base import Games, game_of
 from .unicycle import TOLERANCE, command_of_inputs, holds, inputs_of_command
 
 PASSED, CHANGED, POLICY = 0, 1, 2
@@ -243,10 +243,9 @@ def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: A
 
 
 @kernel
-def decide_game(
-    setup: R.Setup, state: Array, ours: BoolArray, plan: Array, sent: Array, reason: IntArray, clear_m: Array
-) -> None:
+def decide_game(setup: R.Setup, game: Games) -> None:
     """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
+    state, _, ours, plan, sent, reason, clear_m = game
     n, steps = state.shape[0], setup.steps + 1
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
     around = R.Around(near, path, grow)
@@ -266,9 +265,8 @@ def decide_game(
 @kernel
 def decide_games(setup: R.Setup, games: Games) -> None:
     """`decide_game` for every game; arrays carry a leading games axis, and the memory is the boats' plans."""
-    state, _, ours, plan, sent, reason, clear_m = games
-    for b in range(len(state)):
-        decide_game(setup, state[b], ours[b], plan[b], sent[b], reason[b], clear_m[b])
+    for b in range(len(games.state)):
+        decide_game(setup, game_of(games, b))
 
 
 class PolicyLibrary(R.RolloutGuard):

@@ -35,7 +35,7 @@ from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, tab
 from steerclear.shield.tables.settings import OtherMay
 
 from ..jit import kernel
-from .base import BatchGuard, Games
+from .base import BatchGuard, Games, game_of
 
 WAYS = 3
 """Ways an opponent may move in a step: straight on, and with full rudder to port and to starboard."""
@@ -349,9 +349,8 @@ def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of ro
 @kernel
 def decide_games(setup: Setup, games: Games) -> None:
     """`decide_game` for every game; arrays carry a leading games axis."""
-    state, wanted, ours, memory, sent, reason, certificate_m = games
-    for b in range(len(state)):
-        decide_game(setup, Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], certificate_m[b]))
+    for b in range(len(games.state)):
+        decide_game(setup, game_of(games, b))
 
 
 NAME = "reach"

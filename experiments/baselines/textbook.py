@@ -23,7 +23,7 @@ from steerclear.shield.platforms.usv import clamp, wrap_degrees
 
 from ..jit import kernel
 from .barriers import BARRIERS, Barrier, Gains, dot
-from .base import BatchGuard, Games
+from .base import BatchGuard, Games, game_of
 from .unicycle import SOLVED, UNSOLVED, command_of_inputs, holds, input_limits, inputs_of_command, solve
 
 __all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookGuard"]
@@ -198,7 +198,5 @@ def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
 @kernel
 def decide_games(setup: Setup, games: Games, acts: Array, need: Array) -> None:
     """`decide_game` for every game; arrays carry a leading games axis."""
-    state, wanted, ours, memory, sent, reason, clear_m = games
-    for b in range(len(state)):
-        game = Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], clear_m[b])
-        decide_game(setup, game, acts[b], need[b])
+    for b in range(len(games.state)):
+        decide_game(setup, game_of(games, b), acts[b], need[b])
