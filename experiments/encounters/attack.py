@@ -53,94 +53,6 @@ NO_SUCCESS_M = 1.0
 """Merit beyond the radius, m, of an opponent whose breach nobody could have avoided: the search turns elsewhere."""
 
 
-class Duel:
-    """What is the same for all opponents of one search: own boats with their waypoints, current, noise.
-
-    Args:
-        own: platform of the own boats.
-        other: platform of the attackers.
-        attackers: how many.
-        own_boats: how many.
-        conditions: of the encounters.
-        seed: of the own boats' waypoints.
-        restart: number of the search, which draws its own waypoints.
-
-    Raises:
-        SteerclearError: an unknown platform or a number out of range.
-    """
-
-    def __init__(
-        self, own: str, other: str, attackers: int, own_boats: int, conditions: Conditions, seed: int, restart: int
-    ) -> None:
-        for name, value, most in (("--attackers", attackers, MOST_ATTACKERS), ("--own", own_boats, MOST_OWN)):
-            if not 1 <= value <= most:
-                raise ConfigError(f"{name} must be from 1 to {most}; got {value}")
-        self.attackers, self.conditions = attackers, conditions
-        self.build = SceneBuilder(own, other, conditions, seed, "attack", restart)
-        self.length_s = 30.0 + 15.0 * min(self.build.scale, 4.0)
-        room = ROOM_M * self.build.scale
-        for k in range(own_boats):
-            x, y = ahead(0.0, 0.0, 360.0 * k / own_boats, 0.0 if own_boats == 1 else 6.0 * self.build.scale)
-            goals = [self.build.place_in((-room, -room, room, room)) for _ in range(4)]
-            self.build.add_own(x, y, self.build.uniform(-180.0, 180.0), self.build.uniform(0.5, 1.0), *goals)
-        self.build.settle()
-
-    @property
-    def genes(self) -> int:
-        """How many numbers describe the attackers."""
-        return N_GENES * self.attackers
-
-    def scenes(self, points: Array) -> Scenes:
-        """Scenes of (S, genes) points in [0, 1], one game each."""
-        build, games = self.build, len(points)
-        attackers = [[self._attacker(row) for row in point.reshape(-1, N_GENES)] for point in points]
-        far = [build.goals[0]] * self.attackers
-        return Scenes(
-            family="attack",
-            platforms=(*build.platforms, *[build.other] * self.attackers),
-            team=np.array([0] * len(build.state) + [1] * self.attackers, dtype=np.int64),
-            state=np.array([[*build.state, *(state for state, _ in line)] for line in attackers]),
-            script=np.array([[*build.script, *(row for _, row in line)] for line in attackers]),
-            goals=np.tile(np.array([*build.goals, *far], dtype=np.float64), (games, 1, 1, 1)),
-            current=np.tile(np.array(build.current), (games, 1)),
-            noise_seed=np.full(games, build.noise_seed, dtype=np.uint64),
-            number=np.arange(games, dtype=np.int64),
-            field=None,
-            length_s=self.length_s,
-        )
-
-    def _attacker(self, gene: Array) -> tuple[Array, Array]:
-        """State and script of one attacker."""
-        build, top, u = self.build, self.build.top(self.build.other), np.clip(gene, 0.0, 1.0)
-        distance = build.nearest_m + u[1] * (build.farthest_m - build.nearest_m) + self._spread_m
-        bearing = 360.0 * u[0] - 180.0
-        x, y = ahead(0.0, 0.0, bearing, distance)
-        state = under_way(build.other, x, y, bearing + 180.0 + 180.0 * (u[2] - 0.5), (0.3 + 0.7 * u[3]) * top)
-        first_s = 0.6 * self.length_s * u[8]
-        first = S.phase(
-            S.AIM_TARGET,
-            (0.3 + 0.7 * u[6]) * top,
-            lead=1.5 * u[4],
-            angle_deg=140.0 * (u[5] - 0.5),
-            standoff_m=(25.0 * u[7] - 10.0) * build.scale,
-        )
-        second = S.phase(
-            S.AIM_TARGET,
-            (0.3 + 0.7 * u[12]) * top,
-            lead=1.5 * u[10],
-            angle_deg=80.0 * (u[11] - 0.5),
-            at_s=first_s,
-            within_m=20.0 * build.scale * u[9],
-        )
-        last = S.phase(S.AIM_TARGET, top, lead=1.0, at_s=first_s + 0.4 * self.length_s * u[13])
-        return state, S.script(first, second, last, authority=True)
-
-    @property
-    def _spread_m(self) -> float:
-        """Distance of the own boats from the middle, m, so that nobody starts too near one of them."""
-        return 0.0 if len(self.build.state) == 1 else 6.0 * self.build.scale
-
-
 @dataclass(frozen=True)
 class Search:
     """One search.
@@ -174,19 +86,88 @@ class Search:
 
     def __post_init__(self) -> None:
         check_guard(self.guard)
+        for name, value, most in (("--attackers", self.attackers, MOST_ATTACKERS), ("--own", self.own_boats, MOST_OWN)):
+            if not 1 <= value <= most:
+                raise ConfigError(f"{name} must be from 1 to {most}; got {value}")
         check_count("--population", self.population, 8, MOST_PLAYED)
         check_count("--generations", self.generations, 1, MOST_PLAYED)
         check_seed(self.seed)
 
     def duel(self) -> Duel:
         """The own boats that are attacked."""
-        return Duel(self.own, self.other, self.attackers, self.own_boats, self.conditions, self.seed, self.restart)
+        return Duel(self)
 
     @classmethod
     def of_job(cls, job: Job) -> Search:
         """The search that plain values describe, as `dataclasses.asdict` gives them."""
         known = {name: job[name] for name in cls.__dataclass_fields__}
         return cls(**{**known, "conditions": Conditions(**job["conditions"])})
+
+
+class Duel:
+    """What is the same for all opponents of one search: own boats with their waypoints, current, noise."""
+
+    def __init__(self, search: Search) -> None:
+        self.attackers, own_boats = search.attackers, search.own_boats
+        self.build = SceneBuilder(search.own, search.other, search.conditions, search.seed, "attack", search.restart)
+        self.length_s = 30.0 + 15.0 * min(self.build.scale, 4.0)
+        room, self.spread_m = ROOM_M * self.build.scale, 0.0 if own_boats == 1 else 6.0 * self.build.scale
+        for k in range(own_boats):
+            x, y = ahead(0.0, 0.0, 360.0 * k / own_boats, self.spread_m)
+            goals = [self.build.place_in((-room, -room, room, room)) for _ in range(4)]
+            self.build.add_own(x, y, self.build.uniform(-180.0, 180.0), self.build.uniform(0.5, 1.0), *goals)
+        self.build.settle()
+
+    @property
+    def genes(self) -> int:
+        """How many numbers describe the attackers."""
+        return N_GENES * self.attackers
+
+    def scenes(self, points: Array) -> Scenes:
+        """Scenes of (S, genes) points in [0, 1], one game each."""
+        build, games = self.build, len(points)
+        attackers = [[self._attacker(row) for row in point.reshape(-1, N_GENES)] for point in points]
+        far = [build.goals[0]] * self.attackers
+        return Scenes(
+            family="attack",
+            platforms=(*build.platforms, *[build.other] * self.attackers),
+            team=np.array([0] * len(build.state) + [1] * self.attackers, dtype=np.int64),
+            state=np.array([[*build.state, *(state for state, _ in line)] for line in attackers]),
+            script=np.array([[*build.script, *(row for _, row in line)] for line in attackers]),
+            goals=np.tile(np.array([*build.goals, *far], dtype=np.float64), (games, 1, 1, 1)),
+            current=np.tile(np.array(build.current), (games, 1)),
+            noise_seed=np.full(games, build.noise_seed, dtype=np.uint64),
+            number=np.arange(games, dtype=np.int64),
+            field=None,
+            length_s=self.length_s,
+        )
+
+    def _attacker(self, gene: Array) -> tuple[Array, Array]:
+        """State and script of one attacker."""
+        build, top, u = self.build, self.build.top(self.build.other), np.clip(gene, 0.0, 1.0)
+        # the spread: so that nobody starts too near one of the own boats
+        distance = build.nearest_m + u[1] * (build.farthest_m - build.nearest_m) + self.spread_m
+        bearing = 360.0 * u[0] - 180.0
+        x, y = ahead(0.0, 0.0, bearing, distance)
+        state = under_way(build.other, x, y, bearing + 180.0 + 180.0 * (u[2] - 0.5), (0.3 + 0.7 * u[3]) * top)
+        first_s = 0.6 * self.length_s * u[8]
+        first = S.phase(
+            S.AIM_TARGET,
+            (0.3 + 0.7 * u[6]) * top,
+            lead=1.5 * u[4],
+            angle_deg=140.0 * (u[5] - 0.5),
+            standoff_m=(25.0 * u[7] - 10.0) * build.scale,
+        )
+        second = S.phase(
+            S.AIM_TARGET,
+            (0.3 + 0.7 * u[12]) * top,
+            lead=1.5 * u[10],
+            angle_deg=80.0 * (u[11] - 0.5),
+            at_s=first_s,
+            within_m=20.0 * build.scale * u[9],
+        )
+        last = S.phase(S.AIM_TARGET, top, lead=1.0, at_s=first_s + 0.4 * self.length_s * u[13])
+        return state, S.script(first, second, last, authority=True)
 
 
 class _Hunt:

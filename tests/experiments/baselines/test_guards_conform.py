@@ -111,6 +111,9 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
     ("text", "words"),
     [
         ("keeper", "unknown guard 'keeper'; choose from none, shield"),
+        ("none:a=1", "takes no settings"),
+        ("shield:tail", "has no value"),
+        ("shield:tial_s=3", "did you mean 'tail_s'"),
         ("parabolic:a=1", "takes no settings; only shield, reach, gatekeeper"),
         ("reach:tail_s=3", "has no setting 'tail_s'"),
         ("reach:buffer_m=-1", "must be >= 0"),
@@ -127,6 +130,8 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
 def test_bad_names_and_settings_are_refused(text, words):
     with pytest.raises(ConfigError, match=words):
         check_guard(text)
+    with pytest.raises(ConfigError, match="names no guard"):
+        parse_guards(" , ")
 
 
 def test_settings_are_read_from_the_name():

@@ -6,8 +6,8 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.encounters import Conditions, play
-from steerclear.experiments.encounters.attack import N_GENES, Duel, Search, _Hunt, run_search
+from steerclear.experiments.encounters import play
+from steerclear.experiments.encounters.attack import N_GENES, Search, _Hunt, run_search
 from steerclear.experiments.encounters.outcomes import NO_VERDICT, SIDES, measure_chunk
 from steerclear.experiments.encounters.scene import read_scene, scenes_of
 from steerclear.shield.exceptions import ConfigError
@@ -30,7 +30,7 @@ def run(*arguments):
 
 @pytest.mark.parametrize(("own", "attackers", "own_boats"), [("heron", 1, 1), ("surveyor", 3, 2)])
 def test_no_attacker_starts_near_an_own_boat(own, attackers, own_boats):
-    duel = Duel(own, own, attackers, own_boats, Conditions(), 0, 0)
+    duel = Search(own, own, attackers, own_boats).duel()
     scenes = duel.scenes(np.random.default_rng(0).random((200, duel.genes)))
     assert duel.genes == attackers * N_GENES
     places = scenes.state[:, :, :2]

@@ -1,4 +1,4 @@
-"""Boats that never get to their goal: counted against the same boat without a guard; a livelock is told of."""
+"""Closed loops that were lost once: crowds, two rammers on the quarters, a livelock of team-mates."""
 
 import dataclasses
 
@@ -6,9 +6,55 @@ import numpy as np
 import pytest
 from steerclear.experiments.encounters import Conditions, draw, measure, play
 from steerclear.experiments.encounters.outcomes import never_arrived
+from steerclear.experiments.encounters.scene import join
+from steerclear.shield import Reason
+from steerclear.shield.platforms import layout as L
 
-USUAL = Conditions()
-NEVER = np.nan
+USUAL, NEVER, OWN = Conditions(), np.nan, 20
+QUARTERS = (173, 189, 253, 397, 403, 437, 480, 498, 503, 627)
+"""Encounters of a heron and two rammers, one on each quarter, that who takes them to hold their course loses."""
+
+
+def crowd_of(number):
+    return play(join([draw("crowd_40", "heron", "heron", USUAL, 0, number, 1)]), "shield", USUAL)
+
+
+def gaps_of(film):
+    """Distances of every own boat from every boat, (T+1, 20, 40) m, from itself inf."""
+    place = film.state[:, 0][:, :, [L.X, L.Y]]
+    gaps = np.linalg.norm(place[:, :OWN, None] - place[:, None], axis=-1)
+    gaps[:, range(OWN), range(OWN)] = np.inf
+    return gaps
+
+
+@pytest.mark.parametrize("number", [961, 962])
+def test_mates_that_passed_make_room_for_the_escape_another_has_held(number):
+    assert gaps_of(crowd_of(number))[..., :OWN].min() >= 2.5
+
+
+@pytest.mark.parametrize("number", [546, 572, 873])
+def test_a_boat_is_not_let_off_by_what_a_team_mate_far_away_cannot_keep(number):
+    """Three encounters with a hit by an opponent of a boat that had 2 m to spare a few seconds before."""
+    film = crowd_of(number)
+    assert gaps_of(film).min() >= 2.5
+    reason, told_m = film.reason[:, 0, :OWN], film.safety_margin_m[:, 0, :OWN]
+    both = (reason == Reason.BEST_EFFORT).any(axis=1, keepdims=True) & (reason == Reason.BACKUP)
+    assert both.any()  # some keep everything by their backup where others cannot
+    assert (told_m[both] >= 0.0).all()
+
+
+def closest_m(guard):
+    scenes = join([draw("rammer_2", "heron", "heron", USUAL, 0, number, 1) for number in QUARTERS])
+    place = play(scenes, guard, USUAL).state[..., [L.X, L.Y]]
+    return np.linalg.norm(place[:, :, :1] - place[:, :, 1:], axis=-1).min(axis=(0, 2))
+
+
+def test_two_that_close_in_from_both_quarters_are_seen_coming():
+    assert (closest_m("shield") >= 2.5).all()
+
+
+def test_who_takes_them_to_hold_their_course_loses_them():
+    assert (closest_m("shield:profile=hold-course") < 2.5).mean() >= 0.3
 
 
 @pytest.fixture(scope="module")
