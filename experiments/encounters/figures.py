@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.jit import BoolArray
 
 from ..statistics import upper_bound
 from .outcomes import SIDES, Columns
@@ -14,24 +14,35 @@ from .outcomes import SIDES, Columns
 QUANTILES = np.linspace(0.0, 1.0, 101)
 
 
+Of = Callable[[Columns], Any]
+
+
 class Figure(NamedTuple):
     """A figure of a cell, named here and nowhere else.
 
     Attributes:
-        key: in results.
-        meaning: what it is, in a sentence without a full stop.
-        of: from the columns of the cell's encounters to the figure.
+        key: in results; ``[]`` and ``.*`` tell of lists and mappings, as in the page of keys.
         label: words of the report's table; empty: it is not shown there.
+        of: from the columns of the cell's encounters to the figure.
+        meaning: what it is, in a sentence without a full stop.
     """
 
     key: str
+    label: str
+    of: Of
     meaning: str
-    of: Callable[[Columns], Any]
-    label: str = ""
+
+
+def _all(c: Columns) -> BoolArray:
+    return np.ones(len(c["closest_m"]), np.bool_)
 
 
 def _breached(c: Columns) -> BoolArray:
     return (c["breaches_teammate"] + c["breaches_opponent"]) > 0
+
+
+def _bare_breached(c: Columns) -> BoolArray:
+    return (c["unshielded_breaches_teammate"] + c["unshielded_breaches_opponent"]) > 0
 
 
 def _open(c: Columns) -> BoolArray:
@@ -48,15 +59,20 @@ def _outside(c: Columns) -> BoolArray:
     return np.asarray(c["start_certificate_m"] >= 0.0)
 
 
-def _count(mask: Array) -> int:
-    return int(mask.sum())
+def _count(mask: Callable[[Columns], BoolArray]) -> Of:
+    return lambda c: int(mask(c).sum())
 
 
-def _percent_of(column: str) -> Callable[[Columns], float]:
-    return lambda c: 100.0 * float(c[column].mean())
+def _upper(mask: Callable[[Columns], BoolArray], of: Callable[[Columns], BoolArray] = _all) -> Of:
+    """Upper limit of a probability, from how many of those there are."""
+    return lambda c: upper_bound(int(mask(c).sum()), int(of(c).sum()))
 
 
-def _mean_change(column: str) -> Callable[[Columns], float | None]:
+def _mean(column: str, times: float = 1.0) -> Of:
+    return lambda c: times * float(c[column].mean())
+
+
+def _mean_change(column: str) -> Of:
     """Mean over the changed steps of all encounters; None without any."""
 
     def mean(c: Columns) -> float | None:
@@ -66,165 +82,129 @@ def _mean_change(column: str) -> Callable[[Columns], float | None]:
     return mean
 
 
-def _ratio(part: str, whole: str, times: float) -> Callable[[Columns], float | None]:
+def _ratio(part: str, whole: str, times: float = 1.0) -> Of:
     """Of totals; None of nothing."""
     return lambda c: times * float(c[part].sum() / c[whole].sum()) if c[whole].sum() > 0.0 else None
 
 
-def _quantiles(column: str) -> Callable[[Columns], list[float]]:
+def _quantiles(column: str) -> Of:
     return lambda c: [float(value) for value in np.quantile(c[column], QUANTILES)]
 
 
-FIGURES = (
-    Figure("encounters", "encounters played", lambda c: len(c["closest_m"]), "n"),
-    Figure(
-        "breached",
-        "encounters in which an own boat came within the radius of any boat",
-        lambda c: _count(_breached(c)),
-        "breached",
-    ),
-    Figure(
-        "breached_upper",
-        "95 % upper limit of the probability of that (Clopper-Pearson, one-sided)",
-        lambda c: upper_bound(_count(_breached(c)), len(c["closest_m"])),
-    ),
-    Figure(
-        "unshielded_breached",
-        "the same scenes without a guard: how many were breached",
-        lambda c: _count(c["unshielded_breaches_teammate"] + c["unshielded_breaches_opponent"] > 0),
-    ),
-    Figure(
-        "avoidable",
-        "encounters with a breach that an own boat could have avoided, by the oracle",
-        lambda c: _count(c["avoidable"] > 0),
-        "avoidable",
-    ),
-    Figure(
-        "avoidable_upper",
-        "95 % upper limit of the probability of that; what was not judged counts as avoidable",
-        lambda c: upper_bound(_count((c["avoidable"] > 0) | _open(c)), len(c["closest_m"])),
-        "≤ at 95 %, %",
-    ),
-    Figure(
-        "unavoidable",
-        "encounters with breaches of which none was avoidable",
-        lambda c: _count(_settled(c) & (c["unavoidable"] > 0)),
-        "unavoidable",
-    ),
-    Figure(
-        "started_inside",
-        "encounters whose breaches were under way at the start",
-        lambda c: _count(_settled(c) & ~(c["unavoidable"] > 0)),
-    ),
-    Figure(
-        "not_judged",
-        "encounters with breaches that the oracle was not asked about, and no avoidable one",
-        lambda c: _count(_open(c)),
-    ),
-    Figure(
-        "responsible.*",
-        "encounters by whose command let the last chance pass: own, opponent, both, neither, start",
-        lambda c: {name: _count(c["responsible"] == k) for k, name in enumerate(SIDES)},
-    ),
-    Figure(
-        "started_outside",
-        "encounters in which the shield's certificate at the first decision was at least 0",
-        lambda c: _count(_outside(c)),
-    ),
-    Figure(
-        "breaches_outside",
-        "of those, how many were breached",
-        lambda c: _count(_breached(c) & _outside(c)),
-        "breached, started outside",
-    ),
-    Figure(
-        "breaches_outside_upper",
-        "95 % upper limit of the probability of that",
-        lambda c: upper_bound(_count(_breached(c) & _outside(c)), _count(_outside(c))),
-    ),
-    Figure(
-        "breaches_teammate",
-        "entries of two own boats into the radius, all encounters",
-        lambda c: _count(c["breaches_teammate"]),
-    ),
-    Figure(
-        "breaches_opponent",
-        "entries of an own boat and another, all encounters",
-        lambda c: _count(c["breaches_opponent"]),
-    ),
-    Figure("closest_m", "least distance of all encounters, m", lambda c: float(c["closest_m"].min()), "closest, m"),
-    Figure(
-        "closest_quantiles_m[]",
-        "quantiles 0, 0.01, ..., 1 of the closest distance of an encounter, m",
-        _quantiles("closest_m"),
-    ),
-    Figure("unshielded_closest_quantiles_m[]", "the same without a guard, m", _quantiles("unshielded_closest_m")),
-    Figure(
-        "changed_percent",
-        "share of the own boats' steps whose command was changed, %",
-        _percent_of("changed_share"),
-        "changed, %",
-    ),
-    Figure(
-        "inactive_percent",
-        "of sampled states that are safe by the value tables, how many commands pass, %",
-        _ratio("left_alone", "sampled_safe", 100.0),
-        "left alone when safe, %",
-    ),
-    Figure(
-        "heading_change_deg",
-        "mean change of the commanded heading over changed steps, deg",
-        _mean_change("heading_change_deg"),
-        "changed by, deg",
-    ),
-    Figure(
-        "speed_change_mps",
-        "mean change of the commanded speed over changed steps, m/s",
-        _mean_change("speed_change_mps"),
-        "changed by, m/s",
-    ),
-    Figure(
-        "goal_time_ratio",
-        "time to the first goal over that without a guard; never there counts as the whole length",
-        _ratio("goal_s", "unshielded_goal_s", 1.0),
-        "time to goal, ×",
-    ),
-    Figure("reached_percent", "own boats that reached their first goal, %", _percent_of("reached"), "goal reached, %"),
-    Figure(
-        "never_arrived_percent",
-        "own boats that had not reached their first goal by the end but do without a guard, %",
-        _percent_of("never_arrived"),
-        "never arrived, %",
-    ),
-    Figure(
-        "deadlocked",
-        "encounters in which two team-mates that want to move stood still for over 10 s",
-        lambda c: _count(c["deadlocks"] > 0),
-        "deadlocked",
-    ),
-    Figure(
-        "reversals_per_min",
-        "flips of the commanded side per own boat and minute",
-        lambda c: float(c["reversals_per_min"].mean()),
-        "reversals/min",
-    ),
-    Figure(
-        "unshielded_reversals_per_min",
-        "the same without a guard",
-        lambda c: float(c["unshielded_reversals_per_min"].mean()),
-    ),
-    Figure("outside_m", "how far an own boat left the field at most, m", lambda c: float(c["outside_m"].max())),
-    Figure(
-        "decision_us",
-        "median time of a decision per game and step, in batches, us",
-        lambda c: float(np.median(c["decision_us"])),
-        "decision, µs",
-    ),
-    Figure(
-        "decision_p999_us",
-        "99.9th percentile of the same, worst chunk, us",
-        lambda c: float(c["decision_p999_us"].max()),
-    ),
+def _responsible(c: Columns) -> dict[str, int]:
+    return {name: int((c["responsible"] == k).sum()) for k, name in enumerate(SIDES)}
+
+
+_UPPER = "95 % upper limit of the probability of that"
+_SAFE = "of sampled states that are safe by the value tables, how many commands pass, %"
+_TIME = "time to the first goal over that without a guard; never there counts as the whole length"
+_NEVER = "own boats that had not reached their first goal by the end but do without a guard, %"
+_DEAD = "encounters in which two team-mates that want to move stood still for over 10 s"
+_OPEN = "encounters with breaches that the oracle was not asked about, and no avoidable one"
+_WHO = "encounters by whose command let the last chance pass: own, opponent, both, neither, start"
+_NEAR = "quantiles 0, 0.01, ..., 1 of the closest distance of an encounter, m"
+_OUT = "encounters in which the shield's certificate at the first decision was at least 0"
+_AVOID = "encounters with a breach that an own boat could have avoided, by the oracle"
+FIGURES = tuple(
+    Figure(*row)
+    for row in (
+        ("encounters", "n", _count(_all), "encounters played"),
+        (
+            "breached",
+            "breached",
+            _count(_breached),
+            "encounters in which an own boat came within the radius of any boat",
+        ),
+        ("breached_upper", "", _upper(_breached), f"{_UPPER} (Clopper-Pearson, one-sided)"),
+        ("unshielded_breached", "", _count(_bare_breached), "the same scenes without a guard: how many were breached"),
+        ("avoidable", "avoidable", _count(lambda c: c["avoidable"] > 0), _AVOID),
+        (
+            "avoidable_upper",
+            "≤ at 95 %, %",
+            _upper(lambda c: (c["avoidable"] > 0) | _open(c)),
+            f"{_UPPER}; what was not judged counts as avoidable",
+        ),
+        (
+            "unavoidable",
+            "unavoidable",
+            _count(lambda c: _settled(c) & (c["unavoidable"] > 0)),
+            "encounters with breaches of which none was avoidable",
+        ),
+        (
+            "started_inside",
+            "",
+            _count(lambda c: _settled(c) & ~(c["unavoidable"] > 0)),
+            "encounters whose breaches were under way at the start",
+        ),
+        ("not_judged", "", _count(_open), _OPEN),
+        ("responsible.*", "", _responsible, _WHO),
+        ("started_outside", "", _count(_outside), _OUT),
+        (
+            "breaches_outside",
+            "breached, started outside",
+            _count(lambda c: _breached(c) & _outside(c)),
+            "of those, how many were breached",
+        ),
+        ("breaches_outside_upper", "", _upper(lambda c: _breached(c) & _outside(c), _outside), _UPPER),
+        (
+            "breaches_teammate",
+            "",
+            _count(lambda c: c["breaches_teammate"]),
+            "entries of two own boats into the radius, all encounters",
+        ),
+        (
+            "breaches_opponent",
+            "",
+            _count(lambda c: c["breaches_opponent"]),
+            "entries of an own boat and another, all encounters",
+        ),
+        ("closest_m", "closest, m", lambda c: float(c["closest_m"].min()), "least distance of all encounters, m"),
+        ("closest_quantiles_m[]", "", _quantiles("closest_m"), _NEAR),
+        ("unshielded_closest_quantiles_m[]", "", _quantiles("unshielded_closest_m"), "the same without a guard, m"),
+        (
+            "changed_percent",
+            "changed, %",
+            _mean("changed_share", 100.0),
+            "share of the own boats' steps whose command was changed, %",
+        ),
+        ("inactive_percent", "left alone when safe, %", _ratio("left_alone", "sampled_safe", 100.0), _SAFE),
+        (
+            "heading_change_deg",
+            "changed by, deg",
+            _mean_change("heading_change_deg"),
+            "mean change of the commanded heading over changed steps, deg",
+        ),
+        (
+            "speed_change_mps",
+            "changed by, m/s",
+            _mean_change("speed_change_mps"),
+            "mean change of the commanded speed over changed steps, m/s",
+        ),
+        ("goal_time_ratio", "time to goal, ×", _ratio("goal_s", "unshielded_goal_s"), _TIME),
+        ("reached_percent", "goal reached, %", _mean("reached", 100.0), "own boats that reached their first goal, %"),
+        ("never_arrived_percent", "never arrived, %", _mean("never_arrived", 100.0), _NEVER),
+        ("deadlocked", "deadlocked", _count(lambda c: c["deadlocks"] > 0), _DEAD),
+        (
+            "reversals_per_min",
+            "reversals/min",
+            _mean("reversals_per_min"),
+            "flips of the commanded side per own boat and minute",
+        ),
+        ("unshielded_reversals_per_min", "", _mean("unshielded_reversals_per_min"), "the same without a guard"),
+        ("outside_m", "", lambda c: float(c["outside_m"].max()), "how far an own boat left the field at most, m"),
+        (
+            "decision_us",
+            "decision, µs",
+            lambda c: float(np.median(c["decision_us"])),
+            "median time of a decision per game and step, in batches, us",
+        ),
+        (
+            "decision_p999_us",
+            "",
+            lambda c: float(c["decision_p999_us"].max()),
+            "99.9th percentile of the same, worst chunk, us",
+        ),
+    )
 )
 
 

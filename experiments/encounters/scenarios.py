@@ -41,7 +41,7 @@ def onwards(build: SceneBuilder, way_m: float) -> tuple[Point, Point]:
 
 
 def head_on(build: SceneBuilder) -> None:
-    """Two boats on nearly opposite courses."""
+    """The two meet on nearly opposite courses, some widths to the side."""
     gap, share = build.range_m(), build.uniform(0.6, 1.0)
     way = onwards(build, gap + 10.0 * build.scale)
     build.add_own(0.0, 0.0, build.uniform(-5.0, 5.0), build.uniform(0.6, 1.0), *way)
@@ -281,21 +281,26 @@ class Family:
 
     Attributes:
         name: of the family.
-        words: what happens in it, a sentence.
         others: how many boats the own team does not command.
-        build: puts the boats of one encounter into a builder.
+        build: puts the boats of one encounter into a builder; its docstring says what happens, where no words do.
         numbers: what ``build`` takes beside it.
         field_for: number of boats that its field is made for; 0 is open water.
         lasts: how many times as long as others it lasts.
+        told: what happens in it, a sentence.
     """
 
     name: str
-    words: str
     others: int
     build: Callable[..., None]
     numbers: tuple[float, ...] = ()
     field_for: int = 0
     lasts: float = 1.0
+    told: str = ""
+
+    @property
+    def words(self) -> str:
+        """What happens in it, a sentence."""
+        return self.told or (self.build.__doc__ or self.name).splitlines()[0]
 
     def field_of(self, build: SceneBuilder) -> Box | None:
         """The field of an encounter, None for open water."""
@@ -303,79 +308,36 @@ class Family:
 
 
 _LEFT = "The other comes from the left to the place where the own boat will be, give or take a second or two."
-_TURN = "The other passes at a few radii and turns hard at some moment, to some side: every one tried is a game."
-_REST = "One rammer, at times from far away, against a boat that lies still and wants to stay for a while."
-_CORNER = "The own boat goes into a corner of the field and out again; the other comes to the same place, straight."
+_ROUND = "team-mates all round a circle, each on its way to the opposite point."
 FAMILIES: dict[str, Family] = {
     family.name: family
     for family in (
-        Family("head_on", "The two meet on nearly opposite courses, some widths to the side.", 1, head_on),
-        Family("crossing_left", _LEFT, 1, crossing, (1.0,)),
-        Family("crossing_right", "The other comes from the right.", 1, crossing, (-1.0,)),
-        Family("overtaking", "The own boat comes up behind a slower one.", 1, overtaking),
-        Family("converging_2", "Two team-mates.", 0, converging, (2,)),
-        Family("converging_3", "Three team-mates.", 0, converging, (3,)),
-        Family(
-            "circle_3",
-            "Three team-mates all round a circle, each on its way to the opposite point.",
-            0,
-            circle,
-            (3,),
-            0,
-            2.0,
-        ),
-        Family(
-            "circle_6",
-            "Six team-mates all round a circle, each on its way to the opposite point.",
-            0,
-            circle,
-            (6,),
-            0,
-            2.0,
-        ),
-        Family(
-            "doorway",
-            "Two others lie before the flag; one own boat goes in between them, one comes out.",
-            2,
-            doorway,
-            (),
-            4,
-        ),
-        Family(
-            "cluster", "Others lie still in the way, some of them too close together to pass between.", CLUSTER, cluster
-        ),
-        Family("corner", _CORNER, 1, corner, (), 2),
-        Family("sudden_turn", _TURN, 1, sudden_turn),
-        Family("rammer_1", "One rammer against one boat.", 1, rammers, (1, 1)),
-        Family("at_rest", _REST, 1, at_rest),
-        Family("rammer_2", "Two rammers against one boat.", 2, rammers, (1, 2)),
-        Family("rammer_3", "Three rammers against one boat.", 3, rammers, (1, 3)),
-        Family("rammer_3v3", "Three rammers against three boats.", 3, rammers, (3, 3)),
-        Family("crowd_6", "Three against three.", 3, crowd, (3, 3), 6),
-        Family("crowd_12", "Six against six.", 6, crowd, (6, 6), 12),
-        Family("crowd_40", "Twenty against twenty.", 20, crowd, (20, 20), 40),
-        Family("crowd_40_own", "Forty team-mates.", 0, crowd, (40, 0), 40),
-        Family(
-            "pursued_along_edge",
-            "A boat goes along an edge of its field, a pursuer behind it.",
-            1,
-            pursued_along_edge,
-            (),
-            2,
-            2.7,
-        ),
-        Family(
-            "pursued_into_corner",
-            "A boat is on its way into a corner of its field, a pursuer behind it.",
-            1,
-            pursued_into_corner,
-            (),
-            2,
-            2.7,
-        ),
-        Family("chased_in_box", "One pursuer chases a boat about its field.", 1, chased, (1,), 2, 2.7),
-        Family("chased_in_box_2", "Two pursuers chase a boat about its field.", 2, chased, (2,), 3, 2.7),
-        Family("chased_in_box_3", "Three pursuers chase a boat about its field.", 3, chased, (3,), 4, 2.7),
+        Family("head_on", 1, head_on),
+        Family("crossing_left", 1, crossing, (1.0,), told=_LEFT),
+        Family("crossing_right", 1, crossing, (-1.0,), told="The other comes from the right."),
+        Family("overtaking", 1, overtaking),
+        Family("converging_2", 0, converging, (2,), told="Two team-mates."),
+        Family("converging_3", 0, converging, (3,), told="Three team-mates."),
+        Family("circle_3", 0, circle, (3,), lasts=2.0, told=f"Three {_ROUND}"),
+        Family("circle_6", 0, circle, (6,), lasts=2.0, told=f"Six {_ROUND}"),
+        Family("doorway", 2, doorway, field_for=4),
+        Family("cluster", CLUSTER, cluster),
+        Family("corner", 1, corner, field_for=2),
+        Family("sudden_turn", 1, sudden_turn),
+        Family("rammer_1", 1, rammers, (1, 1), told="One rammer against one boat."),
+        Family("at_rest", 1, at_rest),
+        Family("rammer_2", 2, rammers, (1, 2), told="Two rammers against one boat."),
+        Family("rammer_3", 3, rammers, (1, 3), told="Three rammers against one boat."),
+        Family("rammer_3v3", 3, rammers, (3, 3), told="Three rammers against three boats."),
+        Family("crowd_6", 3, crowd, (3, 3), 6, told="Three against three."),
+        Family("crowd_12", 6, crowd, (6, 6), 12, told="Six against six."),
+        Family("crowd_40", 20, crowd, (20, 20), 40, told="Twenty against twenty."),
+        Family("crowd_40_own", 0, crowd, (40, 0), 40, told="Forty team-mates."),
+        Family("pursued_along_edge", 1, pursued_along_edge, (), 2, 2.7),
+        Family("pursued_into_corner", 1, pursued_into_corner, (), 2, 2.7),
+        Family("chased_in_box", 1, chased, (1,), 2, 2.7, "One pursuer chases a boat about its field."),
+        Family("chased_in_box_2", 2, chased, (2,), 3, 2.7, "Two pursuers chase a boat about its field."),
+        Family("chased_in_box_3", 3, chased, (3,), 4, 2.7, "Three pursuers chase a boat about its field."),
     )
 }
 
