@@ -16,7 +16,7 @@ from typing import Any
 from warnings import warn
 
 from ..baselines.registry import build_guard, parse_guards
-from .results import Outcome, measure
+from .figures import Outcome, measure
 from .scenarios import FAMILIES, draw, get_family
 from .scene import DT_S, Conditions, Scenes
 from .simulate import Trajectory, play

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import BoolArray
 
+from ..baselines.registry import SHIELD, GuardMaker
 from ..statistics import upper_bound
-from .outcomes import SIDES, Columns
+from .outcomes import SIDES, Columns, chunk_size, measure_chunk
+from .scenarios import draw
+from .scene import Conditions
 
 QUANTILES = np.linspace(0.0, 1.0, 101)
 
@@ -211,6 +216,59 @@ FIGURES = tuple(
 def summarise(columns: Columns) -> dict[str, Any]:
     """Figures over encounters, JSON-ready."""
     return {one.key.removesuffix("[]").removesuffix(".*"): one.of(columns) for one in FIGURES}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of n encounters.
+
+    Attributes:
+        columns: arrays (n,) by name: see `outcomes.measure_chunk`.
+        summary: `FIGURES` over all of them.
+    """
+
+    columns: Columns
+    summary: dict[str, Any]
+
+
+def measure(
+    family: str,
+    guard: str | GuardMaker = SHIELD,
+    own: str = "heron",
+    other: str = "heron",
+    n: int = 200,
+    seed: int = 0,
+    conditions: Conditions | None = None,
+    judge: bool = True,
+    first: int = 0,
+) -> Outcome:
+    """Play encounters in this process.
+
+    Args:
+        family: name of the family.
+        guard: a name (see `baselines.registry`) or what makes a guard from (config, games, platforms, team,
+            surroundings).
+        own: platform of the own boats.
+        other: platform of the others.
+        n: how many encounters.
+        seed: of the scenes.
+        conditions: radius, delay, noise, current.
+        judge: ask the post-hoc analysis about breaches (seconds each); without, they count as not judged.
+        first: number of the first encounter.
+
+    Raises:
+        SteerclearError: bad input.
+    """
+    if n < 1:
+        raise ConfigError(f"the number of encounters is {n}; ask for at least 1")
+    asked = conditions or Conditions()
+    size = chunk_size(family, own, other, asked, seed, first)
+    parts = [
+        measure_chunk(draw(family, own, other, asked, seed, k, min(size, first + n - k)), guard, asked, judge)
+        for k in range(first, first + n, size)
+    ]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return Outcome(columns, summarise(columns))
 
 
 WORST = {

@@ -10,7 +10,7 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-from ..baselines.registry import NONE, SHIELD, GuardMaker, check_guard, is_shield
+from ..baselines.registry import NONE, check_guard, is_shield
 from ..metrics import judged
 from ..play.spec import check_seed
 from ..result_files import table_name
@@ -31,19 +31,6 @@ UNAVOIDABLE_PERCENT = 1.0
 MOST_WORST = 10
 FAR_M = 1e4
 """A safety margin beyond this, m, says that nobody is near."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What came of n encounters.
-
-    Attributes:
-        columns: arrays (n,) by name: see `outcomes.measure_chunk`.
-        summary: `figures.FIGURES` over all of them.
-    """
-
-    columns: Columns
-    summary: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -116,46 +103,6 @@ def play_job(job: Job) -> list[Row]:
     columns = measure_chunk(scenes, cell.guard, conditions, job["judge"])
     names = asdict(cell)
     return [{**names, **dict(zip(columns, values, strict=True))} for values in np.array([*columns.values()]).T.tolist()]
-
-
-def measure(
-    family: str,
-    guard: str | GuardMaker = SHIELD,
-    own: str = "heron",
-    other: str = "heron",
-    n: int = 200,
-    seed: int = 0,
-    conditions: Conditions | None = None,
-    judge: bool = True,
-    first: int = 0,
-) -> Outcome:
-    """Play encounters in this process.
-
-    Args:
-        family: name of the family.
-        guard: a name (see `baselines.registry`) or what makes a guard from (config, games, platforms, team,
-            surroundings).
-        own: platform of the own boats.
-        other: platform of the others.
-        n: how many encounters.
-        seed: of the scenes.
-        conditions: radius, delay, noise, current.
-        judge: ask the post-hoc analysis about breaches (seconds each); without, they count as not judged.
-        first: number of the first encounter.
-
-    Raises:
-        SteerclearError: bad input.
-    """
-    if n < 1:
-        raise ConfigError(f"the number of encounters is {n}; ask for at least 1")
-    asked = conditions or Conditions()
-    size = chunk_size(family, own, other, asked, seed, first)
-    parts = [
-        measure_chunk(draw(family, own, other, asked, seed, k, min(size, first + n - k)), guard, asked, judge)
-        for k in range(first, first + n, size)
-    ]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Outcome(columns, summarise(columns))
 
 
 def columns_of(rows: Sequence[Row]) -> dict[Cell, Columns]:
