@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+from steerclear.experiments import encounters
 from steerclear.experiments.baselines.registry import NoGuard, build_guard, parse_guards, split_name
 from steerclear.experiments.encounters import DT_S, Conditions, draw, play
 from steerclear.experiments.encounters import script as S
@@ -161,3 +162,14 @@ def test_guards_by_name():
     assert isinstance(shield, BatchedShield)
     kept = shield.config
     assert (kept.separation_m, kept.position_error_m, kept.buffer_m) == (4.0, 0.3, 0.2)
+
+
+def test_names_until_0_8_0_warn_and_give_the_same():
+    played = play(short(draw("head_on", "heron", "heron", USUAL, 0, 0, 1), 0.1), "none", USUAL)
+    with pytest.warns(DeprecationWarning, match="Film is called Trajectory"):
+        assert encounters.Film is encounters.Trajectory
+    for old, new in (("wanted", "nominal"), ("sent", "filtered"), ("certificate_m", "safety_margin_m")):
+        with pytest.warns(DeprecationWarning, match=f"{old} of a trajectory is called {new}"):
+            assert getattr(played, old) is getattr(played, new)
+    with pytest.raises(AttributeError, match="no 'told'"):
+        _ = played.told
