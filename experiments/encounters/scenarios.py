@@ -282,11 +282,11 @@ class Family:
     Attributes:
         name: of the family.
         others: how many boats the own team does not command.
-        build: puts the boats of one encounter into a builder; its docstring says what happens, where no words do.
+        build: puts the boats of one encounter into a builder.
         numbers: what ``build`` takes beside it.
         field_for: number of boats that its field is made for; 0 is open water.
         lasts: how many times as long as others it lasts.
-        told: what happens in it, a sentence.
+        sentence: what happens in it; empty: the first line of the docstring of ``build``.
     """
 
     name: str
@@ -295,12 +295,12 @@ class Family:
     numbers: tuple[float, ...] = ()
     field_for: int = 0
     lasts: float = 1.0
-    told: str = ""
+    sentence: str = ""
 
     @property
     def words(self) -> str:
         """What happens in it, a sentence."""
-        return self.told or (self.build.__doc__ or self.name).splitlines()[0]
+        return self.sentence or (self.build.__doc__ or self.name).splitlines()[0]
 
     def field_of(self, build: SceneBuilder) -> Box | None:
         """The field of an encounter, None for open water."""
@@ -313,26 +313,26 @@ FAMILIES: dict[str, Family] = {
     family.name: family
     for family in (
         Family("head_on", 1, head_on),
-        Family("crossing_left", 1, crossing, (1.0,), told=_LEFT),
-        Family("crossing_right", 1, crossing, (-1.0,), told="The other comes from the right."),
+        Family("crossing_left", 1, crossing, (1.0,), sentence=_LEFT),
+        Family("crossing_right", 1, crossing, (-1.0,), sentence="The other comes from the right."),
         Family("overtaking", 1, overtaking),
-        Family("converging_2", 0, converging, (2,), told="Two team-mates."),
-        Family("converging_3", 0, converging, (3,), told="Three team-mates."),
-        Family("circle_3", 0, circle, (3,), lasts=2.0, told=f"Three {_ROUND}"),
-        Family("circle_6", 0, circle, (6,), lasts=2.0, told=f"Six {_ROUND}"),
+        Family("converging_2", 0, converging, (2,), sentence="Two team-mates."),
+        Family("converging_3", 0, converging, (3,), sentence="Three team-mates."),
+        Family("circle_3", 0, circle, (3,), lasts=2.0, sentence=f"Three {_ROUND}"),
+        Family("circle_6", 0, circle, (6,), lasts=2.0, sentence=f"Six {_ROUND}"),
         Family("doorway", 2, doorway, field_for=4),
         Family("cluster", CLUSTER, cluster),
         Family("corner", 1, corner, field_for=2),
         Family("sudden_turn", 1, sudden_turn),
-        Family("rammer_1", 1, rammers, (1, 1), told="One rammer against one boat."),
+        Family("rammer_1", 1, rammers, (1, 1), sentence="One rammer against one boat."),
         Family("at_rest", 1, at_rest),
-        Family("rammer_2", 2, rammers, (1, 2), told="Two rammers against one boat."),
-        Family("rammer_3", 3, rammers, (1, 3), told="Three rammers against one boat."),
-        Family("rammer_3v3", 3, rammers, (3, 3), told="Three rammers against three boats."),
-        Family("crowd_6", 3, crowd, (3, 3), 6, told="Three against three."),
-        Family("crowd_12", 6, crowd, (6, 6), 12, told="Six against six."),
-        Family("crowd_40", 20, crowd, (20, 20), 40, told="Twenty against twenty."),
-        Family("crowd_40_own", 0, crowd, (40, 0), 40, told="Forty team-mates."),
+        Family("rammer_2", 2, rammers, (1, 2), sentence="Two rammers against one boat."),
+        Family("rammer_3", 3, rammers, (1, 3), sentence="Three rammers against one boat."),
+        Family("rammer_3v3", 3, rammers, (3, 3), sentence="Three rammers against three boats."),
+        Family("crowd_6", 3, crowd, (3, 3), 6, sentence="Three against three."),
+        Family("crowd_12", 6, crowd, (6, 6), 12, sentence="Six against six."),
+        Family("crowd_40", 20, crowd, (20, 20), 40, sentence="Twenty against twenty."),
+        Family("crowd_40_own", 0, crowd, (40, 0), 40, sentence="Forty team-mates."),
         Family("pursued_along_edge", 1, pursued_along_edge, (), 2, 2.7),
         Family("pursued_into_corner", 1, pursued_into_corner, (), 2, 2.7),
         Family("chased_in_box", 1, chased, (1,), 2, 2.7, "One pursuer chases a boat about its field."),

@@ -231,7 +231,9 @@ def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions
     Raises:
         SteerclearError: the guard cannot be made, or what it sends is not finite.
     """
-    keeper = build_guard(guard, scenes, conditions) if isinstance(guard, str) or not hasattr(guard, "decide") else guard
+    safety_filter = (
+        build_guard(guard, scenes, conditions) if isinstance(guard, str) or not hasattr(guard, "decide") else guard
+    )
     world, steps, shape = _world(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
     ours = np.broadcast_to(scenes.own, shape).copy()
     played = Trajectory(
@@ -251,14 +253,14 @@ def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions
         observe(world.state, world.error, world.seeds, conditions.noise_m, step == 0, DT_S, world.seen)
         want(world, step * DT_S, nominal)
         started = time.perf_counter()
-        answer = keeper.decide(world.seen, nominal, ours)
+        answer = safety_filter.decide(world.seen, nominal, ours)
         played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
         filtered[:] = nominal
         np.copyto(filtered, answer, where=ours[..., None])
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
             raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
-        played.reason[step], played.safety_margin_m[step] = keeper.reason, keeper.certificate_m
+        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.certificate_m
         move(world, filtered, step)
         played.state[step + 1] = world.state
     return played
