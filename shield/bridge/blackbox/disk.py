@@ -294,7 +294,7 @@ class _TlogFile:
         self._disk.close()
 
 
-class TlogWriter:
+class TlogWriter(AsyncWriter[tuple[str, bytes, int]]):
     """Writes packets of one endpoint as `mavlogdump.py` and ground stations read them; hand `on_bytes` to it.
 
     Args:
@@ -311,8 +311,7 @@ class TlogWriter:
         self, path: Path, *, flush_s: float = 0.5, capacity: int = 20_000, open_disk: Callable[[Path], Disk] = Disk
     ) -> None:
         self.path = path
-        file = _TlogFile(open_disk(path))
-        self._writer = AsyncWriter(path.name, file, capacity=capacity, flush_s=flush_s)
+        super().__init__(path.name, _TlogFile(open_disk(path)), capacity=capacity, flush_s=flush_s)
 
     def on_bytes(self, direction: str, raw: bytes, unix_us: int) -> None:
         """Take a whole frame as it came or went; never waits, never raises.
@@ -322,24 +321,8 @@ class TlogWriter:
             raw: the frame.
             unix_us: time, microseconds since 1970.
         """
-        try:
-            self._writer.put((direction, bytes(raw), unix_us))
-        except BridgeError:
-            return  # said once in the log by the writer; the black box is the one that makes the loop fall back
-
-    @property
-    def fault(self) -> str:
-        """Why nothing is written any more; empty while all is well."""
-        return self._writer.fault
-
-    @property
-    def dropped(self) -> int:
-        """Packets dropped because the disk was too slow."""
-        return self._writer.dropped
-
-    def close(self) -> None:
-        """Complete the file."""
-        self._writer.close()
+        with contextlib.suppress(BridgeError):  # said once by the writer; the black box makes the loop fall back
+            self.put((direction, bytes(raw), unix_us))
 
 
 def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = "disk") -> CheckResult:

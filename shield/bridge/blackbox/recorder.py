@@ -177,7 +177,7 @@ class McapFile:
         return self._channels[topic]
 
 
-class McapWriter:
+class McapWriter(AsyncWriter[Tick | tuple[int, str, str]]):
     """Keeps ticks in an MCAP file, at most ``flush_s`` and the disk's own delay behind.
 
     The header is on the disk when this returns. A log proves the shield's decisions from the first tick that was
@@ -215,10 +215,8 @@ class McapWriter:
         except OSError as error:
             disk.close()
             raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
-        self._writer: AsyncWriter[Tick | tuple[int, str, str]] = AsyncWriter(
-            path.name, file, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s
-        )
-        file.dropped = lambda: self._writer.dropped
+        file.dropped = lambda: self.dropped
+        super().__init__(path.name, file, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s)
 
     def take(self, tick: Tick) -> None:
         """Keep a tick; never waits. Its arrays may be changed afterwards, its mappings may not.
@@ -226,7 +224,7 @@ class McapWriter:
         Raises:
             BridgeError: ticks can no longer be kept; the text says why and what to do.
         """
-        self._writer.put(_snapshot(tick))
+        self.put(_snapshot(tick))
 
     def note(self, text: str, *, name: str = "steerclear", warning: bool = False) -> None:
         """Keep a line of text at the time of the last tick.
@@ -234,31 +232,7 @@ class McapWriter:
         Raises:
             BridgeError: as `take`.
         """
-        self._writer.put((fg.WARNING if warning else fg.INFO, name, text))
-
-    def close(self) -> None:
-        """Write what waits and the index; what went wrong is in ``fault``."""
-        self._writer.close()
-
-    @property
-    def fault(self) -> str:
-        """Why nothing is written any more; empty while all is well."""
-        return self._writer.fault
-
-    @property
-    def dropped(self) -> int:
-        """Ticks that were dropped because the disk was too slow."""
-        return self._writer.dropped
-
-    @property
-    def behind_s(self) -> float:
-        """How far the disk is behind, s."""
-        return self._writer.behind_s
-
-    @property
-    def waiting(self) -> int:
-        """Ticks not yet written."""
-        return self._writer.waiting
+        self.put((fg.WARNING if warning else fg.INFO, name, text))
 
 
 def log_path(folder: Path, ending: str, unix_s: float | None = None, name: str = "steerclear") -> Path:

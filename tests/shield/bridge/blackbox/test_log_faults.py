@@ -273,7 +273,7 @@ def test_closing_does_not_wait_for_ever(tmp_path, ticks):
     writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.02, open_disk=opened(StuckDisk, found))
     found[0].free.clear()
     writer.take(ticks[0])
-    writer._writer.close(timeout_s=0.2)
+    writer.close(timeout_s=0.2)
     assert "could not be completed within 0.2 s" in writer.fault
     found[0].free.set()
     until(lambda: not any(thread.name == "log run.mcap" for thread in threading.enumerate()))
