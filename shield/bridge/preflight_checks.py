@@ -9,6 +9,8 @@ import logging
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -53,6 +55,32 @@ class Check:
 
     name: str
     run: Callable[[], CheckResult]
+
+
+Found = tuple[bool, str, Mapping[str, float]]
+"""What a check of one boat found: whether it passed, the line, the figures."""
+Seen = TypeVar("Seen")
+
+
+def checks_by_kind(
+    kinds: Mapping[str, Callable[[Seen], Found]], boats: Iterable[str], look: Callable[[str], Seen]
+) -> list[Check]:
+    """A check of each kind for each boat, named ``kind:boat``.
+
+    Args:
+        kinds: what each looks for.
+        boats: names.
+        look: what is looked at of a boat; called when its checks are run.
+    """
+
+    def run(name: str, check: Callable[[Seen], Found], boat: str) -> CheckResult:
+        return CheckResult(name, *check(look(boat)))
+
+    return [
+        Check(f"{kind}:{boat}", partial(run, f"{kind}:{boat}", check, boat))
+        for boat in boats
+        for kind, check in kinds.items()
+    ]
 
 
 def run_check(check: Check) -> CheckResult:

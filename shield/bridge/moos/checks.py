@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 from ..clock import MonotonicClock
 from ..fleet_file import FleetFile
 from ..fleet_settings import MoosLinkSettings
 from ..link_checks import LONGEST_TRIP_S, OLDEST_S, WATCH_S, Watch, check_spread
 from ..messages import BoatReading
-from ..preflight_checks import Check, CheckResult
+from ..preflight_checks import Check, Found, checks_by_kind
 from .client import Health
 from .mission import LONGEST_S, PIDS, SIMULATORS, Mission, mission_faults, number, parse_mission
 from .nav import REFUSED
@@ -53,26 +52,16 @@ def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float 
     """
     watch = Watch(links, MonotonicClock(), seconds)
 
-    def run(name: str, check: _Kind, link: MoosLink) -> CheckResult:
-        settings = fleet.boat(link.boat).link
+    def look(boat: str) -> Watched:
+        settings = fleet.boat(boat).link
         if not isinstance(settings, MoosLinkSettings):
-            raise TypeError(f"boat {link.boat} has no link of MOOS")
-        watched = Watched(link, watch.readings(link.boat), watch.health(link.boat), fleet, settings)
-        passed, text, figures = check(watched)
-        return CheckResult(name, passed, text, figures)
+            raise TypeError(f"boat {boat} has no link of MOOS")
+        return Watched(links[boat], watch.readings(boat), watch.health(boat), fleet, settings)
 
-    return [
-        Check(f"{kind}:{boat}", partial(run, f"{kind}:{boat}", check, link))
-        for boat, link in links.items()
-        for kind, check in KINDS.items()
-    ]
+    return checks_by_kind(KINDS, links, look)
 
 
-_Found = tuple[bool, str, Mapping[str, float]]
-_Kind = Callable[[Watched], _Found]
-
-
-def check_moosdb(watched: Watched) -> _Found:
+def check_moosdb(watched: Watched) -> Found:
     """The MOOSDB answers quickly, is the one of this boat, and took no damage."""
     health, warp = watched.health, watched.link.client.warp
     figures = {"round_trip_s": health.round_trip_s, "sessions": float(health.sessions), "warp": warp}
@@ -87,7 +76,7 @@ def check_moosdb(watched: Watched) -> _Found:
     return True, f"community {health.community}, warp {warp:g}, round trip {1e3 * health.round_trip_s:.1f} ms", figures
 
 
-def check_rates(watched: Watched) -> _Found:
+def check_rates(watched: Watched) -> Found:
     """NAV_* arrive, never late, and none is refused."""
     readings = watched.readings
     oldest = max((reading.age_s for reading in readings), default=math.inf)
@@ -104,7 +93,7 @@ def check_rates(watched: Watched) -> _Found:
     return True, f"NAV_* never older than {oldest:.2f} s", figures
 
 
-def check_grid(watched: Watched) -> _Found:
+def check_grid(watched: Watched) -> Found:
     """NAV_X and NAV_Y, by the file's corner, are where NAV_LAT and NAV_LONG are, by its origin."""
     place, position = watched.link.place_deg(), watched.readings[-1].position_m
     if place is None:
@@ -120,7 +109,7 @@ def check_grid(watched: Watched) -> _Found:
     return True, f"local grid and geodetic position agree within {apart:.1f} m", {"apart_m": apart}
 
 
-def check_commanders(watched: Watched) -> _Found:
+def check_commanders(watched: Watched) -> Found:
     """Nobody else writes what our gate writes, and its variables are numbers."""
     link = watched.link
     (other, seen_s), outputs = link.other_commander(), " and ".join(link.gate.outputs)
@@ -133,7 +122,7 @@ def check_commanders(watched: Watched) -> _Found:
     return True, f"{text}; nobody else writes {outputs}", {}
 
 
-def check_mission(watched: Watched) -> _Found:
+def check_mission(watched: Watched) -> Found:
     """The boat's .moos file stops a boat whose gate died, and lets nobody past it."""
     settings, link = watched.settings, watched.link
     if settings.mission is None:
@@ -148,7 +137,7 @@ def check_mission(watched: Watched) -> _Found:
     return not faults, "; ".join(faults) or "prefix, ticks, thresholds and gains fit", {}
 
 
-def check_stop(watched: Watched) -> _Found:
+def check_stop(watched: Watched) -> Found:
     """What is behind the gate when it dies, and after how long that stops the boat."""
     settings, mission = watched.settings, watched.mission()
     if settings.gate == "helm":
@@ -168,15 +157,10 @@ def check_stop(watched: Watched) -> _Found:
     return True, f"{text}; keep something at hand that cuts its power", {"stop_s": math.inf}
 
 
-def _spread(watched: Watched) -> _Found:
-    found = check_spread(watched.link.boat, watched.readings)
-    return found.passed, found.text, found.figures
-
-
-KINDS: Mapping[str, _Kind] = {
+KINDS: Mapping[str, Callable[[Watched], Found]] = {
     "moosdb": check_moosdb,
     "rates": check_rates,
-    "spread": _spread,
+    "spread": check_spread,
     "grid": check_grid,
     "commanders": check_commanders,
     "mission": check_mission,

@@ -8,6 +8,7 @@ import pytest
 from steerclear.shield.bridge.autopilot_parameters import ASKED
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.link_checks import (
+    Watched,
     check_autopilot,
     check_clock,
     check_commanders,
@@ -18,7 +19,7 @@ from steerclear.shield.bridge.link_checks import (
 )
 from steerclear.shield.bridge.mavlink.vehicle import LinkHealth
 from steerclear.shield.bridge.messages import BoatReading
-from steerclear.shield.bridge.preflight_checks import run_checks
+from steerclear.shield.bridge.preflight_checks import CheckResult, run_checks
 from steerclear.shield.platforms import get_platform
 
 HERON = get_platform("heron")
@@ -60,6 +61,10 @@ def readings(count=100, *, spread_m=0.03, speed=0.0, age=0.05, faults=None, seed
         )
         for i in range(count)
     ]
+
+
+def found(check, health=GOOD, said=()):
+    return CheckResult("", *check(Watched("blue_1", said, health, HERON, 100.0)))
 
 
 class FakeLink:
@@ -110,24 +115,24 @@ def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
     ],
 )
 def test_rates(said, changes, words):
-    result = check_rates("blue_1", readings(**said), replace(GOOD, **changes))
+    result = found(check_rates, replace(GOOD, **changes), readings(**said))
     assert not result.passed
     assert words in result.text
 
 
 def test_repeats_and_disorder_are_no_reason_not_to_start():
-    assert check_rates("blue_1", readings(faults={"duplicate": 4, "out_of_order": 2}), GOOD).passed
+    assert found(check_rates, GOOD, readings(faults={"duplicate": 4, "out_of_order": 2})).passed
 
 
 def test_latency():
-    assert check_latency("blue_1", GOOD).figures["round_trip_median_s"] == pytest.approx(0.04)
-    slow = check_latency("blue_1", replace(GOOD, round_trips_s=(0.05,) * 18 + (0.9,) * 4))
+    assert found(check_latency, GOOD).figures["round_trip_median_s"] == pytest.approx(0.04)
+    slow = found(check_latency, replace(GOOD, round_trips_s=(0.05,) * 18 + (0.9,) * 4))
     assert not slow.passed
     assert "0.90 s (95 of 100), more than 0.2 s" in slow.text
-    silent = check_latency("blue_1", replace(GOOD, round_trips_s=()))
+    silent = found(check_latency, replace(GOOD, round_trips_s=()))
     assert not silent.passed
     assert "answers no TIMESYNC" in silent.text
-    assert not check_latency("blue_1", replace(GOOD, round_trips_s=(math.nan,) * 3)).passed
+    assert not found(check_latency, replace(GOOD, round_trips_s=(math.nan,) * 3)).passed
 
 
 @pytest.mark.parametrize(
@@ -139,27 +144,27 @@ def test_latency():
     ],
 )
 def test_clock(changes, words):
-    result = check_clock("blue_1", replace(GOOD, **changes))
+    result = found(check_clock, replace(GOOD, **changes))
     assert not result.passed
     assert words in result.text
 
 
 def test_a_wrong_wall_clock_matters_to_signing_only():
-    assert check_clock("blue_1", replace(GOOD, wall_ahead_s=3600.0)).passed
-    assert check_clock("blue_1", replace(GOOD, signs=True, wall_ahead_s=math.nan)).passed
+    assert found(check_clock, replace(GOOD, wall_ahead_s=3600.0)).passed
+    assert found(check_clock, replace(GOOD, signs=True, wall_ahead_s=math.nan)).passed
 
 
 def test_spread():
-    assert check_spread("blue_1", readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
-    wide = check_spread("blue_1", readings(spread_m=1.0))
+    assert found(check_spread, GOOD, readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
+    wide = found(check_spread, GOOD, readings(spread_m=1.0))
     assert not wide.passed
     assert "wait for a better fix" in wide.text
-    moving = check_spread("blue_1", readings(speed=1.0))
+    moving = found(check_spread, GOOD, readings(speed=1.0))
     assert not moving.passed
     assert "moves at 1.0 m/s" in moving.text
-    assert not check_spread("blue_1", readings(age=1.0)).passed
-    assert not check_spread("blue_1", readings(spread_m=math.nan)).passed
-    assert not check_spread("blue_1", []).passed
+    assert not found(check_spread, GOOD, readings(age=1.0)).passed
+    assert not found(check_spread, GOOD, readings(spread_m=math.nan)).passed
+    assert not found(check_spread, GOOD, []).passed
 
 
 @pytest.mark.parametrize(
@@ -189,7 +194,7 @@ def test_spread():
     ],
 )
 def test_autopilot(parameters, words):
-    result = check_autopilot("blue_1", replace(GOOD, parameters={**GOOD.parameters, **parameters}), HERON)
+    result = found(check_autopilot, replace(GOOD, parameters={**GOOD.parameters, **parameters}))
     assert not result.passed
     assert words in result.text
 
@@ -212,7 +217,7 @@ def test_autopilot(parameters, words):
     ],
 )
 def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
-    result = check_autopilot("blue_1", replace(GOOD, parameters={**GOOD.parameters, **parameters}), HERON)
+    result = found(check_autopilot, replace(GOOD, parameters={**GOOD.parameters, **parameters}))
     assert result.passed, result.text
 
 
@@ -226,14 +231,14 @@ def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
     ],
 )
 def test_a_boat_without_a_fix_does_not_pass(changes, words):
-    result = check_autopilot("blue_1", replace(GOOD, **changes), HERON)
+    result = found(check_autopilot, replace(GOOD, **changes))
     assert not result.passed
     assert words in result.text
 
 
 @pytest.mark.parametrize("kind", ["no_fix", "fix_silent", "poor_fix", "no_estimate"])
 def test_a_fix_lost_while_watched_does_not_pass(kind):
-    assert f"5 {kind}" in check_rates("blue_1", readings(faults={kind: 5}), GOOD).text
+    assert f"5 {kind}" in found(check_rates, GOOD, readings(faults={kind: 5})).text
 
 
 def test_what_was_refused_before_the_watch_is_not_of_it():
@@ -248,7 +253,7 @@ def test_every_parameter_that_is_looked_at_is_asked_for():
 
 
 def test_an_autopilot_that_told_nothing_does_not_pass():
-    assert not check_autopilot("blue_1", replace(GOOD, parameters={}, version=None), HERON).passed
+    assert not found(check_autopilot, replace(GOOD, parameters={}, version=None)).passed
 
 
 @pytest.mark.parametrize(
@@ -261,20 +266,20 @@ def test_an_autopilot_that_told_nothing_does_not_pass():
     ],
 )
 def test_commanders(changes, words):
-    result = check_commanders("blue_1", replace(GOOD, **changes), 100.0)
+    result = found(check_commanders, replace(GOOD, **changes))
     assert not result.passed
     assert words in result.text
 
 
 def test_signing_is_said():
-    assert check_commanders("blue_1", GOOD, 0.0).text.endswith("not signed")
-    assert check_commanders("blue_1", replace(GOOD, signs=True, faults={"unsigned": 3, "replayed": 1}), 0.0).passed
+    assert found(check_commanders, GOOD).text.endswith("not signed")
+    assert found(check_commanders, replace(GOOD, signs=True, faults={"unsigned": 3, "replayed": 1})).passed
 
 
 def test_an_autopilot_that_has_no_position_yet_is_not_told_as_old_telemetry():
     booting = [replace(reading, position_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
-    result = check_rates("blue_1", booting, replace(GOOD, fix_type=1, fix_fault="GPS has no fix"))
+    result = found(check_rates, replace(GOOD, fix_type=1, fix_fault="GPS has no fix"), booting)
     assert not result.passed
     assert "the autopilot has no position yet (GPS has no fix)" in result.text
     late = [replace(reading, position_age_s=7.6, heading_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
-    assert "telemetry was 7.60 s old" in check_rates("blue_1", late, GOOD).text
+    assert "telemetry was 7.60 s old" in found(check_rates, GOOD, late).text
