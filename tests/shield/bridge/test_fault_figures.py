@@ -98,7 +98,7 @@ DRILLS = {
 
 
 def driven(strike, settings):
-    """Each tick's time since the fault and answers, and the closest distance."""
+    """Each tick's time since the fault and answers, and the world after it."""
     fed = settings.pop("fed", False)
     world = pair(**settings)
     if fed:  # somebody else sees it too
@@ -112,7 +112,7 @@ def driven(strike, settings):
 
     world.loop._recorder.take = note
     world.run(STRUCK_S - 1000.0 + AFTER_S, lambda world: world.clock.now_s() >= STRUCK_S - 1e-6 and strike(world))
-    return seen, world.closest_m
+    return seen, world
 
 
 def row_of(name):
@@ -126,11 +126,16 @@ def row_of(name):
 @pytest.mark.parametrize("name", DRILLS)
 def test_a_drill_is_answered_in_time_and_as_documented(name):
     strike, answer, deadline_s, settings = DRILLS[name]
-    seen, closest_m = driven(strike, dict(settings))
+    seen, world = driven(strike, dict(settings))
+    closest_m = world.closest_m
     when = [since for since, answers in seen if answer in answers and since >= -1e-6]
     assert bool(when) == (answer is not None)
     answered_s = when[0] if when else None
     assert closest_m >= 2.5
+    commands = np.array([entry[1:] for link in world.links.values() for entry in link.sent])
+    assert (np.abs(commands) < 10.0).all()  # nothing that is no number, or nobody's command, ever left
+    if name.startswith("policy"):
+        assert ("policy", "hold_station") in seen[-1][1]  # given up in the end
     assert answered_s is None or answered_s <= deadline_s + 1e-6
     told_s, told_m = row_of(name)
     assert told_s == (None if answered_s is None else pytest.approx(answered_s, abs=0.11))

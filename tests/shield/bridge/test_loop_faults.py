@@ -40,31 +40,6 @@ def test_without_the_shield_they_would():
     assert pair(shield=Unheeded()).run(20.0).closest_m < 1.0
 
 
-@pytest.mark.parametrize("fault", ["hangs", "dies", "NaN", "1e9"])
-def test_a_policy_that_fails_is_answered_as_declared_and_breaks_no_distance(fault):
-    world = pair()
-
-    def strike(world):
-        if world.clock.now_s() < 1003.0:
-            return
-        if fault == "hangs":
-            world.policy.hung = True
-        elif fault == "dies":
-            world.policy.answer, world.policy.fault = None, "the policy's process died"
-            world.policy.hung = True
-        else:
-            world.policy.rule = lambda snapshot: np.full((2, 2), float(fault))
-
-    world.run(3.9, strike)
-    assert ("policy", "hold_course") in world.responses("blue_1")
-    world.run(10.0, strike)
-    assert ("policy", "hold_station") in world.responses("blue_1")
-    assert world.closest_m >= 2.5
-    commands = np.array([entry[1:] for link in world.links.values() for entry in link.sent])
-    assert np.isfinite(commands).all()
-    assert np.abs(commands).max() < 10.0
-
-
 def test_the_policys_fault_is_told():
     world = pair()
     world.policy.fault, world.policy.hung = "its process died with exit code 1", True
@@ -129,53 +104,6 @@ def test_a_boat_that_hears_nothing_any_more_is_kept_clear_of():
     world.run(25.0, strike)
     assert ("link", "stop") in world.responses("blue_1")
     assert world.closest_m >= 2.5
-
-
-def test_frozen_telemetry_is_old_telemetry():
-    """A link that finds its position frozen gives it its true age, whatever the time stamps say."""
-    world = pair()
-
-    def strike(world):
-        if world.clock.now_s() >= 1004.0:
-            link = world.links["blue_1"]
-            link.changed = {"position_m": (20.0, 8.0), "position_age_s": world.clock.now_s() - 1004.0}
-
-    world.run(20.0, strike)
-    assert world.links["blue_1"].stops > 0
-    assert world.closest_m >= 2.5
-
-
-def test_a_position_frozen_with_fresh_time_stamps_is_not_believed():
-    world = pair()
-    link = world.links["blue_1"]
-
-    def strike(world):
-        if world.clock.now_s() >= 1004.0:
-            link.changed = {"position_m": link.changed.get("position_m", tuple(link.row[:2])), "speed_mps": 2.0}
-
-    world.run(5.5, strike)
-    assert "frozen" in world.loop.tracker.faults["blue_1"]
-    assert ("navigation", "stop") in world.responses("blue_1")
-    world.run(15.0, strike)
-    assert link.stops > 0
-    assert world.closest_m >= 2.5
-
-
-def test_a_jump_of_30_m_is_not_followed_and_believed_only_after_a_while():
-    world = pair()
-
-    def strike(world):
-        if 1004.0 <= world.clock.now_s() < 1004.4:
-            world.links["blue_1"].offset_m = (30.0, 0.0)
-        else:
-            world.links["blue_1"].offset_m = (0.0, 0.0)
-
-    world.run(4.3, strike)
-    assert world.last.fleet.state[0, L.X] < 21.5
-    assert world.loop.tracker.faults["blue_1"] == "position jumped 30 m"
-    world.run(20.0, strike)
-    assert world.closest_m >= 2.5
-    assert world.links["blue_1"].stops == 0
 
 
 def test_a_boat_that_stays_where_it_jumped_to_is_believed_in_the_end():
