@@ -22,7 +22,6 @@ from .fleet_file import FleetFile
 from .game_state import GameSource, GameState
 from .messages import (
     Action,
-    Alarm,
     Alarming,
     BoatReading,
     Contact,
@@ -190,7 +189,10 @@ class ControlLoop:
                 game_over=game is not None and game.over,
                 log_fault=self._recorder.fault,
                 overrides=self.operator.active(began),
-                alarms=self._alarms(),
+                alarms=(
+                    *self.tracker.alarms(),
+                    *(a for source in self.parts.contacts if isinstance(source, Alarming) for a in source.alarms()),
+                ),
                 outside_model_s={name: self.model_error.outside_s(name) for name in readings},
                 decided=self._decided,
             )
@@ -257,10 +259,6 @@ class ControlLoop:
         told = [contact_of(link.read(), error) for link in self.parts.ears.values()]
         heard = [contact for source in self.parts.contacts for contact in source.read()]
         return (*heard, *(contact for contact in told if contact is not None))
-
-    def _alarms(self) -> tuple[Alarm, ...]:
-        sources = (source for source in self.parts.contacts if isinstance(source, Alarming))
-        return (*self.tracker.alarms(), *(alarm for source in sources for alarm in source.alarms()))
 
 
 class Overruns:

@@ -30,9 +30,8 @@ def check_fleet(fleet: FleetSettings) -> None:
     Raises:
         FleetFileError: two things of the file contradict each other; one line that names both.
     """
-    _check_names(fleet)
+    _check_unique([boat.name for boat in fleet.boats], "are named")
     _check_agents(fleet)
-    _check_fence(fleet)
     for name in {boat.platform for boat in fleet.boats} | set(fleet.platforms):
         platform_of(fleet, name)
     _check_room(fleet, shield_config(fleet))
@@ -133,10 +132,6 @@ def _is_host(host: str) -> bool:
     return True
 
 
-def _check_names(fleet: FleetSettings) -> None:
-    _check_unique([boat.name for boat in fleet.boats], "are named")
-
-
 def _check_agents(fleet: FleetSettings) -> None:
     agents = [boat.agent for boat in fleet.boats if boat.agent is not None]
     _check_unique(agents, "play")
@@ -157,15 +152,11 @@ def _check_unique(values: list[str], what: str) -> None:
             raise FleetFileError(f"two boats {what} {value!r}; give each its own")
 
 
-def _check_fence(fleet: FleetSettings) -> None:
-    fence = fleet.geofence
-    if not (fence.xmin_m < fence.xmax_m and fence.ymin_m < fence.ymax_m):
-        raise FleetFileError(f"geofence {fence.box} is empty; give xmin_m < xmax_m and ymin_m < ymax_m")
-
-
 def _check_room(fleet: FleetSettings, config: ShieldConfig) -> None:
     """The geofence has room for the boats that are kept inside, a separation apart, as the shield keeps its edge."""
     fence = fleet.geofence
+    if not (fence.xmin_m < fence.xmax_m and fence.ymin_m < fence.ymax_m):
+        raise FleetFileError(f"geofence {fence.box} is empty; give xmin_m < xmax_m and ymin_m < ymax_m")
     try:
         xmin, ymin, xmax, ymax = Surroundings(field=fence.box).pack(config).field.tolist()
     except ConfigError as error:

@@ -106,12 +106,12 @@ class FleetFile(FleetSettings):
     @cached_property
     def team_of(self) -> Mapping[str, int]:
         """0 blue, 1 red, 2 nobody's, by boat's name: the first half of the agents is blue."""
-        return {boat.name: self._team_of(boat) for boat in self.boats}
-
-    def _team_of(self, boat: BoatSettings) -> int:
-        if boat.agent is None:
-            return OUTSIDE_TEAM if boat.team is None else int(boat.team == "red")
-        return int(int(boat.agent.removeprefix("agent_")) >= len(self.agent_ids) // 2)
+        sides = {None: OUTSIDE_TEAM, "blue": 0, "red": 1}
+        half = len(self.agent_ids) // 2
+        return {
+            boat.name: sides[boat.team] if boat.agent is None else int(self.agent_ids.index(boat.agent) >= half)
+            for boat in self.boats
+        }
 
     @property
     def team_number(self) -> int:
@@ -132,7 +132,11 @@ class FleetFile(FleetSettings):
     @property
     def ours(self) -> tuple[BoatSettings, ...]:
         """Boats of our team with a link, to be commanded by some process of ours."""
-        return tuple(boat for boat in self.boats if self._is_ours(boat))
+        return tuple(
+            boat
+            for boat in self.boats
+            if boat.link is not None and boat.commanded and self.team_of[boat.name] == self.team_number
+        )
 
     def commanded(self, only: str | None = None) -> tuple[BoatSettings, ...]:
         """Boats a process commands: those of our team with a link, or the one named.
@@ -151,9 +155,6 @@ class FleetFile(FleetSettings):
                 f"boat {only!r} is not ours to command; choose one of {', '.join(b.name for b in ours)}"
             )
         return (boat,)
-
-    def _is_ours(self, boat: BoatSettings) -> bool:
-        return boat.link is not None and boat.commanded and self.team_of[boat.name] == self.team_number
 
     def contact_of(self, boat: BoatSettings) -> str:
         """How a process that does not command this boat knows it: "feed", "telemetry" or "moos"."""

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..commands import Commands
 from ..exceptions import ConfigError, SteerclearError
-from ..platforms import layout as L
 from ..shield import Shield
 from ..surroundings import OPEN_WATER, Surroundings
 from .failsafe import words
@@ -223,7 +222,9 @@ def check_certificate(fleet: FleetFile, tracker: Tracker, obstacles: StaticObsta
         return CheckResult("certificate", False, "no boat of ours seen; check telemetry")
     worst = int(own[np.argmin(answer.certificate_m[own])])
     margin = float(answer.certificate_m[worst])
-    figures = {"certificate_m": margin, "nearest_m": _nearest_m(given.state, worst)}
+    others = np.delete(given.position_m, worst, axis=0)
+    nearest_m = np.hypot(*(others - given.position_m[worst]).T).min(initial=math.inf)
+    figures = {"certificate_m": margin, "nearest_m": float(nearest_m)}
     name = given.names[worst]
     if not margin >= 0.0:
         near = ", ".join(answer[worst].binding) or "the others"
@@ -238,11 +239,6 @@ def _inside_m(fleet: FleetFile, row: Sequence[float]) -> float:
     xmin, ymin, xmax, ymax = fleet.geofence.box
     x, y = float(row[0]), float(row[1])
     return min(x - xmin, xmax - x, y - ymin, ymax - y) if math.isfinite(x) else math.nan
-
-
-def _nearest_m(state: np.ndarray, i: int) -> float:
-    others = np.delete(state[:, [L.X, L.Y]], i, axis=0)
-    return float(np.hypot(*(others - state[i, [L.X, L.Y]]).T).min()) if len(others) else math.inf
 
 
 SITUATION: Mapping[str, Callable[[FleetFile, Tracker, StaticObstacles], CheckResult]] = {

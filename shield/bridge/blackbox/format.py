@@ -11,6 +11,7 @@ import json
 import math
 import struct
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import msgspec
@@ -192,12 +193,7 @@ def _platform_text(kind: str | Platform, known: Mapping[str, Platform]) -> str:
     platform = kind if isinstance(kind, Platform) else PLATFORMS.get(kind)
     if platform is None or known.get(platform.name) == platform:
         return kind if isinstance(kind, str) else kind.name
-    return json.dumps(plain(_asdict(platform)), allow_nan=False)
-
-
-def _asdict(platform: Platform) -> dict[str, Any]:
-    gains = {name: dict(vars(getattr(platform, name))) for name in ("speed_pid", "heading_pid")}
-    return {**vars(platform), **gains}
+    return json.dumps(plain(asdict(platform)), allow_nan=False)
 
 
 def _surroundings(fixed: Surroundings) -> dict[str, Any]:

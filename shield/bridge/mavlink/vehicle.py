@@ -44,13 +44,10 @@ class LinkHealth:
     """State of one link at one moment.
 
     Attributes:
-        boat: its name.
-        address: where it is heard from.
         rates_hz: arrivals of each message asked for, by name.
         missing: needed messages that do not arrive at the rate asked for, in words; empty: all do.
         round_trips_s: of the last TIMESYNC answers, s, newest last.
         shortest_delay_s: what the quickest telemetry took, s; 0 while no round trip is known.
-        clock_offset_s: our clock less the boat's, s.
         clock_starts: how often the boat's clock began anew.
         wall_ahead_s: this machine's wall clock less the boat's GPS time, s; NaN: not heard.
         fix_type: GPS_FIX_TYPE of the best receiver; -1: not heard.
@@ -65,13 +62,10 @@ class LinkHealth:
         home_deg: latitude and longitude of its home, deg; None: not heard.
     """
 
-    boat: str
-    address: str
     rates_hz: Mapping[str, float]
     missing: str
     round_trips_s: tuple[float, ...]
     shortest_delay_s: float
-    clock_offset_s: float
     clock_starts: int
     wall_ahead_s: float
     fix_type: int
@@ -267,13 +261,10 @@ class MavlinkLink(Link):
         with boat.dialogue.changed:
             now_s, seen, dialogue = self._clock.now_s(), boat.telemetry, boat.dialogue
             return LinkHealth(
-                boat=self.boat,
-                address=self.endpoint.place(self.system_id),
                 rates_hz=boat.streams.rates_hz(now_s),
                 missing=boat.streams.missing(now_s),
                 round_trips_s=tuple(boat.trips_s),
                 shortest_delay_s=seen.clock.shortest_delay_s,
-                clock_offset_s=seen.clock.offset_s,
                 clock_starts=seen.clock.starts,
                 wall_ahead_s=seen.wall_ahead_s,
                 fix_type=seen.fix.fix_type,

@@ -24,13 +24,10 @@ from steerclear.shield.platforms import get_platform
 
 HERON = get_platform("heron")
 GOOD = LinkHealth(
-    boat="blue_1",
-    address="127.0.0.1:14550",
     rates_hz={"GLOBAL_POSITION_INT": 20.0, "ATTITUDE": 20.0},
     missing="",
     round_trips_s=(0.03, 0.04, 0.05),
     shortest_delay_s=0.02,
-    clock_offset_s=100.0,
     clock_starts=1,
     wall_ahead_s=0.2,
     fix_type=3,
