@@ -165,15 +165,16 @@ class MoosLink(Link):
             LinkError: heading or speed is not finite; nothing is posted.
         """
         check_finite(self.boat, heading_rad, speed_mps)
-        now_s = self._clock.now_s()
-        with self._lock:
-            values = self.gate.encode(heading_rad, speed_mps, self._reading(now_s))
-        delivered = self.client.post(values)
-        with self._lock:
+        now_s, route = self._clock.now_s(), " and ".join(self.gate.outputs)
+        with self._lock:  # also round the post: what is heard meanwhile comes after it
+            why_not = self._drivers.why_not()
+            if why_not and self.gate.at_rest and speed_mps != 0.0:
+                return Sent(self.boat, now_s, heading_rad, speed_mps, f"none: {why_not}", False)
+            delivered = self.client.post(self.gate.encode(heading_rad, speed_mps, self._reading(now_s)))
             self._last_rad = heading_rad
             if delivered:
                 self._drivers.posted(now_s)
-        return Sent(self.boat, now_s, heading_rad, speed_mps, " and ".join(self.gate.outputs), delivered)
+        return Sent(self.boat, now_s, heading_rad, speed_mps, route, delivered)
 
     def stop(self) -> Sent:
         """Speed 0 on the present heading, or the last one sent; never waits, never raises."""
@@ -278,7 +279,10 @@ class MoosLink(Link):
             elif key in self.gate.inputs:
                 self.gate.hear(message, received_s)
             else:
+                obeyed = not self._drivers.why_not()
                 text = self._drivers.hear(message, received_s, received_s - true_s)
+                if obeyed and self._drivers.why_not() and self._prepared and self.gate.at_rest:
+                    self.client.post(self.gate.at_rest)  # who takes the boat must not inherit our last thrust
             self._say(text, received_s)
 
     def _say(self, text: str, now_s: float) -> None:

@@ -71,6 +71,25 @@ def test_a_boat_that_is_left_has_no_thrust():
         assert until(lambda: boats.states()["blue_1"][L.SPEED] < 0.05, 10.0)
 
 
+@pytest.mark.parametrize(
+    ("key", "word"), [("MOOS_MANUAL_OVERRIDE", "true"), ("IVPHELM_ALLSTOP", "BehaviorError")], ids=["hand", "all-stop"]
+)
+def test_who_takes_a_boat_does_not_inherit_our_last_thrust(key, word):
+    fleet = fleet_of(1, 0, gate="pid")
+    with sim_of(fleet, WARP) as boats, link_of(fleet, WARP) as (link, _):
+        for _ in range(30):
+            link.send(1.0, 1.2)
+            time.sleep(0.1 / WARP)
+        assert boats.states()["blue_1"][L.THRUST] > 5.0
+        boats.boats["blue_1"].community.post(key, word, "somebody")
+        assert until(lambda: not link.read().ready, 1.0)
+        assert not link.send(1.0, 1.2).delivered  # decided just before it was heard
+        assert until(lambda: boats.boats["blue_1"].community.actuators.thrust == 0.0, 1.0)
+        boats.boats["blue_1"].community.post("DESIRED_THRUST", 20.0, "joystick")  # whose boat it is from now on
+        time.sleep(0.5)
+        assert boats.boats["blue_1"].community.actuators.thrust == 20.0
+
+
 def test_actuators_keep_what_they_were_told_and_take_no_number_that_is_none():
     with sim_of(fleet_of(1, 0, gate="pid"), WARP) as boats:
         community = boats.boats["blue_1"].community
