@@ -41,11 +41,11 @@ class Drivers:
         self._ours, self._outputs, self._prefix = ours, outputs, prefix
         self.faults: Counter[str] = Counter()
         self.other, self.other_s = "", -math.inf
+        self._override: dict[str, tuple[bool, str]] = {}
         self.forget()
 
     def forget(self) -> None:
-        """The connection was lost: what is known of the helm is old."""
-        self._override: dict[str, tuple[bool, str]] = {}
+        """The connection was lost: what is known of the helm is old; a hand on the boat stays there until it lets go."""
         self.helm = self.state = self.allstop = ""
         self._posted_s = self._echoed_s = -math.inf
         self._known: set[str] = set()

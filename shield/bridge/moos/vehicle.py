@@ -13,7 +13,7 @@ from dataclasses import replace
 from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
-from ..messages import NEVER_S, BoatReading, Link, Sent, check_finite, never
+from ..messages import NEVER_S, PILOT, BoatReading, Link, Sent, check_finite, never
 from . import drivers, nav
 from .client import Health, MoosClient
 from .contacts import MoosContacts
@@ -131,12 +131,14 @@ class MoosLink(Link):
             faults = {kind: count for counter in counters for kind, count in counter.items() if count}
             for counter in counters:
                 counter.clear()
-            why_not = health.fault or self._drivers.why_not()
+            why_not, hand = health.fault or self._drivers.why_not(), self._drivers.overridden
             return replace(
                 self._reading(now_s),
-                mode=self._drivers.state or ("override" if self._drivers.overridden else "no helm"),
+                mode=self._drivers.state or ("override" if hand else "no helm"),
                 ready=not why_not,
                 why_not=why_not,
+                released=bool(hand),  # his also when it is not heard any more: nothing may be sent against him
+                released_by=PILOT if hand else "",
                 heartbeat_age_s=NEVER_S if health.fault else max(0.0, health.echo_age_s) * self.client.warp,
                 texts=texts,
                 faults=faults,

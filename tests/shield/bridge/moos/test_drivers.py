@@ -38,6 +38,14 @@ def test_an_override_counts_at_once_in_both_spellings_and_ends_when_it_is_set_of
     assert drivers.why_not() == ""
 
 
+def test_a_hand_stays_on_the_boat_through_a_lost_connection(drivers):
+    drivers.hear(said("MOOS_MANUAL_OVERRIDE", "true"), 1.0, 0.0)
+    drivers.forget()
+    assert "driven by hand" in drivers.why_not()
+    drivers.hear(said("MOOS_MANUAL_OVERRIDE", "false"), 9.0, 0.0)
+    assert drivers.why_not() == ""
+
+
 @pytest.mark.parametrize(("reason", "stops"), [("clear", False), ("NothingToDo", False), ("BehaviorError", True)])
 def test_an_all_stop_of_the_helm_is_told_and_an_error_of_it_stops_commands(drivers, reason, stops):
     text = drivers.hear(said("IVPHELM_ALLSTOP", reason, "pHelmIvP"), 1.0, 0.0)

@@ -7,6 +7,7 @@ import pytest
 from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.messages import PILOT
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
 from steerclear.shield.bridge.preflight_checks import run_checks
@@ -69,10 +70,12 @@ def test_a_hand_on_the_boat_is_seen_at_once_and_only_that_hand_lets_go(world, co
     assert until(lambda: not link.read().ready)
     assert time.monotonic() - began < 0.5
     assert "pMarineViewer" in link.read().why_not
+    assert (link.read().released, link.read().released_by) == (True, PILOT)  # his, also where nobody hears it any more
     with pytest.raises(LinkRefused, match="driven by hand"):
         link.prepare(1.0)
     community.post("MOOS_MANUAL_OVERRIDE", "false", "pMarineViewer")
     assert until(lambda: link.read().ready)
+    assert not link.read().released
 
 
 def test_another_writer_of_our_variables_is_named_and_counted(world, community):
