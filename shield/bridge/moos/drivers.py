@@ -45,7 +45,7 @@ class Drivers:
         self.forget()
 
     def forget(self) -> None:
-        """The connection was lost: what is known of the helm is old; a hand on the boat stays there until it lets go."""
+        """The connection was lost: what is known of the helm is old; a hand stays on the boat until it lets go."""
         self.helm = self.state = self.allstop = ""
         self._posted_s = self._echoed_s = -math.inf
         self._known: set[str] = set()
