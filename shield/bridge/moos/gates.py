@@ -148,10 +148,13 @@ class PidGate(Gate):
 
     def meaning(self, first: float, second: float, reading: BoatReading) -> Nominal:
         """See `Gate`."""
-        table = np.asarray(self._platform.thrust_map, dtype=float)
-        speed_mps = float(np.interp(second, table[:, 0], table[:, 1]))  # that this thrust holds on a straight course
-        heading_rad = reading.heading_rad + math.radians(self._error_deg(first))
-        self._meant = Nominal(speed_mps, heading_rad % TWO_PI), (first, second)
+        platform, table = self._platform, np.asarray(self._platform.thrust_map, dtype=float)
+        lowest, highest = max(table[0, 0], -platform.max_thrust), min(table[-1, 0], platform.max_thrust)
+        rudder = min(max(first, -platform.max_rudder), platform.max_rudder)
+        thrust = min(max(second, float(lowest)), float(highest))  # beyond it the speed below would not be its own
+        speed_mps = float(np.interp(thrust, table[:, 0], table[:, 1]))  # that this thrust holds on a straight course
+        heading_rad = reading.heading_rad + math.radians(self._error_deg(rudder))
+        self._meant = Nominal(speed_mps, heading_rad % TWO_PI), (rudder, thrust)
         return self._meant[0]
 
     def encode(self, heading_rad: float, speed_mps: float, reading: BoatReading) -> Mapping[str, float]:

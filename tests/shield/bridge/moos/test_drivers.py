@@ -115,6 +115,24 @@ def test_the_gate_after_the_pid_passes_what_the_shield_leaves_alone_bit_for_bit(
     assert nominal.speed_mps == pytest.approx(2.25)
 
 
+@pytest.mark.parametrize(
+    ("platform", "told", "posted"),
+    [
+        ("heron", (0.0, -50.0), (0.0, 0.0)),  # it is not known to go astern, so nobody decided on that
+        ("heron", (250.0, 160.0), (100.0, 100.0)),
+        ("surveyor", (-101.0, -150.0), (-100.0, -100.0)),
+        ("large_usv", (0.0, 90.0), (0.0, 70.0)),
+    ],
+)
+def test_the_gate_after_the_pid_passes_nothing_that_the_platform_cannot_do(platform, told, posted):
+    gate = PidGate(get_platform(platform), 0.1)
+    for key, value in zip(gate.inputs, told, strict=True):
+        gate.hear(number(key, value, "pid"), 10.0)
+    nominal = gate.nominal(reading())
+    found = gate.encode(nominal.heading_rad, nominal.speed_mps, reading())
+    assert tuple(found.values()) == posted
+
+
 def test_the_gate_after_the_pid_steers_as_the_platforms_autopilot_where_the_shield_decides_otherwise():
     platform = get_platform("surveyor")
     gate, row = PidGate(platform, 0.1), fresh_state(0.0, 0.0, math.degrees(0.5), 1.0)
