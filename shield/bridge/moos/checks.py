@@ -14,7 +14,7 @@ from ..messages import BoatReading
 from ..preflight_checks import Check, Found, checks_by_kind
 from .client import Health
 from .mission import LONGEST_S, PIDS, SIMULATORS, Mission, mission_faults, number, parse_mission
-from .nav import REFUSED
+from .nav import REFUSED, VARIABLES
 from .vehicle import MoosLink, client_name
 
 APART_M = 5.0
@@ -77,8 +77,8 @@ def check_moosdb(watched: Watched) -> Found:
 
 
 def check_rates(watched: Watched) -> Found:
-    """NAV_* arrive, never late, and none is refused."""
-    readings = watched.readings
+    """NAV_* arrive, each from one source, never late, and none is refused."""
+    readings, writers = watched.readings, watched.link.writers
     oldest = max((reading.age_s for reading in readings), default=math.inf)
     fixes = {reading.read_s - reading.position_age_s for reading in readings}
     refused = {kind: sum(r.faults.get(kind, 0) for r in readings) for kind in (*REFUSED, "bad_report")}
@@ -87,6 +87,9 @@ def check_rates(watched: Watched) -> Found:
         said = next((text for reading in readings for text in reading.texts if "refused" in text), "see the log")
         kinds = ", ".join(f"{count} {kind}" for kind, count in refused.items() if count)
         return False, f"refused while watched: {kinds}; {said}", figures
+    if shared := [key for key in VARIABLES if len(writers.get(key, ())) > 1]:
+        text = f"{shared[0]} is written by {' and by '.join(sorted(writers[shared[0]]))}: two say where it is, end one"
+        return False, text, figures
     if not oldest <= OLDEST_S:
         text = f"NAV_* were {oldest:.2f} s old, more than {OLDEST_S:g} s; raise the AppTick of what posts them to 10"
         return False, text, figures

@@ -133,6 +133,19 @@ def test_checks_tell_what_is_there_and_what_nobody_can_know(world):
     assert "pBehave" in results["commanders:blue_1"].text
 
 
+def test_two_sources_of_where_a_boat_is_do_not_pass():
+    fleet = fleet_of(1, 1)
+    with sim_of(fleet) as boats, link_of(fleet) as (link, _):
+        checks = [check for check in moos_checks({"blue_1": link}, fleet, 0.3) if check.name == "rates:blue_1"]
+        assert run_checks(checks)[0].passed
+        boats.boats["blue_1"].community.db.post("NAV_X", 0.0, "iGPS")
+        assert until(lambda: len(link.writers["NAV_X"]) == 2)
+        checks = [check for check in moos_checks({"blue_1": link}, fleet, 0.3) if check.name == "rates:blue_1"]
+        (found,) = run_checks(checks)
+        assert not found.passed
+        assert "NAV_X is written by iGPS and by uSimMarine" in found.text
+
+
 def test_a_frozen_moosdb_shows_as_age_and_the_boat_stops_by_itself(world, community):
     boats, link, _ = world
     sent_for(link, 2.0)
