@@ -141,6 +141,7 @@ class Link(Protocol):
 
     def learn(self, timeout_s: float) -> None:
         """Ask for what checks look at and is not known yet; mostly nothing."""
+        return
 
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
@@ -204,9 +205,11 @@ class LinkMaker(Protocol):
         Raises:
             LinkError: a wire cannot be opened.
         """
+        return
 
     def close(self) -> None:
         """Give it back; may be called again."""
+        return
 
     def sources(self) -> Sequence[ContactSource]:
         """Who tells of other boats by the same way."""
@@ -332,12 +335,14 @@ class WantedSource(Protocol):
 
     def offer(self, snapshot: Snapshot) -> None:
         """Show it the latest snapshot; older ones it has not looked at are dropped."""
+        return
 
     def latest(self) -> Answer:
         """Its latest answer."""
 
     def close(self) -> None:
         """End it."""
+        return
 
 
 @dataclass(frozen=True)
