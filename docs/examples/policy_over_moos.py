@@ -9,10 +9,10 @@ import socket
 import tempfile
 from pathlib import Path
 
-from steerclear.experiments.boats import SimFleet
-from steerclear.experiments.boats.demo import demo_text
 from steerclear.experiments.deploy.orders import Orders
 from steerclear.experiments.deploy.run import deploy
+from steerclear.experiments.sim_boats import SimFleet
+from steerclear.experiments.sim_boats.demo import demo_text
 
 SOLUTION = """
 class solution:

@@ -20,16 +20,15 @@ from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import ConfigError
 
-from ..boats.demo import demo_fleet, demo_text
 from ..deploy.dashboard import Dashboard
 from ..deploy.demo import Demo, demo_file
 from ..deploy.orders import Orders, Surface
-from ..deploy.plain import PlainLines, logging_aside
+from ..deploy.plain import PlainLines, distance_words, logging_aside
 from ..deploy.rules import game_config
 from ..deploy.run import deploy as run_boats
-from ..deploy.tally import distance_words
 from ..play.spec import check_seed
 from ..result_files import write_json
+from ..sim_boats.demo import demo_fleet, demo_text
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

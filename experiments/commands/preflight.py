@@ -13,7 +13,7 @@ from steerclear.shield.bridge.fleet_file import load_fleet
 
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
-from ..deploy.preflighting import preflight as check_boats
+from ..deploy.run import preflight as check_boats
 from ..result_files import write_json
 from . import deploying as d
 from . import options as o

@@ -17,7 +17,7 @@ from steerclear.shield.bridge.feed import GameState
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import ConfigError
 
-from ..deploy.lifeline import end_with_parent
+from ..deploy.demo import end_with_parent
 from ..deploy.referee import RATE_HZ, Referee
 from ..provenance import machine, versions
 from ..result_files import write_json

@@ -11,8 +11,7 @@ from steerclear.env.record import save
 from steerclear.shield.bridge.blackbox import LogReader, mend
 from steerclear.shield.bridge.mavlink.signing import read_key
 
-from ..deploy.replay_text import show
-from ..deploy.replaying_report import Replay, as_content, compare, draw, replay_log
+from ..deploy.replay import Replay, as_content, compare, draw, replay_log, show
 from ..provenance import machine, versions
 from ..replay_html import write_replay
 from ..result_files import NEW, write_json

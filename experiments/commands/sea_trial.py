@@ -11,8 +11,8 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..deploy.orders import Orders, Surface
 from ..deploy.plain import PlainLines, logging_aside
+from ..deploy.run import sea_trial as try_boats
 from ..deploy.sea_trial import MANOEUVRES, SeaTrial
-from ..deploy.trying import sea_trial as try_boats
 from . import deploying as d
 from .console import Interrupted, command, err, finish, out
 

@@ -17,15 +17,14 @@ from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.exceptions import BridgeError, ConfigError
 from steerclear.shield.platforms import Platform, get_platform
 
-from ..boats import AutopilotSettings, RadioSettings, SimFleet, Water
-from ..boats.demo import demo_fleet
-from ..boats.from_file import Hulls
-from ..boats.incidents import Plan, parse_incident
-from ..boats.off import off_platform
-from ..boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
-from ..deploy.lifeline import end_with_parent
+from ..deploy.demo import end_with_parent
 from ..play.spec import check_seed
 from ..result_files import NEW, write_json
+from ..sim_boats import AutopilotSettings, RadioSettings, SimFleet, Water
+from ..sim_boats.demo import demo_fleet, off_platform
+from ..sim_boats.fleet import Hulls
+from ..sim_boats.incidents import Plan, parse_incident
+from ..sim_boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from . import deploying as d
 from . import options as o
 from .console import Interrupted, command, err, finish, out

@@ -17,9 +17,8 @@ from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.operator import Operator
 
 from ..terminal import SafeConsole, SafeFormatter
-from .controls import Controls
+from .controls import Controls, Keyboard
 from .dashboard_view import SILENT_S, Moment, View
-from .keys import Keyboard
 
 logger = logging.getLogger(__name__)
 

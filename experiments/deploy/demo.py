@@ -1,22 +1,54 @@
-"""Boats and a referee for a demonstration: `sim-boats` and `referee` as processes of their own, ended with the run."""
+"""Boats and a referee for a demonstration: `sim-boats` and `referee` as processes that end with the run."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO
+from typing import IO, BinaryIO
 
-from steerclear.experiments.boats.demo import MOOS_PORTS, demo_text
+from steerclear.experiments.sim_boats.demo import MOOS_PORTS, demo_text
 from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
+
+GRACE_S = 3.0
+"""How long a program may take to end in order, s."""
+
+
+def end_with_parent(stream: BinaryIO | None = None) -> threading.Thread:
+    """End this process in order (SIGTERM) when a stream is closed at its other end, at once `GRACE_S` later.
+
+    Whoever starts a program with a pipe as its standard input holds the only other end: the system closes it also when
+    that process is killed with -9.
+
+    Args:
+        stream: the stream; None: standard input.
+
+    Returns:
+        The thread that waits for it.
+    """
+    watched = sys.stdin.buffer if stream is None else stream
+    thread = threading.Thread(target=_wait, args=(watched,), name="lifeline", daemon=True)
+    thread.start()
+    return thread
+
+
+def _wait(stream: BinaryIO) -> None:
+    while os.read(stream.fileno(), 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+    threading.Event().wait(GRACE_S)
+    os._exit(1)
+
 
 FOLDER = Path("steerclear_demo")
 """Demonstrations keep their fleet files and logs in folders of their own in here, in the present folder."""

@@ -1,4 +1,4 @@
-"""A line now and then about a run, where no dashboard is shown; and logs that never make the loop wait."""
+"""A line now and then about a run, its figures, and logs that never make the loop wait."""
 
 from __future__ import annotations
 
@@ -11,12 +11,75 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.messages import Tick
+from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import BridgeError
+from steerclear.shield.fleet import Fleet
+from steerclear.shield.platforms import layout as L
 
 from ..terminal import SafeFormatter
-from .tally import Tally
+
+
+class Tally:
+    """Counts decisions and keeps the closest approach of own boats to any other.
+
+    Attributes:
+        commands: of own boats that were decided.
+        changed: of these, by the shield.
+        closest_m: closest approach, as believed, m; inf: nobody else was there.
+    """
+
+    def __init__(self) -> None:
+        self._ticks = self._decided = self._best_effort = self._responses = 0
+        self.commands = self.changed = 0
+        self.closest_m = math.inf
+        self._least_m = math.inf
+
+    def take(self, tick: Tick) -> None:
+        """Count one tick."""
+        self._ticks += 1
+        self._responses += any(action.response != "none" for action in tick.actions)
+        decisions = tick.decisions
+        if decisions is None or tick.fleet is None:
+            return
+        own = tick.fleet.controlled
+        self._decided += 1
+        self.commands += int(own.sum())
+        self.changed += decisions.count_intervened
+        self._best_effort += int((decisions.reason[own] == Reason.BEST_EFFORT).sum())
+        self._least_m = min(self._least_m, float(decisions.certificate_m[own].min(initial=math.inf)))
+        self.closest_m = min(self.closest_m, closest_m(tick.fleet))
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def figures(self) -> dict[str, float]:
+        """Ticks, shares of commands changed, closest approach m (as believed), least certificate m."""
+        return {
+            "ticks": float(self._ticks),
+            "decided": float(self._decided),
+            "changed_share": self.changed / max(1, self.commands),
+            "best_effort_commands": float(self._best_effort),
+            "ticks_with_actions": float(self._responses),
+            "closest_m": self.closest_m,
+            "least_certificate_m": self._least_m,
+        }
+
+
+def closest_m(fleet: Fleet) -> float:
+    """Smallest distance of a controlled boat from any other, m, where they are believed to be."""
+    at = fleet.state[:, [L.X, L.Y]]
+    apart = np.hypot(*np.moveaxis(at[:, None] - at[None], -1, 0))
+    np.fill_diagonal(apart, np.inf)
+    return float(apart[fleet.controlled].min(initial=math.inf))
+
+
+def distance_words(distance_m: float) -> str:
+    """A closest approach for a person; inf: nobody else was there."""
+    return f"{distance_m:.2f} m" if math.isfinite(distance_m) else "no other boat"
+
 
 MOST_LINES = 10_000
 """Lines of the log that may wait to be written; more are dropped."""
@@ -127,3 +190,30 @@ class _Dropping(logging.handlers.QueueHandler):
         """Hand a line over, or drop it."""
         with contextlib.suppress(queue.Full):
             self.queue.put_nowait(record)
+
+
+DEPLOY = {
+    "ended": "why the run ended; empty: it never began",
+    "refused[]": "checks neither passed nor accepted",
+    "checks[].name": "name of the check, with the boat's where it is about one",
+    "checks[].passed": "whether it passed",
+    "checks[].text": "what was found, and the remedy",
+    "checks[].figures.*": "what was measured; the unit ends the name",
+    "left[]": "what each boat was left doing, and boats on the way to one of them then",
+    "log": "path of the black box, or of the kept preflight; null: none",
+    "figures.ticks": "turns of the loop",
+    "figures.decided": "of those, with a decision",
+    "figures.changed_share": "share of own boats' commands that the shield changed, 0 to 1",
+    "figures.best_effort_commands": "own boats' commands for which no manoeuvre kept the margin",
+    "figures.ticks_with_actions": "turns in which a declared response, an override or STOP ALL did something",
+    "figures.closest_m": "closest approach of an own boat to any other, as believed, m",
+    "figures.least_certificate_m": "smallest certificate of an own boat, m",
+    "figures.missed_turns": "turns left out because the loop was late",
+    "figures.jitter_p50_s": "turns begun after they were due, median, s",
+    "figures.jitter_p999_s": "the same, 999 of 1000, s",
+    "figures.jitter_max_s": "the same, the worst, s",
+    "figures.read_to_sent_p50_s": "from reading telemetry to the last command sent, median, s",
+    "figures.read_to_sent_p99_s": "the same, 99 of 100, s",
+    "figures.read_to_sent_max_s": "the same, the worst, s",
+    "figures.decide_p99_s": "the shield's decision alone, 99 of 100, s",
+}

@@ -14,7 +14,7 @@ import threading
 import time
 from typing import Any
 
-from .frames import read_message, write_message
+from .worker import read_message, write_message
 
 FAILED = 3
 """Exit status when the policy could not be loaded; the answer before it says why."""

@@ -25,10 +25,8 @@ from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array
 
-from .frames import Broken
-from .observing import cast_of
-from .player import Orders
-from .worker import Worker
+from .player import Orders, cast_of
+from .worker import Broken, Worker
 
 logger = logging.getLogger(__name__)
 

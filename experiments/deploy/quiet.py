@@ -19,7 +19,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import fresh_state, step_boat
 
-from .rehearsal import boats_of
+from .orders import boats_of
 
 NICENESS = -10
 """Of the runner's threads while boats are steered, where the system allows that and no more."""

@@ -1,4 +1,4 @@
-"""The game on the water: its settings from a fleet file, and `Umpire`, which applies the env's rules to real boats."""
+"""The game on the water: settings and static constraints of a fleet file, and `Umpire`, which applies the rules."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
 from steerclear.shield.jit import IntArray
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.surroundings import OPEN_WATER, Surroundings
+from steerclear.shield.wrappers.mctf import surroundings_of
 
 FROM_FILE = {
     "team_size": "boats",
@@ -217,3 +219,14 @@ def _flag(core: BatchedMctf, team: int) -> FlagStatus:
 
 def _pair(counts: IntArray) -> tuple[int, int]:
     return int(counts[0, 0]), int(counts[0, 1])
+
+
+def grounds_of(fleet: FleetFile) -> Surroundings:
+    """Obstacles of the game, and the circle of our own flag at home as ``stops``; nothing when no boat plays.
+
+    Raises:
+        FleetFileError: the preset or a rule is unknown, or a rule contradicts another key.
+    """
+    if not fleet.agent_ids:
+        return OPEN_WATER
+    return surroundings_of(BatchedMctf(game_config(fleet)), fleet.team_number)

@@ -1,31 +1,203 @@
-"""A run on boats: from a fleet file and a policy's name to boats that are left stopped."""
+"""Runs on boats: checks, a black box, boats that obey; they are always left stopped.
+
+`deploy` lets a policy play, `preflight` checks and drills, `sea_trial` drives the manoeuvres a boat is fitted to.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 from steerclear.policies.registry import SB3_PREFIX
+from steerclear.shield.bridge.autopilot_fence import check_fence
+from steerclear.shield.bridge.blackbox import McapWriter, check_disk, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
-from steerclear.shield.bridge.control_loop import Timing
+from steerclear.shield.bridge.control_loop import ControlLoop, Timing
+from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.feed_sender import PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.link_checks import link_checks
 from steerclear.shield.bridge.links import key_of
-from steerclear.shield.bridge.messages import TickSink
+from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
+from steerclear.shield.bridge.messages import Tick, TickSink, WantedSource
+from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.moos.links import MoosNominal
+from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight_checks import Check
+from steerclear.shield.bridge.preflight_checks import SITUATION, Check, check_situation, not_passed, run_checks
 from steerclear.shield.bridge.session import VehicleSession
+from steerclear.shield.bridge.tracker import Tracker
 
-from .begin import Begun, run_boats
-from .checks import drilled_check
-from .orders import Orders, Outcome, Surface, read_fleet
+from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet, refuse_early
+from .plain import Tally
 from .policy_process import PolicyProcess
-from .preflight_file import DRILLED
-from .quiet import warm_up
-from .rehearsal import refuse_early
-from .tally import Tally
+from .preflight_file import DRILLED, check_drill, keep
+from .quiet import ended_by_signals, undisturbed, warm_up
+from .rules import grounds_of
+from .sea_trial import SeaTrial, longest_s
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A run whose boats obey.
+
+    Attributes:
+        session: links and feed, prepared.
+        box: the black box.
+        orders, surface, operator: as given.
+        outcome: to be filled in.
+    """
+
+    session: VehicleSession
+    box: McapWriter
+    orders: Orders
+    surface: Surface
+    operator: Operator
+    outcome: Outcome
+
+    def sail(
+        self,
+        nominal: WantedSource,
+        seconds: float | None,
+        sinks: Sequence[TickSink] = (),
+        *,
+        plays: bool = False,
+        begins: Callable[[ControlLoop], None] = lambda loop: None,
+    ) -> ControlLoop:
+        """Steer by nominal commands, each through the shield, until the time is over or somebody ends it.
+
+        Args:
+            nominal: where they come from.
+            seconds: how long; None: until ended.
+            sinks: get every tick, besides the black box and the surface's.
+            plays: whether the referee's state of the game counts.
+            begins: is given the loop before its first turn.
+        """
+        fleet, clock = self.session.fleet, self.session.clock
+        with contextlib.ExitStack() as stack:
+            shown = self.surface.sinks(fleet, self.operator, clock)
+            for sink in (*sinks, *shown):
+                stack.callback(sink.close)
+            parts = self.session.parts(nominal, (self.box, *sinks, *shown), grounds_of(fleet), plays=plays)
+            loop = ControlLoop(fleet, parts, self.operator, clock)
+            begins(loop)
+            with undisturbed():
+                self.outcome.ended = loop.run(seconds)
+        return loop
+
+
+def run_boats(
+    orders: Orders,
+    surface: Surface,
+    operator: Operator,
+    read: tuple[FleetFile, str],
+    policy: str,
+    drive: Callable[[Begun], None] | None,
+    *,
+    clock: MonotonicClock | None = None,
+    opened: Callable[[VehicleSession], Sequence[Check]] = lambda session: (),
+    elsewhere: Sequence[str] = (),
+) -> Outcome:
+    """Open the boats, run the checks, and drive when they allow it.
+
+    Args:
+        orders: of the run.
+        surface: where a person sees it.
+        operator: whose orders count.
+        read: the file and its text, see `orders.read_fleet`.
+        policy: name of what steers, for the log.
+        drive: steers boats that obey; None: no boat is moved.
+        clock: the loop's; None: a new one.
+        opened: called with the open session before anything is sent; its further checks.
+        elsewhere: kinds of checks made elsewhere that may be accepted too.
+
+    Raises:
+        ConfigError: a name to accept is no check's.
+        BridgeError: a port is taken, a boat does not answer or refuses; boats heard until then are left stopped.
+    """
+    fleet, text = read
+    outcome, clock = Outcome(), clock or MonotonicClock(orders.speed)
+    session = VehicleSession(fleet, orders.boat, clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
+    try:
+        with session, ended_by_signals(operator):
+            checks = [*checks_of(session, orders.minutes or LONGEST_MINUTES), *opened(session)]
+            check_accepted(checks, orders.accept, elsewhere)
+            session.connect(orders.connect_s)  # the first packets to boats; whatever needs none was refused by now
+            if may_start(checks, orders.accept, surface, outcome) and drive is not None and not operator.ended:
+                with contextlib.closing(_black_box(session, text, policy, outcome)) as box:
+                    outcome.log = box.path
+                    session.prepare()
+                    drive(Begun(session, box, orders, surface, operator, outcome))
+    finally:
+        outcome.left = (*session.left, *(f"at the end {text}: take it over by hand" for text in outcome.near))
+    return outcome
+
+
+def _black_box(session: VehicleSession, text: str, policy: str, outcome: Outcome) -> McapWriter:
+    """Begin the log; checks that were accepted although they did not pass are noted."""
+    header = header_of_fleet(
+        session.fleet,
+        text,
+        policy=policy,
+        commanded=session.links,
+        clock_s=session.clock.now_s(),
+        notes={f"accepted {result.name}": result.text for result in outcome.checks if not result.passed},
+    )
+    return McapWriter(log_path(session.fleet.log_dir, ".mcap", session.begun_unix_s), header, key=session.key)
+
+
+LOOK_S = 1.5
+"""How long boats are looked at before their situation is judged, s."""
+
+
+class _Look:
+    """What is known of all boats after watching them for a while, when first asked for."""
+
+    def __init__(self, station: VehicleSession) -> None:
+        self._station = station
+
+    @cached_property
+    def roster(self) -> Tracker:
+        station = self._station
+        fleet, clock = station.fleet, station.clock
+        roster = Tracker(fleet, station.links)
+        due = clock.now_s()
+        for _ in range(math.ceil(LOOK_S / fleet.dt_s)):
+            due += fleet.dt_s
+            clock.sleep_until(due)
+            readings = {name: link.read() for name, link in station.links.items()}
+            roster.update(clock.now_s(), readings, station.contacts())
+        return roster
+
+
+def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
+    """Checks that move no boat, in the order to run.
+
+    Args:
+        station: connected.
+        minutes: how long the run may take.
+    """
+    fleet, look = station.fleet, _Look(station)
+    disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
+    mavlink = {name: link for name, link in station.links.items() if isinstance(link, MavlinkLink)}
+    moos = {name: link for name, link in station.links.items() if isinstance(link, MoosLink)}
+    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
+    links = [*link_checks(mavlink, fleet.platform_of, station.clock), *fences, *moos_checks(moos, fleet)]
+    grounds = grounds_of(fleet)
+    situation = [
+        Check(name, lambda name=name: check_situation(name, fleet, look.roster, grounds)) for name in SITUATION
+    ]
+    return [disk, *links, *situation]
+
+
+def drilled_check(station: VehicleSession, text: str, boat: str | None, accept: Sequence[str]) -> Check:
+    """The check that these boats were drilled lately, and did well but for what is accepted."""
+    return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links), accept))
 
 
 def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | None = None) -> Outcome:
@@ -96,3 +268,97 @@ def _publishers(fleet: FleetFile, orders: Orders) -> list[TickSink]:
         return []
     sender = FeedSender(f"deploy_{orders.boat or fleet.team}", fleet.feed.publish, key_of(fleet))
     return [PositionPublisher(sender, fleet.frame, fleet.shield_config.position_error_m)]
+
+
+def preflight(
+    orders: Orders, surface: Surface | None = None, operator: Operator | None = None, *, drill: bool = True
+) -> Outcome:
+    """Run all checks, and the drill when the others allow it; boats are left stopped. What was found is kept.
+
+    Args:
+        orders: of a run; its policy is not needed.
+        surface: where a person sees it.
+        operator: whose orders count.
+        drill: whether boats are moved.
+
+    Raises:
+        FleetFileError: the file cannot be used; nothing was opened.
+        BridgeError: a port is taken, a boat does not answer or refuses, or the result cannot be kept.
+    """
+    surface, operator = surface or Surface(), operator or Operator()
+    fleet, text = read_fleet(orders)
+    refuse_early(fleet)
+    warm_up(fleet)
+    drive = _drill if drill else None
+    outcome = run_boats(orders, surface, operator, (fleet, text), "drill", drive, elsewhere=(*DRILLED, "drill"))
+    outcome.ended = operator.ended
+    outcome.log = keep(fleet, text, orders.boat, outcome.checks, [result.name for result in outcome.refused])
+    return outcome
+
+
+def _drill(begun: Begun) -> None:
+    """Drive one boat after the other a short way, and judge what was seen."""
+    fleet, outcome = begun.session.fleet, begun.outcome
+    drill = Drill(fleet, tuple(begun.session.links))
+    missed = Missed(drill)
+
+    def begins(loop: ControlLoop) -> None:
+        missed.model_error = loop.model_error
+
+    begun.sail(drill, drill.seconds + 2.0 * fleet.dt_s, (drill, missed), begins=begins)
+    outcome.checks += run_checks(drill_checks(drill, missed, fleet), begun.surface.shown)
+    outcome.refused = not_passed(outcome.checks, begun.orders.accept)
+
+
+def sea_trial(
+    orders: Orders,
+    surface: Surface | None = None,
+    operator: Operator | None = None,
+    *,
+    only: str | None = None,
+    speed_mps: float | None = None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> tuple[Outcome, SeaTrial | None]:
+    """Run the manoeuvres of a sea trial when the checks allow it; boats are left stopped.
+
+    Args:
+        orders: of a run; its policy is not needed.
+        surface: where a person sees it.
+        operator: whose orders count.
+        only: the one boat to drive; None: all of the process, one after the other.
+        speed_mps: highest speed told, m/s; None: top speed.
+        tell: is told which manoeuvre begins.
+
+    Raises:
+        FleetFileError: the file cannot be used, or has no such boat; nothing was opened.
+        BridgeError: a port is taken, a boat does not answer or refuses.
+    """
+    surface, operator = surface or Surface(), operator or Operator()
+    fleet, text = read_fleet(orders)
+    names = tuple(entry.name for entry in fleet.commanded(orders.boat))
+    driven = names if only is None else (fleet.boat(only).name,)
+    refuse_early(fleet)
+    warm_up(fleet)
+    trial = SeaTrial(fleet, driven, speed_mps, tell)
+    begun: list[Begun] = []
+
+    def drive(run: Begun) -> None:
+        begun.append(run)
+        run.sail(trial, longest_s(len(run.session.links)), (trial, _End(trial, operator)))
+
+    outcome = run_boats(orders, surface, operator, (fleet, text), "sea-trial", drive)
+    return outcome, trial if begun else None
+
+
+class _End:
+    """A sink that ends the run once the trial is done."""
+
+    def __init__(self, trial: SeaTrial, operator: Operator) -> None:
+        self._trial, self._operator = trial, operator
+
+    def take(self, tick: Tick) -> None:
+        if self._trial.done and not self._operator.ended:
+            self._operator.end("the trial is done")
+
+    def close(self) -> None:
+        """Nothing is held."""

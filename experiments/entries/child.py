@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from steerclear import policies
-from steerclear.experiments.deploy.frames import read_message, write_message
+from steerclear.experiments.deploy.worker import read_message, write_message
 from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
 from steerclear.shield.words import describe_error

@@ -18,8 +18,7 @@ from typing import Any
 from steerclear.policies.registry import SB3_PREFIX
 from steerclear.shield.exceptions import PolicyError
 
-from ..deploy.frames import Broken
-from ..deploy.worker import Worker
+from ..deploy.worker import Broken, Worker
 from .imports import imports_of
 from .sandbox import Limits
 

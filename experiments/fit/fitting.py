@@ -1,17 +1,209 @@
-"""From runs to a platform file: every kind of boat is tried, the one that predicts best is kept."""
+"""From runs to a platform file: least squares, held-out errors and the margin that covers them, per kind of boat."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 from steerclear.shield.exceptions import PlatformError
+from steerclear.shield.jit import Array
 from steerclear.shield.platforms.files import PlatformFile
 
-from .judge import AHEAD_S, COVERED, Judged, judge
-from .models import MODELS, Seen
-from .runs import FitError, Run
+from .models import MODELS, Model, Seen, distance_m, errors_of
+from .runs import STEP_S, FitError, Run
+
+EVERY, AHEAD, PICKED = 10, 60, 6
+"""Windows begin every so many steps and reach so far ahead; each so many steps one is looked at."""
+WEIGHTS = np.array([1.0, 1.0, 0.02, 0.5])
+"""Of x, y (1/m), heading (1/deg) and speed (s/m)."""
+SOFT = 0.5
+"""Residuals beyond this count less: one bad stretch must not bend the whole."""
+DELAYS_S = np.arange(0.025, 0.8, 0.05)
+BEGUN = 8
+"""Evaluations (each with its derivatives) that every first guess gets."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    Attributes:
+        model: which.
+        vector: its numbers.
+        cost: mean square of the weighted residuals.
+    """
+
+    model: Model
+    vector: Array
+    cost: float
+
+    @property
+    def delay_s(self) -> float:
+        """From command to effect, s."""
+        return float(self.vector[-1])
+
+
+def residuals(model: Model, vector: Array, runs: Sequence[Run], top_mps: float) -> Array:
+    """Weighted differences of all runs, flat."""
+    params = model.platform(vector, "fitted", top_mps).pack()
+    parts = [
+        (errors_of(params, run, float(vector[-1]), EVERY, AHEAD)[:, PICKED - 1 :: PICKED] * WEIGHTS).ravel()
+        for run in runs
+    ]
+    return np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3)
+
+
+def fit_model(model: Model, runs: Sequence[Run], top_mps: float, starts: Sequence[Array], most: int = 50) -> Fit:
+    """The best of the fits from several first guesses: each is begun, the best is gone on with."""
+    begun = [_least(model, runs, top_mps, start, BEGUN) for start in starts] if len(starts) > 1 else []
+    best = min(begun, key=lambda fit: fit.cost) if begun else Fit(model, starts[0], np.inf)
+    if len(starts) > 1:
+        best = _scan_delay(model, runs, top_mps, best)
+    return _least(model, runs, top_mps, best.vector, most)
+
+
+def _scan_delay(model: Model, runs: Sequence[Run], top_mps: float, fit: Fit) -> Fit:
+    """The same numbers with the delay that suits them best: a descent gets stuck where commands come in steps."""
+    best = fit
+    for delay_s in DELAYS_S:
+        vector = np.append(fit.vector[:-1], delay_s)
+        cost = float(np.mean(residuals(model, vector, runs, top_mps) ** 2))
+        if cost < best.cost:
+            best = Fit(model, vector, cost)
+    return best
+
+
+def _least(model: Model, runs: Sequence[Run], top_mps: float, start: Array, most: int) -> Fit:
+    room = 1e-6 * (model.high - model.low)
+    found = least_squares(
+        lambda vector: residuals(model, vector, runs, top_mps),
+        np.clip(start, model.low + room, model.high - room),
+        bounds=(model.low, model.high),
+        x_scale=np.maximum(np.abs(start), 0.02 * (model.high - model.low)),
+        loss="soft_l1",
+        f_scale=SOFT,
+        diff_step=1e-3,
+        max_nfev=most,
+    )
+    return Fit(model, found.x, float(np.mean(found.fun**2)))
+
+
+FOLDS = 3
+"""Runs of each kind are dealt out to so many parts; each part is predicted by a fit to the others."""
+AHEAD_S = (1.0, 3.0, 6.0)
+COVERED = 0.99
+JUDGED_EVERY = 3
+"""Steps between the moments from which a run is predicted."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fit and its held-out errors.
+
+    Attributes:
+        fit: to all runs.
+        seen: what the boat did at its hardest.
+        errors_m: (windows, 3) distances at `AHEAD_S` between places predicted and seen, of all runs, NaN: past its end.
+        whose: (windows,) number of the run.
+        held_out: (windows,) whether the run was predicted by a fit that did not know it.
+        runs: all of them.
+    """
+
+    fit: Fit
+    seen: Seen
+    errors_m: Array
+    whose: Array
+    held_out: Array
+    runs: Sequence[Run]
+
+    def quantile_m(self, column: int, share: float) -> float:
+        """Quantile of the errors at one of `AHEAD_S`: the next larger one, of all errors when none is held out."""
+        errors = self.errors_m[self.held_out, column]
+        errors = errors[np.isfinite(errors)]
+        if len(errors) == 0:
+            errors = self.errors_m[np.isfinite(self.errors_m[:, column]), column]
+        if len(errors) == 0:
+            return float("nan")
+        rank = min(len(errors), int(np.ceil(share * (len(errors) + 1))))
+        return float(np.sort(errors)[rank - 1])
+
+    def median_of_kind(self, kind: str, column: int = 1) -> float:
+        """Median error of the runs of a kind, m; NaN: there is none."""
+        mine = np.array([self.runs[int(number)].kind == kind for number in self.whose], dtype=bool)
+        errors = self.errors_m[mine, column] if len(mine) else np.zeros(0)
+        errors = errors[np.isfinite(errors)]
+        return float(np.median(errors)) if len(errors) else float("nan")
+
+    def margin(self) -> tuple[float, float]:
+        """Error 1 s ahead, m, and its growth, m/s, which together cover `COVERED` of the errors at `AHEAD_S`."""
+        bounds = [self.quantile_m(column, COVERED) for column in range(len(AHEAD_S))]
+        known = [(at, bound) for at, bound in zip(AHEAD_S, bounds, strict=True) if np.isfinite(bound)]
+        begin = known[0][1] if known else 0.0
+        growths = [(bound - begin) / (at - AHEAD_S[0]) for at, bound in known[1:]]
+        return begin, max([0.0, *growths])
+
+
+def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
+    """Fit a model to all runs, and predict each run by a fit to the others of its kind."""
+    around = model.around(seen)
+    fit = fit_model(around, runs, seen.top_mps, around.starts())
+    part = _dealt(runs)
+    errors, whose, out = [], [], []
+    for fold in range(FOLDS):
+        left = [run for run, its in zip(runs, part, strict=True) if its != fold]
+        mine = [number for number, its in enumerate(part) if its == fold]
+        if not mine or not left:
+            continue
+        other = fit_model(around, left, seen.top_mps, [fit.vector], most=12)
+        _collect(around, other, runs, mine, seen, True, errors, whose, out)
+    _collect(around, fit, runs, [n for n, its in enumerate(part) if its < 0], seen, False, errors, whose, out)
+    joined = np.concatenate(errors) if errors else np.zeros((0, len(AHEAD_S)))
+    return Judged(fit, seen, joined, np.array(whose), np.array(out, dtype=bool), runs)
+
+
+def _dealt(runs: Sequence[Run]) -> list[int]:
+    """Part of each run; -1: the only one of its kind, which is never left out."""
+    kinds = [run.kind for run in runs]
+    counts: dict[str, int] = {}
+    parts = []
+    for kind in kinds:
+        counts[kind] = counts.get(kind, -1) + 1
+        parts.append(counts[kind] % FOLDS if kinds.count(kind) > 1 else -1)
+    return parts
+
+
+def _collect(
+    model: Model,
+    fit: Fit,
+    runs: Sequence[Run],
+    numbers: Sequence[int],
+    seen: Seen,
+    held_out: bool,
+    errors: list[Array],
+    whose: list[int],
+    out: list[bool],
+) -> None:
+    params = model.platform(fit.vector, "fitted", seen.top_mps).pack()
+    for number in numbers:
+        found = at_times(params, runs[number], fit.delay_s)
+        errors.append(found)
+        whose += [number] * len(found)
+        out += [held_out] * len(found)
+
+
+def at_times(params: Array, run: Run, delay_s: float) -> Array:
+    """Errors of places at `AHEAD_S`, (windows, 3), m; of a run shorter than one of them NaN there."""
+    columns = []
+    steps = [round(at / STEP_S) for at in AHEAD_S]
+    count = len(errors_of(params, run, delay_s, JUDGED_EVERY, steps[0]))
+    for ahead in steps:
+        distances = distance_m(errors_of(params, run, delay_s, JUDGED_EVERY, ahead)[:, -1:])[:, 0]
+        columns.append(np.concatenate([distances, np.full(count - len(distances), np.nan)]))
+    return np.column_stack(columns)
+
 
 DIGITS = 4
 CHOSEN_BY = 0.9

@@ -6,7 +6,7 @@ import pytest
 import yaml
 from boat_page import PAGE, commands, follow, lines
 from steerclear.experiments.cli import app
-from steerclear.experiments.deploy.observing import NEED_NO_GAME
+from steerclear.experiments.deploy.player import NEED_NO_GAME
 from steerclear.shield.platforms.files import load_platform
 from typer.testing import CliRunner
 

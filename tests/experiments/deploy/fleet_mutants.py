@@ -2,7 +2,7 @@
 
 import random
 
-from steerclear.experiments.boats.demo import demo_text
+from steerclear.experiments.sim_boats.demo import demo_text
 
 ODD = (
     "010", "0x1F", "1_000", "5:30", "1:0", "yes", "no", "true", "null", "~", "", ".inf", "-.inf", ".nan", "1e400",

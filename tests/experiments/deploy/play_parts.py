@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 from steerclear.env.record import load
-from steerclear.experiments.boats.demo import demo_text
 from steerclear.experiments.deploy.demo import PORTS, Demo, free_ports
-from steerclear.experiments.deploy.replaying import Prover
+from steerclear.experiments.deploy.proof import Prover
+from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 

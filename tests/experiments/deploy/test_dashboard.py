@@ -17,14 +17,10 @@ from deploy_ticks import Stream
 from made_ticks import made_tick
 from rich.console import Console
 from steerclear.experiments.deploy import dashboard as dashboard_module
-from steerclear.experiments.deploy.approach import approaches
-from steerclear.experiments.deploy.braille import Canvas
-from steerclear.experiments.deploy.controls import Controls
+from steerclear.experiments.deploy.controls import Controls, Keyboard
 from steerclear.experiments.deploy.dashboard import Dashboard
-from steerclear.experiments.deploy.dashboard_map import FieldMap
-from steerclear.experiments.deploy.dashboard_table import fitting
-from steerclear.experiments.deploy.dashboard_view import Moment, View
-from steerclear.experiments.deploy.keys import Keyboard
+from steerclear.experiments.deploy.dashboard_map import Canvas, FieldMap
+from steerclear.experiments.deploy.dashboard_view import Moment, View, approaches, fitting
 from steerclear.experiments.terminal import SafeConsole
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.failsafe_table import DISABLES
@@ -40,7 +36,7 @@ PATIENCE_S = 30.0
 @pytest.fixture(scope="module")
 def stream():
     """A game of three against three under way, rammers about."""
-    from steerclear.experiments.boats.demo import demo_fleet
+    from steerclear.experiments.sim_boats.demo import demo_fleet
 
     played = Stream(demo_fleet())
     for _ in range(80):
@@ -50,7 +46,7 @@ def stream():
 
 @pytest.fixture(scope="module")
 def fleet_of_the_demo():
-    from steerclear.experiments.boats.demo import demo_fleet
+    from steerclear.experiments.sim_boats.demo import demo_fleet
 
     return demo_fleet()
 

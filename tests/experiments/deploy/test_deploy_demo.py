@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.boats.demo import demo_text
-from steerclear.experiments.deploy.demo import PORTS, Demo, demo_file
-from steerclear.experiments.deploy.lifeline import end_with_parent
+from steerclear.experiments.deploy.demo import PORTS, Demo, demo_file, end_with_parent
+from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import BridgeError
 from typer.testing import CliRunner
@@ -97,7 +96,7 @@ def test_killed_with_9_it_takes_its_processes_with_it(tmp_path):
 
 def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
     told = []
-    monkeypatch.setattr("steerclear.experiments.deploy.lifeline.GRACE_S", 0.01)
+    monkeypatch.setattr("steerclear.experiments.deploy.demo.GRACE_S", 0.01)
     monkeypatch.setattr(os, "kill", lambda pid, number: told.append((pid, number)))
     monkeypatch.setattr(os, "_exit", lambda status: told.append(status))
     ours, theirs = os.pipe()

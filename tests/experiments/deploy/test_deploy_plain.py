@@ -13,7 +13,7 @@ import time
 import numpy as np
 import pytest
 from deploy_ticks import Stream
-from steerclear.experiments.deploy.plain import PlainLines, logging_aside
+from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m, distance_words, logging_aside
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
     NICENESS,
@@ -23,7 +23,6 @@ from steerclear.experiments.deploy.quiet import (
     undisturbed,
     warm_up,
 )
-from steerclear.experiments.deploy.tally import Tally, closest_m, distance_words
 from steerclear.shield import Commands, Shield, ShieldConfig, deciders
 from steerclear.shield.bridge.messages import Action
 from steerclear.shield.bridge.operator import Operator

@@ -9,17 +9,15 @@ import threading
 
 import pytest
 from steerclear.env.core import BatchedMctf
-from steerclear.experiments.boats import AutopilotSettings, SimFleet
 from steerclear.experiments.cli import app
-from steerclear.experiments.deploy.grounds import grounds_of
 from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
+from steerclear.experiments.deploy.plain import Tally
 from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
-from steerclear.experiments.deploy.preflighting import preflight
-from steerclear.experiments.deploy.replaying import prove
-from steerclear.experiments.deploy.rules import game_config, player_names, state_of
-from steerclear.experiments.deploy.run import deploy
-from steerclear.experiments.deploy.tally import Tally
+from steerclear.experiments.deploy.proof import prove
+from steerclear.experiments.deploy.rules import game_config, grounds_of, player_names, state_of
+from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.experiments.docs_keys import KEYS, undocumented
+from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed import FeedSender

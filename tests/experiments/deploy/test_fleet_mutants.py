@@ -5,8 +5,8 @@ import time
 
 import pytest
 from fleet_mutants import mutant
-from steerclear.experiments.deploy.grounds import grounds_of
-from steerclear.experiments.deploy.rehearsal import rehearse
+from steerclear.experiments.deploy.orders import rehearse
+from steerclear.experiments.deploy.rules import grounds_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import SteerclearError
 
@@ -46,7 +46,7 @@ def used_kib():
 
 
 def test_the_file_without_a_slip_is_taken():
-    from steerclear.experiments.boats.demo import demo_text
+    from steerclear.experiments.sim_boats.demo import demo_text
 
     assert read(demo_text())
 

@@ -4,9 +4,8 @@ import socket
 import time
 
 import pytest
-from steerclear.experiments.boats import AutopilotSettings, SimFleet
-from steerclear.experiments.deploy.hearing import Hearing
-from steerclear.experiments.deploy.referee import Referee
+from steerclear.experiments.deploy.referee import Hearing, Referee
+from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix
 from steerclear.shield.bridge.fleet_file import parse_fleet

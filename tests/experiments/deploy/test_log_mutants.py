@@ -7,7 +7,7 @@ import random
 import pytest
 from forged_logs import read_records, write_records
 from logged_runs import write_log
-from steerclear.experiments.deploy.replaying_report import as_content, draw, replay_log
+from steerclear.experiments.deploy.replay import as_content, draw, replay_log
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.exceptions import SteerclearError
 

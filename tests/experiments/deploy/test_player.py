@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.deploy.observing import Observer, cast_of
-from steerclear.experiments.deploy.player import Orders, Player, load_player
+from steerclear.experiments.deploy.player import Observer, Orders, Player, cast_of, load_player
 from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError

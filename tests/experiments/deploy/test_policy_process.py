@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy import policy_process
-from steerclear.experiments.deploy.observing import cast_of
-from steerclear.experiments.deploy.player import Orders, load_player
+from steerclear.experiments.deploy.player import Orders, cast_of, load_player
 from steerclear.experiments.deploy.policy_process import PolicyProcess
 from steerclear.shield.exceptions import PolicyError
 

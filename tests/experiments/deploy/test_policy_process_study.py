@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.deploy.observing import cast_of
+from steerclear.experiments.deploy.player import cast_of
 from steerclear.experiments.deploy.policy_process import PolicyProcess
 
 TURN_S = 0.05

@@ -6,8 +6,7 @@ import pytest
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.orders import Orders
 from steerclear.experiments.deploy.preflight_file import measured_delay_s, path_of
-from steerclear.experiments.deploy.preflighting import preflight
-from steerclear.experiments.deploy.run import deploy
+from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.exceptions import SteerclearError

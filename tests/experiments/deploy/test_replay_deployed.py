@@ -6,9 +6,9 @@ import socket
 import numpy as np
 import pytest
 from pymavlink import mavutil
-from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
-from steerclear.experiments.deploy.replaying_report import compare, draw, replay_log
+from steerclear.experiments.deploy.replay import compare, draw, replay_log
 from steerclear.experiments.deploy.run import warm_up
+from steerclear.experiments.sim_boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield import Commands
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import MonotonicClock

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 from logged_runs import FIELD, Encounter, header_of, write_log
-from steerclear.experiments.deploy.replaying import exact, prove
-from steerclear.experiments.deploy.replaying_report import origin_of, replay_log
+from steerclear.experiments.deploy.proof import exact, prove
+from steerclear.experiments.deploy.replay import origin_of, replay_log
 from steerclear.shield import Commands, Fleet, ShieldConfig, Surroundings
 from steerclear.shield.bridge.blackbox import LogReader, platforms_of
 

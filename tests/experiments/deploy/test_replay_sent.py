@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from logged_runs import Encounter, header_of
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.experiments.deploy.replaying import prove
-from steerclear.experiments.deploy.replaying_sent import SentCheck
+from steerclear.experiments.deploy.proof import SentCheck, prove
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.commands import AttitudeRoute, VelocityRoute
 from steerclear.shield.bridge.messages import Action, Sent

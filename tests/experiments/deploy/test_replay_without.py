@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from logged_runs import NAMES, START_S, Encounter, header_of
 from steerclear.env.record import find_breaches, read_meta, validate
-from steerclear.experiments.deploy.replaying_record import placed, record_of
-from steerclear.experiments.deploy.replaying_tracks import GONE_S, TrackBuilder
-from steerclear.experiments.deploy.replaying_without import BACK_S, sail_without
+from steerclear.experiments.deploy.tracks import BACK_S, GONE_S, TrackBuilder, placed, record_of, sail_without
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import LogError
 from steerclear.shield.platforms import get_platform, step_boat

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from steerclear.experiments.commands.sea_trial import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
-from steerclear.experiments.fit.streams import NEEDED, Streams, untold
+from steerclear.experiments.fit.runs import NEEDED, Streams, untold
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat

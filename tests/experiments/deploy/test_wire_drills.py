@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
+from steerclear.experiments.sim_boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts

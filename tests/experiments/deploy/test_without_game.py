@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steerclear.experiments.deploy.grounds import grounds_of
-from steerclear.experiments.deploy.observing import NEED_NO_GAME, cast_of
-from steerclear.experiments.deploy.player import Orders, load_player
-from steerclear.experiments.deploy.rehearsal import rehearse
+from steerclear.experiments.deploy.orders import rehearse
+from steerclear.experiments.deploy.player import NEED_NO_GAME, Orders, cast_of, load_player
+from steerclear.experiments.deploy.rules import grounds_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetFileError

@@ -4,7 +4,7 @@ import dataclasses
 
 from steerclear.experiments.cli import main
 from steerclear.shield import Shield
-from steerclear.shield.bridge import loop
+from steerclear.shield.bridge import control_loop
 
 
 class Unheeded(Shield):
@@ -15,5 +15,5 @@ class Unheeded(Shield):
 
 
 if __name__ == "__main__":
-    loop.Shield = Unheeded
+    control_loop.Shield = Unheeded
     main()

@@ -5,11 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.experiments.cli import app
-from steerclear.experiments.fit.fitting import measured_of, platform_file
-from steerclear.experiments.fit.judge import judge
-from steerclear.experiments.fit.models import RATE, Seen
+from steerclear.experiments.fit.fitting import judge, measured_of, platform_file
+from steerclear.experiments.fit.models import RATE, Seen, distance_m, errors_of
 from steerclear.experiments.fit.reading import read_logs
-from steerclear.experiments.fit.rollout import distance_m, errors_of
 from steerclear.shield.platforms.files import parse_platform, to_text
 from typer.testing import CliRunner
 

@@ -5,8 +5,8 @@ import re
 import pytest
 from bridge_fakes import World, fleet_text
 from steerclear.env.config import GameConfig
-from steerclear.experiments.boats.places import start_places
-from steerclear.experiments.boats.settings import SimBoat
+from steerclear.experiments.sim_boats.game import start_places
+from steerclear.experiments.sim_boats.settings import SimBoat
 from steerclear.shield.bridge.drill import EACH_S, Drill, check_response
 from steerclear.shield.bridge.fleet_file import parse_fleet
 

@@ -6,8 +6,8 @@ import os
 import pytest
 from fed_world import FRAME, KEY, PER_TURN, fed_world
 from feed_attack import CLOCK, OVER
-from steerclear.experiments.deploy.replaying import prove
-from steerclear.experiments.deploy.replaying_tracks import TrackBuilder
+from steerclear.experiments.deploy.proof import prove
+from steerclear.experiments.deploy.tracks import TrackBuilder
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet
 from steerclear.shield.bridge.feed import Packet
 from steerclear.shield.bridge.feed_packets import Fix, Seal

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from bridge_fakes import fleet_text
-from steerclear.experiments.boats.demo import demo_text
+from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.bridge.fleet_yaml import LONGEST_TEXT, MOST_BYTES, read_settings
 from steerclear.shield.exceptions import FleetFileError

@@ -12,7 +12,7 @@ import time
 import pytest
 from bridge_fakes import fleet_of
 from pymavlink import mavutil
-from steerclear.experiments.boats import AutopilotSettings, SimBoat, SimFleet
+from steerclear.experiments.sim_boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_settings import ModelLimit
 from steerclear.shield.bridge.frame import FieldFrame

@@ -4,7 +4,7 @@ import contextlib
 import socket
 import time
 
-from steerclear.experiments.boats import SimFleet
+from steerclear.experiments.sim_boats import SimFleet
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.links import MoosLinks

@@ -8,7 +8,7 @@ import time
 import pytest
 from drills import Gate
 from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
-from steerclear.experiments.boats import SimFleet
+from steerclear.experiments.sim_boats import SimFleet
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.preflight_checks import run_checks

@@ -1,0 +1,300 @@
+"""Running the shield again on what a log holds: does it decide the same, bit for bit, and was that sent?"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from steerclear.shield import Decisions, Shield, SteerclearError
+from steerclear.shield.bridge.blackbox import LogHeader
+from steerclear.shield.bridge.mavlink.commands import CREEP_MPS, VelocityRoute
+from steerclear.shield.bridge.messages import Sent, Tick
+
+ROUNDED_MPS, ROUNDED_RAD = 1e-5, 1e-5
+"""Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted."""
+OWN_STOP = "send"
+"""Condition of the action that declares that a link used its own stop for a boat that was decided for."""
+
+
+@dataclass(frozen=True)
+class Strayed:
+    """A command that does not rest on what was decided.
+
+    Attributes:
+        boat: whose.
+        what: which value.
+        decided, sent: the two, m/s or rad; None: there is none.
+    """
+
+    boat: str
+    what: str
+    decided: float | None
+    sent: float | None
+
+    @property
+    def is_unfounded(self) -> bool:
+        """Whether the log holds no decision for it: then nothing is proved, but nothing contradicts itself."""
+        return self.decided is None
+
+
+class SentCheck:
+    """Compares tick by tick, for the boats this process commanded or sent something.
+
+    Different, and right: rounding of messages, the autopilot's limit, a link that cannot go astern and creeps instead,
+    a link's own stop where the tick declares it or nothing was decided for the boat, and nothing sent to a boat that
+    a person steers.
+
+    Attributes:
+        cut: how many commands an autopilot's limit cut, by boat and limit, m/s.
+
+    Args:
+        header: of the log.
+    """
+
+    def __init__(self, header: LogHeader) -> None:
+        self.cut: Counter[tuple[str, float]] = Counter()
+        self._ours = [boat.name for boat in header.boats if boat.ours]
+        self._is_team = header.config.coordination == "team"  # then nobody else steers a boat the shield decides for
+        self._tells_limits = header.version > 1
+        self._limits: dict[str, float] = {}
+
+    def strayed(self, tick: Tick) -> list[Strayed]:
+        """What does not fit in a tick."""
+        decided = _decided(tick)
+        names = dict.fromkeys((*self._ours, *tick.sent, *(decided if self._is_team else ())))
+        found = [self._one(name, tick, decided.get(name)) for name in names]
+        return [entry for entry in found if entry is not None]
+
+    def _one(self, name: str, tick: Tick, decided: tuple[float, float] | None) -> Strayed | None:
+        sent = tick.sent.get(name)
+        if sent is None:
+            return Strayed(name, "command", None if decided is None else decided[0], None)
+        if decided is None:
+            return None if _stops(sent) else Strayed(name, "sent without a decision", None, sent.speed_mps)
+        if _stops(sent) and _declares_stop(tick, name):
+            return None
+        speed_mps, heading_rad = decided
+        if not _are_alike(sent.heading_rad, heading_rad):
+            return Strayed(name, "heading", heading_rad, sent.heading_rad)
+        if not self._is_speed(sent, speed_mps):
+            return Strayed(name, "speed", speed_mps, sent.speed_mps)
+        return None
+
+    def _is_speed(self, sent: Sent, decided_mps: float) -> bool:
+        if sent.route == VelocityRoute.name:
+            decided_mps = max(CREEP_MPS, decided_mps)
+        limit_mps = sent.limit_mps if self._tells_limits else self._limit_seen(sent, decided_mps)
+        allowed_mps = min(limit_mps, max(-limit_mps, decided_mps))
+        if abs(allowed_mps - decided_mps) > ROUNDED_MPS:
+            self.cut[sent.boat, limit_mps] += 1
+        return abs(sent.speed_mps - allowed_mps) <= ROUNDED_MPS
+
+    def _limit_seen(self, sent: Sent, decided_mps: float) -> float:
+        """The limit of logs that do not tell it: the first speed that was cut; it never changes."""
+        if abs(sent.speed_mps) < abs(decided_mps) - ROUNDED_MPS:
+            self._limits.setdefault(sent.boat, abs(sent.speed_mps))
+        return self._limits.get(sent.boat, math.inf)
+
+
+def _decided(tick: Tick) -> dict[str, tuple[float, float]]:
+    """Speed m/s and heading rad decided for each boat that the shield steered."""
+    if tick.decisions is None:
+        return {}
+    fleet, commands = tick.decisions.fleet, tick.decisions.sent
+    return {
+        name: commands.absolute(i, float(fleet.heading_rad[i]))
+        for i, name in enumerate(fleet.names)
+        if fleet.controlled[i]
+    }
+
+
+def _are_alike(first_rad: float, second_rad: float) -> bool:
+    """Whether two headings are one, but for rounding; those that are not finite never are."""
+    apart_rad = first_rad - second_rad
+    return math.isfinite(apart_rad) and abs(math.remainder(apart_rad, 2.0 * math.pi)) <= ROUNDED_RAD
+
+
+def _stops(sent: Sent) -> bool:
+    """Whether it is a link's own stop, or nothing left at all."""
+    if math.isnan(sent.speed_mps):
+        return not sent.delivered
+    return abs(sent.speed_mps) <= CREEP_MPS + ROUNDED_MPS
+
+
+def _declares_stop(tick: Tick, name: str) -> bool:
+    return any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
+
+
+FIELDS = ("intervened", "reason", "certificate_m", "slack_m", "bound")
+"""Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where a decision differs from the recorded one.
+
+    Attributes:
+        tick: its number.
+        time_s: since the log began, s.
+        boat: whose; "" when it is about all.
+        what: which value.
+        recorded, replayed: the two, to the last bit.
+    """
+
+    tick: int
+    time_s: float
+    boat: str
+    what: str
+    recorded: str
+    replayed: str
+
+
+@dataclass
+class Proof:
+    """What the replay found.
+
+    Attributes:
+        ticks: in the log.
+        decisions: decided again.
+        covered: of those, with a boat of ours in it.
+        same: of those, the same bit for bit.
+        unproven: of those, not the same, but after ticks that are missing, so that the shield's memory is not known.
+        different: of those, not the same though everything before is known.
+        first: the first of these.
+        missing: (number before, number after) of each stretch of missing ticks; -1 before the first.
+        strayed: commands that left for a boat and are not what was decided for it, or that did not leave.
+        unfounded: commands that left for a boat, no stops, without any decision.
+        first_sent: the first of these.
+        cut: commands an autopilot's limit cut, by boat and limit, m/s.
+    """
+
+    ticks: int = 0
+    decisions: int = 0
+    covered: int = 0
+    same: int = 0
+    unproven: int = 0
+    different: int = 0
+    first: Difference | None = None
+    missing: list[tuple[int, int]] = field(default_factory=list)
+    strayed: int = 0
+    unfounded: int = 0
+    first_sent: Difference | None = None
+    cut: Counter[tuple[str, float]] = field(default_factory=Counter)
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing contradicts: no decision differs that could be proved, and no command from its decision."""
+        return self.different == 0 and self.strayed == 0
+
+    @property
+    def proved(self) -> bool:
+        """Whether every turn is proved: boats were decided for, all the same, none missing, and all that was sent."""
+        unproven = self.unproven or self.missing or self.unfounded
+        return self.holds and self.covered > 0 and not unproven
+
+
+class Prover:
+    """Decides again tick by tick.
+
+    The shield remembers backups from tick to tick, so that after missing ticks its answer is only known again from the
+    next reset on, or from the next change of the fleet's boats, which makes it forget as well.
+
+    Args:
+        header: of the log.
+    """
+
+    def __init__(self, header: LogHeader) -> None:
+        self.proof = Proof()
+        self._header = header
+        self._shield = Shield(header.config, header.surroundings)
+        self._sent = SentCheck(header)
+        self.proof.cut = self._sent.cut
+        self._known = False
+        self._last: int | None = None
+        self._boats: Any = None
+
+    def add(self, tick: Tick) -> None:
+        """Decide a tick again and compare; compare what was sent with what was decided."""
+        self._follow(tick)
+        for strayed in self._sent.strayed(tick):
+            self._stray(tick, strayed)
+        if tick.fleet is None or tick.wanted is None or tick.decisions is None:
+            return
+        boats = (tick.fleet.platforms, tick.fleet.names, tick.fleet.team.tobytes())
+        self._known |= tick.shield_reset or (self._boats is not None and boats != self._boats)
+        self._boats = boats
+        if tick.shield_reset:
+            self._shield.reset()
+        difference = self._compare(tick, tick.decisions)
+        self.proof.decisions += 1
+        self.proof.covered += bool(tick.decisions.fleet.controlled.any())
+        if difference is None:
+            self.proof.same += 1
+        elif self._known:
+            self.proof.different += 1
+            self.proof.first = self.proof.first or difference
+        else:
+            self.proof.unproven += 1
+
+    def _stray(self, tick: Tick, strayed: Strayed) -> None:
+        self.proof.strayed += not strayed.is_unfounded
+        self.proof.unfounded += strayed.is_unfounded
+        if self.proof.first_sent is None:
+            decided, sent = ("none" if value is None else exact(value) for value in (strayed.decided, strayed.sent))
+            time_s = tick.began_s - self._header.clock_s
+            self.proof.first_sent = Difference(tick.number, time_s, strayed.boat, strayed.what, decided, sent)
+
+    def _follow(self, tick: Tick) -> None:
+        self.proof.ticks += 1
+        if self._last is None:
+            self._known = tick.number == 0
+            if tick.number != 0:
+                self.proof.missing.append((-1, tick.number))
+        elif tick.number != self._last + 1:
+            self.proof.missing.append((self._last, tick.number))
+            self._known, self._boats = False, None
+        self._last = tick.number
+
+    def _compare(self, tick: Tick, recorded: Decisions) -> Difference | None:
+        time_s = tick.began_s - self._header.clock_s
+        try:
+            replayed = self._shield.decide(recorded.fleet, recorded.wanted, tick.surroundings)
+        except SteerclearError as error:
+            return Difference(tick.number, time_s, "", "decision", "decided", f"refused: {error}")
+        for boat, what, a, b in _differing(recorded, replayed):
+            return Difference(tick.number, time_s, boat, what, exact(a), exact(b))
+        return None
+
+
+def prove(header: LogHeader, ticks: Iterable[Tick]) -> Proof:
+    """Decide all ticks of a log again."""
+    prover = Prover(header)
+    for tick in ticks:
+        prover.add(tick)
+    return prover.proof
+
+
+def exact(value: Any) -> str:
+    """A value so that two that differ in a bit read differently."""
+    return f"{value!r} ({value.hex()})" if isinstance(value, float) else repr(value)
+
+
+def _differing(recorded: Decisions, replayed: Decisions) -> Iterator[tuple[str, str, Any, Any]]:
+    """Boat, name of the value and the two values, for every value that differs in a bit."""
+    if recorded.sent.relative != replayed.sent.relative:
+        yield "", "frame of the command", recorded.sent.relative, replayed.sent.relative
+    pairs = [("sent speed, m/s", recorded.sent.values[:, 0], replayed.sent.values[:, 0])]
+    pairs += [("sent heading", recorded.sent.values[:, 1], replayed.sent.values[:, 1])]
+    pairs += [(name, getattr(recorded, name), getattr(replayed, name)) for name in FIELDS]
+    for name, a, b in pairs:
+        for i in np.flatnonzero(_bits(a) != _bits(b)):
+            yield recorded.fleet.names[i], name, a[i].item(), b[i].item()
+
+
+def _bits(values: Any) -> Any:
+    array = np.ascontiguousarray(values)
+    return array.view(np.uint64) if array.dtype == np.float64 else array

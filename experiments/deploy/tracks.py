@@ -1,0 +1,412 @@
+"""A log as tracks: every boat's state at even steps of time, as it was and as it would have been without the shield."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.config import GameConfig
+from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
+from steerclear.shield.bridge.blackbox import LogHeader
+from steerclear.shield.bridge.messages import Tick
+from steerclear.shield.bridge.tracker import GHOST
+from steerclear.shield.decision import Reason
+from steerclear.shield.exceptions import ConfigError, LogError
+from steerclear.shield.platforms import get_platform, step_boat
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.tracking.tracks import fill_memory, whole_steps
+
+Array = NDArray[np.float64]
+GONE_S = 1.5
+"""A boat that nothing was heard of for longer than this is not there, s."""
+_MATCH_S = 1e-6
+MOST_STEPS = 10_000_000
+"""Ten days at 10 Hz: more is damage."""
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """What happened, at even steps of time.
+
+    Attributes:
+        names: of the n boats: in the header's order, then others as they were met.
+        team: (n,) 0 blue, 1 red, 2 outside the game.
+        ours: (n,) bool, boats this process commanded and its shield decided for.
+        platforms: names.
+        params: (n, N_PARAM) platform rows.
+        time_s: (T+1,) since the log began, s.
+        states: (T+1, n, N_STATE) rows, memory filled in; NaN where a boat was not there.
+        wanted, sent: (T, n, 2) speed m/s and absolute heading rad in [0, 2 pi); NaN where nothing was decided.
+        reason: (T, n); NOT_COVERED where nothing was decided.
+        intervened: (T, n) bool.
+        certificate_m: (T, n); NaN where nothing was decided.
+        driven: (T, n) bool, the game steered the boat.
+        games: (T,) state of the game at each step.
+        dt_s: step, s.
+    """
+
+    names: tuple[str, ...]
+    team: NDArray[np.int64]
+    ours: NDArray[np.bool_]
+    platforms: tuple[str, ...]
+    params: Array
+    time_s: Array
+    states: Array
+    wanted: Array
+    sent: Array
+    reason: NDArray[np.int64]
+    intervened: NDArray[np.bool_]
+    certificate_m: Array
+    driven: NDArray[np.bool_]
+    games: list[Mapping[str, Any]]
+    dt_s: float
+
+    @property
+    def positions(self) -> Array:
+        """(T+1, n, 2) m; NaN where a boat was not there."""
+        return self.states[:, :, : L.Y + 1]
+
+
+@dataclass(frozen=True)
+class _Decided:
+    """One boat's part of one tick."""
+
+    wanted: tuple[float, float]
+    sent: tuple[float, float]
+    reason: int
+    intervened: bool
+    certificate_m: float
+
+
+_NOTHING = _Decided((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
+
+
+class TrackBuilder:
+    """Collects ticks.
+
+    Args:
+        header: of the log.
+    """
+
+    def __init__(self, header: LogHeader) -> None:
+        self._header = header
+        self._team = {boat.name: boat.team for boat in header.boats}
+        self._kind: dict[str, Any] = {boat.name: boat.platform for boat in header.boats}
+        self._mine = {boat.name for boat in header.boats if boat.ours}
+        self._ours: set[str] = set()
+        self._fixes: dict[str, list[tuple[float, Array]]] = {boat.name: [] for boat in header.boats}
+        self._times: list[float] = []
+        self._decided: list[dict[str, _Decided]] = []
+        self._games: list[Mapping[str, Any]] = []
+
+    def add(self, tick: Tick) -> None:
+        """Add one tick."""
+        time_s = tick.began_s - self._header.clock_s
+        self._times.append(time_s)
+        self._games.append(tick.game)
+        self._decided.append(self._decisions(tick))
+        fleet = tick.fleet
+        if fleet is None:
+            return
+        for i, name in enumerate(fleet.names):
+            if GHOST in name:
+                continue  # a place the boat was kept from, not a boat
+            age_s = 0.0 if fleet.age_s is None else float(fleet.age_s[i])
+            fixes = self._fixes.setdefault(name, [])
+            self._team.setdefault(name, int(fleet.team[i]))
+            self._kind[name] = fleet.platforms[i]
+            if not fixes or time_s - age_s > fixes[-1][0] + _MATCH_S:
+                fixes.append((time_s - age_s, fleet.state[i].copy()))
+
+    def finish(self) -> Tracks:
+        """The tracks.
+
+        Raises:
+            LogError: no tick, or none with boats.
+        """
+        names = tuple(name for name, fixes in self._fixes.items() if fixes)
+        if len(self._times) < 2 or not names:
+            raise LogError("the log holds no two ticks with boats; there is nothing to replay without the shield")
+        dt_s = self._header.config.dt_s
+        span = (self._times[-1] - self._times[0]) / dt_s + 0.5
+        if not 1.0 <= span < MOST_STEPS:
+            raise LogError(f"the times of the log's ticks span {span:g} steps; there is nothing to replay")
+        steps = int(span)
+        time_s = self._times[0] + dt_s * np.arange(steps + 1)
+        kinds = [self._header.platforms.get(self._kind[name], self._kind[name]) for name in names]
+        params = np.array([get_platform(kind).pack() for kind in kinds])
+        states = np.stack([_states(self._fixes[name], time_s) for name in names], axis=1)
+        _fill(states, params)
+        at = np.searchsorted(np.array(self._times) - _MATCH_S, time_s[:-1], side="right") - 1
+        rows = [[self._decided[k].get(name, _NOTHING) for name in names] for k in at]
+        return Tracks(
+            names=names,
+            team=np.array([self._team[name] for name in names], dtype=np.int64),
+            ours=np.array([name in self._ours for name in names]),
+            platforms=tuple(get_platform(kind).name for kind in kinds),
+            params=params,
+            time_s=time_s,
+            states=states,
+            driven=np.array([[_driven(self._games[k], name) for name in names] for k in at]),
+            games=[self._games[k] for k in at],
+            dt_s=dt_s,
+            **_columns(rows),
+        )
+
+    def _decisions(self, tick: Tick) -> dict[str, _Decided]:
+        decisions = tick.decisions
+        if decisions is None:
+            return {}
+        found = {}
+        for i, name in enumerate(decisions.fleet.names):
+            if not decisions.fleet.controlled[i] or (self._header.boats and name not in self._mine):
+                continue  # team-mates with a shield of their own are steered by another process
+            own_rad = float(decisions.fleet.heading_rad[i])
+            self._ours.add(name)
+            found[name] = _Decided(
+                decisions.wanted.absolute(i, own_rad),
+                decisions.sent.absolute(i, own_rad),
+                int(decisions.reason[i]),
+                bool(decisions.intervened[i]),
+                float(decisions.certificate_m[i]),
+            )
+        return found
+
+
+def _columns(rows: list[list[_Decided]]) -> dict[str, Any]:
+    return {
+        "wanted": np.array([[entry.wanted for entry in row] for row in rows]),
+        "sent": np.array([[entry.sent for entry in row] for row in rows]),
+        "reason": np.array([[entry.reason for entry in row] for row in rows], dtype=np.int64),
+        "intervened": np.array([[entry.intervened for entry in row] for row in rows]),
+        "certificate_m": np.array([[entry.certificate_m for entry in row] for row in rows]),
+    }
+
+
+def _driven(game: Mapping[str, Any], name: str) -> bool:
+    boats = game.get("boats")
+    boat = boats.get(name) if isinstance(boats, Mapping) else None
+    return isinstance(boat, Mapping) and bool(boat.get("driven"))
+
+
+def _states(fixes: list[tuple[float, Array]], time_s: Array) -> Array:
+    """One boat's rows (T+1, N_STATE) from its fixes: places, headings and speeds between them, memory as it was."""
+    known_s = np.array([fix[0] for fix in fixes])
+    rows = np.array([fix[1] for fix in fixes])
+    before = np.clip(np.searchsorted(known_s - _MATCH_S, time_s, side="right") - 1, 0, len(rows) - 1)
+    states = rows[before].copy()
+    turned_deg = np.degrees(np.unwrap(np.radians(rows[:, L.HEADING])))
+    for column, values in ((L.X, rows[:, L.X]), (L.Y, rows[:, L.Y]), (L.SPEED, rows[:, L.SPEED])):
+        states[:, column] = np.interp(time_s, known_s, values)
+    heading_deg = np.interp(time_s, known_s, turned_deg)
+    states[:, L.HEADING] = (heading_deg + 180.0) % 360.0 - 180.0
+    after = np.minimum(before + 1, len(rows) - 1)
+    away_s = np.minimum(np.abs(time_s - known_s[before]), np.abs(known_s[after] - time_s))
+    states[away_s > GONE_S] = np.nan
+    return states
+
+
+def _fill(states: Array, params: Array) -> None:
+    """Memory nobody told: thrust that holds the speed, no rudder; in place, boats that are not there left out."""
+    for i in range(states.shape[1]):
+        there = np.isfinite(states[:, i, L.X])
+        rows = np.ascontiguousarray(states[there, i])
+        fill_memory(rows, np.repeat(params[i : i + 1], len(rows), axis=0))
+        states[there, i] = rows
+
+
+BACK_S = 5.0
+"""A boat is put back when its command was not changed for so long, s."""
+LONGEST_S = 20.0
+"""A boat is put back after so long in any case, s."""
+
+
+@dataclass(frozen=True)
+class Without:
+    """Tracks without the shield.
+
+    Attributes:
+        states: (T+1, n, N_STATE) as in `Tracks`.
+        away: (T+1, n) bool, boats that are not on their recorded track.
+        stretches: how many times a boat left it.
+    """
+
+    states: Array
+    away: NDArray[np.bool_]
+    stretches: int
+
+
+def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
+    """Steer boats whose command was changed by what was wanted.
+
+    Args:
+        tracks: what happened.
+        delay_s: from a command to its effect, s.
+    """
+    states = tracks.states.copy()
+    away = np.zeros(states.shape[:2], dtype=np.bool_)
+    late = whole_steps(delay_s, tracks.dt_s)
+    stretches = sum(_sail(tracks, int(i), late, states, away) for i in np.flatnonzero(tracks.ours))
+    return Without(states, away, stretches)
+
+
+def _sail(tracks: Tracks, i: int, late: int, states: Array, away: NDArray[np.bool_]) -> int:
+    """One boat, in place; returns how many times it left its track."""
+    back, longest = round(BACK_S / tracks.dt_s), round(LONGEST_S / tracks.dt_s)
+    begun = quiet = 0
+    out, stretches = False, 0
+    for k in range(late, len(tracks.wanted)):
+        changed = bool(tracks.intervened[k - late, i])
+        quiet = 0 if changed else quiet + 1
+        there = np.isfinite(tracks.states[k : k + 2, i, L.X]).all()
+        if out and (quiet >= back or k - begun >= longest or not there):
+            out = False
+        if not out and changed and there:
+            out, begun, stretches = True, k, stretches + 1
+            states[k, i] = tracks.states[k, i]
+        if out:
+            states[k + 1, i] = _stepped(tracks, i, states[k, i], tracks.wanted[k - late, i])
+            away[k + 1, i] = True
+    return stretches
+
+
+def _stepped(tracks: Tracks, i: int, row: Array, wanted: Array) -> Array:
+    """The boat one step on; a command nobody could follow leaves it to stop on its course."""
+    row = row.copy()
+    speed_mps, heading_rad = (float(value) for value in wanted)
+    if not (math.isfinite(speed_mps) and math.isfinite(heading_rad) and abs(speed_mps) < 1e3):
+        speed_mps, heading_rad = 0.0, math.radians(row[L.HEADING])
+    error_deg = (math.degrees(heading_rad) - row[L.HEADING] + 180.0) % 360.0 - 180.0
+    step_boat(tracks.params[i], row, speed_mps, error_deg, tracks.dt_s)
+    return row
+
+
+OFF_M = 1e6
+"""Where boats are that are not there, m, each as far from the next."""
+_MARKS = {"has_flag": "has_flag", "is_tagged": "tagged", "oob": "oob"}
+
+
+def placed(states: Array) -> Array:
+    """States (T+1, n, N_STATE) with boats that are not there put far away from everything and one another."""
+    found = states.copy()
+    for i in range(states.shape[1]):
+        gone = ~np.isfinite(states[:, i, L.X])
+        found[gone, i] = 0.0
+        found[gone, i, L.X] = OFF_M * (i + 1)
+        found[gone, i, L.Y] = OFF_M
+    return found
+
+
+def drawn(states: Array) -> Array:
+    """States with boats that are not there left where they were last, or will be first."""
+    found = states.copy()
+    for i in range(states.shape[1]):
+        known = np.flatnonzero(np.isfinite(states[:, i, L.X]))
+        if len(known) == 0:
+            found[:, i] = 0.0
+            continue
+        last = known[np.clip(np.searchsorted(known, np.arange(len(states)), side="right") - 1, 0, None)]
+        found[:, i] = states[last, i]
+    return found
+
+
+def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shielded: bool) -> Record:
+    """The record of a game.
+
+    Args:
+        header: of the log.
+        tracks: what happened.
+        states: (T+1, n, N_STATE) the boats' states to record, the tracks' own or those without the shield.
+        title: of the record.
+        shielded: whether boats were sent what the shield said; otherwise what was wanted.
+    """
+    seen = drawn(states)
+    marks = _marks(tracks)
+    covered = shielded & (tracks.reason != NOT_COVERED)
+    wanted = _degrees(tracks.wanted)
+    return make_record(
+        _meta(header, tracks, title, shielded),
+        position=seen[:, :, : L.Y + 1],
+        heading_deg=seen[:, :, L.HEADING],
+        speed_mps=seen[:, :, L.SPEED],
+        **marks,
+        wanted=wanted,
+        sent=_degrees(tracks.sent) if shielded else wanted,
+        reason=np.where(covered, tracks.reason, NOT_COVERED),
+        intervened=tracks.intervened & covered,
+        certificate_m=np.where(covered, tracks.certificate_m, np.nan),
+        breaches=find_breaches(placed(states)[:, :, : L.Y + 1], header.config.separation_m),
+    )
+
+
+def _degrees(commands: Array) -> Array:
+    found = commands.copy()
+    found[..., 1] = (np.degrees(found[..., 1]) + 180.0) % 360.0 - 180.0
+    return found
+
+
+def _marks(tracks: Tracks) -> dict[str, NDArray[Any]]:
+    """Flags, tags and scores as the game's state had them; nobody has anything where there was none."""
+    games = [*tracks.games, tracks.games[-1]]
+    marks: dict[str, NDArray[Any]] = {
+        array: np.array([[_mark(game, name, key) for name in tracks.names] for game in games])
+        for array, key in _MARKS.items()
+    }
+    marks["flag_position"] = np.array([_flags(game) for game in games], dtype=np.float64)
+    marks["captures"] = np.array([_pair(game.get("captures")) for game in games], dtype=np.int64)
+    return marks
+
+
+def _mark(game: Mapping[str, Any], name: str, key: str) -> bool:
+    boat = (game.get("boats") or {}).get(name)
+    return isinstance(boat, Mapping) and bool(boat.get(key))
+
+
+def _pair(values: Any) -> tuple[int, int]:
+    return (int(values[0]), int(values[1])) if isinstance(values, list | tuple) and len(values) == 2 else (0, 0)
+
+
+def _flags(game: Mapping[str, Any]) -> list[tuple[float, float]]:
+    flags = game.get("flags")
+    if not isinstance(flags, list | tuple) or len(flags) != 2:
+        return [(0.0, 0.0), (0.0, 0.0)]
+    return [(float(flag["x_m"]), float(flag["y_m"])) for flag in flags]
+
+
+def _meta(header: LogHeader, tracks: Tracks, title: str, shielded: bool) -> dict[str, Any]:
+    rules = _rules(header.preset)
+    radii = rules.agent_radius_m
+    flags = [_flags(game) for game in tracks.games if game.get("flags")]
+    size = header.field_size_m or tuple(float(value) for value in np.nanmax(np.abs(tracks.positions), axis=(0, 1)))
+    ours = "blue" if int(tracks.team[tracks.ours].min(initial=1)) == 0 else "red"
+    return {
+        "dt_s": tracks.dt_s,
+        "env_bounds_m": size,
+        "team_size": int(np.count_nonzero(tracks.team == 0)),
+        "agent_ids": list(tracks.names),
+        "team": [min(int(team), 1) for team in tracks.team],
+        "flag_home": flags[0] if flags else [(size[0] / 8, size[1] / 2), (size[0] * 7 / 8, size[1] / 2)],
+        "catch_radius_m": rules.catch_radius_m,
+        "flag_keepout_m": rules.flag_keepout_m,
+        "agent_radius_m": radii if isinstance(radii, float) else radii[0],
+        "separation_m": header.config.separation_m,
+        "preset": header.preset,
+        "policies": {"blue": "", "red": ""} | {ours: header.policy},
+        "shielded": [name for name, own in zip(tracks.names, tracks.ours, strict=True) if own and shielded],
+        "seed": None,
+        "reason_names": [reason.name for reason in Reason],
+        "platforms": list(tracks.platforms),
+        "title": title,
+    }
+
+
+def _rules(preset: str) -> GameConfig:
+    """Radii to draw: the preset's, or the usual ones where the log names none that is known."""
+    try:
+        return GameConfig.preset(preset)
+    except ConfigError:
+        return GameConfig.preset("aamas2024")

@@ -1,0 +1,87 @@
+"""The fleet file that comes with the package, and boats that are not quite what their platforms say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields, replace
+from importlib import resources
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from steerclear.shield.bridge.fleet_file import FleetFile, parse_fleet
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import Gains, Platform
+
+KEPT = ("name", "kind", "max_speed_mps", "thrust_map", "max_thrust", "max_rudder", "speed_gain", "speed_pid")
+"""What a boat has whatever it is: its top speed and the scales that its other numbers are in."""
+LARGEST = 0.9
+
+
+def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Platform:
+    """The platform with each parameter larger or smaller by that share.
+
+    Args:
+        platform: as declared.
+        share: 0.2 makes each 20 % more or less.
+        boat: its name; every boat draws its own signs.
+        seed: of the draw.
+
+    Raises:
+        ConfigError: the share is not one.
+        PlatformError: what comes of it is no boat that can be steered.
+    """
+    if not 0.0 <= share <= LARGEST:
+        raise ConfigError(f"boats cannot be off by {share:g}; give a share from 0 to {LARGEST:g}, such as 0.2")
+    if share == 0.0:
+        return platform
+    rng = np.random.default_rng([seed, crc32(boat.encode())])
+    changed = {
+        entry.name: _off(getattr(platform, entry.name), share, rng)
+        for entry in fields(Platform)
+        if entry.name not in KEPT
+    }
+    changed["turn_loss"] = min(1.0, float(changed["turn_loss"]))
+    return replace(platform, name=f"{platform.name}_off", **changed)
+
+
+def _off(value: float | Gains, share: float, rng: np.random.Generator) -> float | Gains:
+    if isinstance(value, Gains):
+        return replace(value, kp=_scaled(value.kp, share, rng), kd=_scaled(value.kd, share, rng))
+    return _scaled(float(value), share, rng)
+
+
+def _scaled(value: float, share: float, rng: np.random.Generator) -> float:
+    return value * (1.0 + share * float(rng.choice((-1.0, 1.0))))
+
+
+NAME = "demo_fleet.yaml"
+
+
+LINKS = ("mavlink", "moos")
+MOOS_PORTS = (9001, 9002, 9003)
+"""Ports of our boats' MOOSDBs in the file of boats that run MOOS."""
+
+
+def demo_text(link: str = "mavlink") -> str:
+    """The file's text, to begin one's own with.
+
+    Args:
+        link: what our boats run, one of `LINKS`.
+
+    Raises:
+        ConfigError: another.
+    """
+    text = resources.files("steerclear.experiments").joinpath("templates", NAME).read_text(encoding="utf-8")
+    if link not in LINKS:
+        raise ConfigError(f"--link is {link!r}; choose one of {', '.join(LINKS)}")
+    if link == "moos":
+        ports = iter(MOOS_PORTS)
+        text = re.sub(r"link: \{kind: mavlink[^}]*\}", lambda _: f'link: "moos://127.0.0.1:{next(ports)}"', text)
+        text = text.replace("contact: feed", "contact: moos")
+    return text
+
+
+def demo_fleet(link: str = "mavlink") -> FleetFile:
+    """The file, read; its relative paths start from the present folder."""
+    return parse_fleet(demo_text(link), NAME, Path.cwd())

@@ -1,0 +1,136 @@
+"""What a boat's sensors say of its hull, with the noise that was measured, and the radio to and from its commander."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.platforms import layout as L
+
+from .hull import Hull
+from .settings import RadioSettings
+
+_POSITION_M, _POSITION_MEMORY_S = 0.06, 10.0
+_VELOCITY_MPS, _VELOCITY_MEMORY_S = 0.035, 1.0
+_HEADING_DEG_RUNNING, _HEADING_DEG_AT_REST, _HEADING_MEMORY_S = 0.3, 1.7, 3.0
+_TURN_RATE_RADS = 0.003
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One boat as its sensors see it at one moment, in the field's frame and on earth.
+
+    Attributes:
+        time_s: when it was so, simulated s.
+        x_m, y_m: m.
+        latitude_deg, longitude_deg: deg.
+        velocity_mps: over ground along the field's axes, m/s.
+        heading_rad: of the bow, clockwise from the field's y axis.
+        speed_mps: along the bow over ground, negative astern, m/s.
+        turn_rate_rads: clockwise.
+        has_fix: whether the place is GPS's; else it is dead reckoning.
+    """
+
+    time_s: float
+    x_m: float
+    y_m: float
+    latitude_deg: float
+    longitude_deg: float
+    velocity_mps: tuple[float, float]
+    heading_rad: float
+    speed_mps: float
+    turn_rate_rads: float
+    has_fix: bool = True
+
+
+class Sensors:
+    """GPS, compass and gyro of one boat.
+
+    Args:
+        frame: where the field is.
+        noise: 0 none, 1 as measured.
+        random: its random numbers.
+    """
+
+    def __init__(self, frame: FieldFrame, noise: float, random: np.random.Generator) -> None:
+        self._frame = frame
+        self._noise = noise
+        self._random = random
+        self._errors = random.standard_normal(5)
+
+    def sense(self, hull: Hull, time_s: float) -> Snapshot:
+        """What they say of the hull now."""
+        x, y = float(hull.state[L.X]), float(hull.state[L.Y])
+        velocity, heading, rate = hull.velocity_mps, hull.heading_rad, hull.turn_rate_rads
+        if self._noise > 0.0:
+            dx, dy, dvx, dvy, turn = self._drawn(hull)
+            x, y, heading = x + dx, y + dy, heading + turn
+            velocity = (velocity[0] + dvx, velocity[1] + dvy)
+            rate += self._noise * _TURN_RATE_RADS * float(self._random.standard_normal())
+        latitude, longitude = self._frame.to_geodetic_deg(x, y)
+        along = velocity[0] * math.sin(heading) + velocity[1] * math.cos(heading)
+        return Snapshot(time_s, x, y, latitude, longitude, velocity, heading, along, rate)
+
+    def _drawn(self, hull: Hull) -> tuple[float, ...]:
+        """Errors that wander: each forgets itself over its own time."""
+        memory = np.array([_POSITION_MEMORY_S] * 2 + [_VELOCITY_MEMORY_S] * 2 + [_HEADING_MEMORY_S])
+        kept = np.exp(-hull.dt_s / memory)
+        self._errors = kept * self._errors + np.sqrt(1.0 - kept**2) * self._random.standard_normal(5)
+        running = min(abs(hull.speed_mps), 1.0)
+        heading = math.radians(_HEADING_DEG_AT_REST + running * (_HEADING_DEG_RUNNING - _HEADING_DEG_AT_REST))
+        size = np.array([_POSITION_M, _POSITION_M, _VELOCITY_MPS, _VELOCITY_MPS, heading])
+        return tuple((self._noise * size * self._errors).tolist())
+
+
+Bend = Callable[[bytes], list[tuple[float, bytes]]]
+"""A fault: what becomes of a packet, as (further delay s, bytes)."""
+
+
+class Radio:
+    """Holds packets until they arrive.
+
+    Args:
+        settings: what happens to every packet.
+        random: its random numbers.
+
+    Attributes:
+        bends: faults that act now, in order.
+        lost: packets dropped so far.
+    """
+
+    def __init__(self, settings: RadioSettings, random: np.random.Generator) -> None:
+        self._settings = settings
+        self._random = random
+        self._waiting: list[tuple[float, int, bytes]] = []
+        self._number = 0
+        self.bends: list[Bend] = []
+        self.lost = 0
+
+    def put(self, packet: bytes, now_s: float) -> None:
+        """A packet leaves."""
+        if self._settings.loss > 0.0 and self._random.random() < self._settings.loss:
+            self.lost += 1
+            return
+        copies = [(0.0, packet)]
+        for bend in self.bends:
+            copies = [(late + more, bent) for late, data in copies for more, bent in bend(data)]
+        self.lost += not copies
+        for late, data in copies:
+            delay = self._settings.delay_s + late
+            if self._settings.jitter_s > 0.0:
+                delay += self._settings.jitter_s * self._random.random()
+            self._number += 1
+            heapq.heappush(self._waiting, (now_s + delay, self._number, data))
+
+    def take(self, now_s: float) -> Iterator[bytes]:
+        """Packets that have arrived by now."""
+        while self._waiting and self._waiting[0][0] <= now_s + 1e-9:
+            yield heapq.heappop(self._waiting)[2]
+
+    def clear(self) -> None:
+        """Forget what is under way."""
+        self._waiting.clear()

@@ -1,0 +1,299 @@
+"""The autopilot without its messages: modes, parameters, arming, time-outs, and which message is sent how often."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections import deque
+from collections.abc import Mapping
+from enum import IntEnum
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.exceptions import ConfigError
+
+from .hull import STEP_S, Coast, Keep, Order, Reach, Steer, Turn
+from .settings import AutopilotSettings
+
+
+class Mode(IntEnum):
+    """Modes by the autopilot's own numbers."""
+
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+
+
+NEEDS_POSITION = frozenset({Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED})
+"""Modes that cannot be entered before the position is known."""
+
+NOT_OFFERED = frozenset({Mode.AUTO, Mode.RTL, Mode.SMART_RTL})
+"""Modes that need a mission or a path back, which these boats do not have."""
+
+
+_REAL32, _INT8, _INT16, _INT32 = 9, 2, 4, 6
+
+_DEFAULTS: dict[str, tuple[float, int]] = {
+    "SYSID_THISMAV": (1.0, _INT16),
+    "SYSID_MYGCS": (255.0, _INT16),
+    "ARMING_CHECK": (1.0, _INT32),
+    "CRUISE_SPEED": (2.0, _REAL32),
+    "FRAME_CLASS": (2.0, _INT8),
+    "AVOID_ENABLE": (3.0, _INT8),
+    "FENCE_ACTION": (2.0, _INT8),
+    "FENCE_ENABLE": (0.0, _INT8),
+    "FS_ACTION": (2.0, _INT8),
+    "FS_GCS_ENABLE": (0.0, _INT8),
+    "FS_GCS_TIMEOUT": (5.0, _REAL32),
+    "FS_TIMEOUT": (1.5, _REAL32),
+    "INITIAL_MODE": (0.0, _INT8),
+    "LOIT_RADIUS": (2.0, _REAL32),
+    "OA_TYPE": (0.0, _INT8),
+    "WP_SPEED": (2.0, _REAL32),
+}
+
+
+class Parameters:
+    """Values by name; types never change.
+
+    Args:
+        given: values that differ from the defaults.
+        has_timeout: whether GUID_TIMEOUT exists.
+
+    Raises:
+        ConfigError: a name the autopilot does not have.
+    """
+
+    def __init__(self, given: Mapping[str, float], has_timeout: bool = False) -> None:
+        table = dict(_DEFAULTS)
+        if has_timeout:
+            table["GUID_TIMEOUT"] = (3.0, _REAL32)
+        self._values = {name: value for name, (value, _) in table.items()}
+        self._types = {name: kind for name, (_, kind) in table.items()}
+        for name, value in given.items():
+            if name not in self._values:
+                near = difflib.get_close_matches(name, self._values, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(self._values)}"
+                raise ConfigError(f"the simulated autopilot has no parameter {name!r}; {hint}")
+            self._values[name] = float(value)
+        self.names = sorted(self._values)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def get(self, name: str, default: float) -> float:
+        """Value of a parameter, or the default where it does not exist."""
+        return self._values.get(name, default)
+
+    def set(self, name: str, value: float) -> bool:
+        """Set a known parameter, integers rounded; False when there is none of that name."""
+        if name not in self._values:
+            return False
+        self._values[name] = float(value) if self._types[name] == _REAL32 else float(round(value))
+        return True
+
+    def type_of(self, name: str) -> int:
+        """MAV_PARAM_TYPE of a parameter."""
+        return self._types[name]
+
+
+WARNING, CRITICAL, INFO = 4, 2, 6
+"""Severities of texts."""
+
+_BOOT_S = 42.0
+_POSITION_SHARE = 9.0 / _BOOT_S
+_ATTITUDE_SHARE = 1.0 / _BOOT_S
+
+NO_ARMING = "Arm: AHRS: not using configured AHRS type"
+
+
+class Vehicle:
+    """One boat's autopilot from power on.
+
+    Attributes:
+        parameters: kept over a restart, as on a real boat.
+        mode, armed: present ones.
+        texts: (severity, text) not yet sent.
+        target: what the commander asked for; None when there is none or it timed out.
+    """
+
+    def __init__(self, settings: AutopilotSettings, parameters: Parameters) -> None:
+        self.settings = settings
+        self.parameters = parameters
+        self.texts: deque[tuple[int, str]] = deque(maxlen=100)
+        self.boot(0.0)
+
+    def boot(self, now_s: float) -> None:
+        """Start, or start again: everything but the parameters is forgotten."""
+        self.booted_s = now_s
+        self.armed = False
+        self.mode = Mode(int(self.parameters["INITIAL_MODE"]))
+        self.target: Steer | Turn | Reach | None = None
+        self._target_s = -math.inf
+        self._timed_out = False
+        self._gcs_s = math.inf
+        self.texts.clear()
+        self.say(INFO, "ArduPilot Ready")
+
+    def say(self, severity: int, text: str) -> None:
+        """Queue a text for the ground."""
+        self.texts.append((severity, text))
+
+    def uptime_s(self, now_s: float) -> float:
+        """Since power on, s."""
+        return now_s - self.booted_s
+
+    def has_position(self, now_s: float) -> bool:
+        """Whether it knows where it is."""
+        return self.uptime_s(now_s) >= self.settings.boot_s * _POSITION_SHARE
+
+    def has_attitude(self, now_s: float) -> bool:
+        """Whether its attitude is to be believed."""
+        return self.uptime_s(now_s) >= self.settings.boot_s * _ATTITUDE_SHARE
+
+    def can_arm(self, now_s: float) -> bool:
+        """Whether all checks pass."""
+        return self.uptime_s(now_s) >= self.settings.boot_s
+
+    def arm(self, now_s: float, force: bool = False) -> bool:
+        """Arm; refusals are explained in a text."""
+        checks = self.parameters["ARMING_CHECK"] != 0.0 and not force
+        if not self.armed and checks and not self.can_arm(now_s):
+            self.say(CRITICAL, NO_ARMING)
+            return False
+        self.armed = True
+        return True
+
+    def disarm(self) -> None:
+        """Motors off."""
+        self.armed = False
+
+    def set_mode(self, number: int, now_s: float) -> bool:
+        """Change mode; refusals are explained in a text."""
+        if number not in list(Mode):
+            self.say(WARNING, f"No such mode {number}")
+            return False
+        mode = Mode(number)
+        if mode == self.mode:
+            return True
+        if mode in NOT_OFFERED or (mode in NEEDS_POSITION and not self.has_position(now_s)):
+            self.say(WARNING, "Flight mode change failed")
+            return False
+        self.mode = mode
+        self.target, self._timed_out = None, False
+        return True
+
+    def take(self, target: Steer | Turn | Reach, now_s: float) -> bool:
+        """Obey a target from now on; in any other mode than GUIDED it is ignored."""
+        if self.mode is not Mode.GUIDED:
+            return False
+        self.target, self._target_s, self._timed_out = target, now_s, False
+        return True
+
+    def hear_ground(self, now_s: float) -> None:
+        """A heartbeat of the ground station came."""
+        self._gcs_s = now_s
+
+    def tick(self, now_s: float) -> None:
+        """Look at the clocks: targets that grew old, ground stations gone silent."""
+        limit = self._timeout_s()
+        if isinstance(self.target, (Steer, Turn)) and now_s - self._target_s > limit:
+            self.say(WARNING, f"target not received last {limit:g}secs, stopping")
+            self.target, self._timed_out = None, True
+        patience = self.parameters["FS_GCS_TIMEOUT"] + self.parameters["FS_TIMEOUT"]
+        watched = self.parameters["FS_GCS_ENABLE"] != 0.0 and self.armed and self.mode is not Mode.HOLD
+        if watched and now_s - self._gcs_s > patience:
+            self.say(CRITICAL, "Radio Failsafe")
+            self.set_mode(Mode.HOLD, now_s)
+
+    def order(self) -> Order:
+        """What the hull is to do now."""
+        if not self.armed or self.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD):
+            return Coast()
+        if self.mode is Mode.GUIDED and self.target is not None:
+            return self.target
+        return Keep(self.settings.back_up_m if self._timed_out else 0.0)
+
+    def _timeout_s(self) -> float:
+        return self.parameters.get("GUID_TIMEOUT", self.settings.timeout_s)
+
+
+HEARTBEAT_S = 1.0
+_PHASE_S = STEP_S
+"""A stream begins at a multiple of this, so that it tells each new state of the hull as soon as there is one."""
+
+GROUPS: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (),
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT),
+    mavlink.MAV_DATA_STREAM_POSITION: (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT),
+}
+"""Messages of REQUEST_DATA_STREAM's groups."""
+
+
+class Streams:
+    """Intervals of one boat's messages.
+
+    Args:
+        top_rate_hz: highest rate of one message; faster requests are slowed to it.
+        known: ids of the messages it can send.
+    """
+
+    def __init__(self, top_rate_hz: float, known: frozenset[int]) -> None:
+        self._shortest_s = 1.0 / top_rate_hz
+        self._known = known
+        self.reset()
+
+    def reset(self) -> None:
+        """As after power on: heartbeats only."""
+        self._interval_s = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: HEARTBEAT_S}
+        self._next_s: dict[int, float] = {}
+
+    def set_interval(self, message: int, interval_us: float) -> bool:
+        """SET_MESSAGE_INTERVAL: -1 never, 0 the default; False for a message it cannot send."""
+        if message not in self._known:
+            return False
+        if interval_us > 0.0:
+            self._interval_s[message] = max(interval_us * 1e-6, self._shortest_s)
+        elif message == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self._interval_s[message] = HEARTBEAT_S
+        else:
+            self._interval_s.pop(message, None)
+        self._next_s.pop(message, None)
+        return True
+
+    def set_group(self, group: int, rate_hz: int) -> None:
+        """REQUEST_DATA_STREAM: all messages of a group, 0 Hz stops them."""
+        groups = GROUPS if group == mavlink.MAV_DATA_STREAM_ALL else {group: GROUPS.get(group, ())}
+        for messages in groups.values():
+            for message in messages:
+                self.set_interval(message, 1e6 / rate_hz if rate_hz > 0 else -1.0)
+
+    def interval_us(self, message: int) -> int:
+        """Present interval, us; -1: not sent, 0: unknown."""
+        if message not in self._known:
+            return 0
+        return round(self._interval_s[message] * 1e6) if message in self._interval_s else -1
+
+    def due(self, now_s: float) -> list[int]:
+        """Messages to send now; one that fell behind is sent once."""
+        due = []
+        for message, interval in self._interval_s.items():
+            at = self._next_s.setdefault(message, math.ceil(now_s / _PHASE_S - 1e-6) * _PHASE_S)
+            if at <= now_s + 1e-9:
+                due.append(message)
+                self._next_s[message] = at + interval if at + interval > now_s else now_s + interval
+        return due

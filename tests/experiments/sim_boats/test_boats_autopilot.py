@@ -1,0 +1,429 @@
+import hashlib
+import itertools
+import math
+
+import pytest
+from boat_bench import ARM, ID, INTERVAL, MODE, Bench, attitude, stream, velocity
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.experiments.sim_boats import LATER_FIRMWARE
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import layout as L
+
+GPI = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+LOCAL = mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE
+
+
+def test_boots_as_measured():
+    bench = Bench(boot_s=42.0)
+    stream(bench, GPI, 10)
+    stream(bench, LOCAL, 10)
+    bench.run(8.0)
+    assert bench.command(MODE, 1, 15) == mavlink.MAV_RESULT_FAILED  # GUIDED needs a position
+    assert bench.last("GLOBAL_POSITION_INT").lat == 0
+    assert not bench.times("LOCAL_POSITION_NED")
+    bench.run(2.0)
+    assert bench.times("LOCAL_POSITION_NED")[0] == pytest.approx(9.0, abs=0.2)
+    assert bench.last("GLOBAL_POSITION_INT").lat == pytest.approx(420000900, abs=100)
+    assert bench.command(MODE, 1, 15) == mavlink.MAV_RESULT_ACCEPTED
+    bench.run(30.0)
+    assert bench.command(ARM, 1) == mavlink.MAV_RESULT_FAILED
+    bench.run(0.1)
+    assert "Arm: AHRS: not using configured AHRS type" in bench.texts()
+    assert not bench.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    bench.run(2.5)
+    assert bench.command(ARM, 1) == mavlink.MAV_RESULT_ACCEPTED
+    bench.run(1.1)
+    assert bench.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert (bench.last("HEARTBEAT").custom_mode, bench.last("HEARTBEAT").type) == (15, 11)
+
+
+def test_attitude_of_the_first_second_is_not_to_be_believed():
+    bench = Bench(boot_s=42.0)
+    stream(bench, ATTITUDE, 40)
+    bench.run(3.0)
+    yaws = [(t, m.yaw) for t, m in bench.heard if m.get_type() == "ATTITUDE"]
+    assert max(abs(yaw) for t, yaw in yaws if t < 1.0) > 0.5
+    assert max(abs(yaw) for t, yaw in yaws if t > 1.1) < 1e-6
+
+
+def test_arms_without_checks_when_forced_or_set_so():
+    assert Bench(boot_s=42.0).command(ARM, 1, 21196) == mavlink.MAV_RESULT_ACCEPTED
+    assert Bench(boot_s=42.0, parameters={"ARMING_CHECK": 0}).command(ARM, 1) == mavlink.MAV_RESULT_ACCEPTED
+    bench = Bench().guided()
+    assert bench.command(ARM, 0) == mavlink.MAV_RESULT_ACCEPTED
+    assert not bench.boat.autopilot.vehicle.armed
+
+
+@pytest.mark.parametrize(
+    ("command", "parameters", "result"),
+    [
+        (MODE, (0, 15), mavlink.MAV_RESULT_DENIED),
+        (MODE, (1, 77), mavlink.MAV_RESULT_FAILED),
+        (MODE, (1, 10), mavlink.MAV_RESULT_FAILED),
+        (MODE, (1, 4), mavlink.MAV_RESULT_ACCEPTED),
+        (ARM, (3,), mavlink.MAV_RESULT_UNSUPPORTED),
+        (ARM, (math.nan,), mavlink.MAV_RESULT_UNSUPPORTED),
+        (INTERVAL, (9999, 1e5), mavlink.MAV_RESULT_FAILED),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (), mavlink.MAV_RESULT_UNSUPPORTED),
+        (mavlink.MAV_CMD_REQUEST_MESSAGE, (9999,), mavlink.MAV_RESULT_FAILED),
+        (mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, (0,), mavlink.MAV_RESULT_DENIED),
+    ],
+)
+def test_commands_are_acknowledged(command, parameters, result):
+    bench = Bench()
+    bench.run(0.1)
+    assert bench.command(command, *parameters) == result
+    assert bench.command(command, *parameters, target=ID + 1) is None
+
+
+def test_speed_cannot_be_changed_while_heading_and_speed_are_commanded():
+    bench = Bench().guided()
+    assert bench.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    bench.say(attitude(0.0, 0.5))
+    assert bench.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 1.0) == 4
+
+
+def test_set_mode_is_acknowledged_too():
+    bench = Bench()
+    bench.run(0.1)
+    bench.say(mavlink.MAVLink_set_mode_message(ID, 1, 15))
+    assert (bench.last("COMMAND_ACK").command, bench.last("COMMAND_ACK").result) == (11, 0)
+
+
+def steady(bench, message):
+    """Heading over ground deg, speed along the bow m/s, and turn rate deg/s under a command held for a while."""
+    bench.run(18.0, message)
+    return math.degrees(bench.hull.heading_rad), bench.hull.speed_mps, math.degrees(bench.hull.turn_rate_rads)
+
+
+@pytest.mark.parametrize(
+    ("message", "heading_deg", "speed_mps"),
+    [
+        (attitude(math.radians(60), 0.5), 60.0, 1.0),
+        (attitude(math.radians(60), 5.0), 60.0, 2.0),  # thrust beyond 1 is 1
+        (attitude(math.radians(60), -0.5), 60.0, -1.0),
+        (velocity(0.0, 1.5), 90.0, 1.5),
+        (velocity(-3.0, 0.0), 180.0, 2.0),  # clamped to WP_SPEED, and southward ahead
+        (velocity(1.0, 0.0, mask=2503, yaw=math.radians(30)), 30.0, 1.0),
+        (velocity(-1.0, 0.0, mask=2503, yaw=math.radians(180)), 180.0, -1.0),  # the trap
+        (velocity(0.0, 1.0, mask=2503, yaw=math.radians(90)), 90.0, 1.0),
+    ],
+)
+def test_routes_in_guided(message, heading_deg, speed_mps):
+    heading, speed, _ = steady(Bench().guided(), message)
+    assert (heading - heading_deg + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=2.0)
+    assert speed == pytest.approx(speed_mps, abs=0.08)
+
+
+def test_later_firmware_has_no_trap_and_no_yaw_speed_command():
+    bench = Bench(firmware=LATER_FIRMWARE).guided()
+    _, speed, _ = steady(bench, velocity(-1.0, 0.0, mask=2503, yaw=math.radians(180)))
+    assert speed == pytest.approx(1.0, abs=0.05)
+    assert bench.command(mavlink.MAV_CMD_NAV_SET_YAW_SPEED, 30, 1, 0) == mavlink.MAV_RESULT_UNSUPPORTED
+
+
+def test_yaw_speed_command_is_not_clamped():
+    bench = Bench(parameters={"WP_SPEED": 1.0}).guided()
+    bench.run(1.0)
+    for _ in range(25):
+        assert bench.command(mavlink.MAV_CMD_NAV_SET_YAW_SPEED, 30, 1.8, 0) == mavlink.MAV_RESULT_ACCEPTED
+        bench.run(1.0)
+    assert bench.hull.speed_mps == pytest.approx(1.8, abs=0.05)
+    assert math.degrees(bench.hull.heading_rad) == pytest.approx(30.0, abs=2.0)
+
+
+def test_relative_yaw_in_body_frame_spins():
+    bench = Bench().guided()
+    turned = 0.0
+    for _ in range(100):
+        bench.run(0.1, velocity(1.0, 0.0, frame=8, mask=2503, yaw=math.radians(20)))
+        turned += 0.1 * math.degrees(bench.hull.turn_rate_rads)
+    assert turned > 60.0  # the same +20 deg again and again: it never gets there
+
+
+@pytest.mark.parametrize(
+    "message",
+    [velocity(1.0, 0.0, frame=8, mask=1479, rate=0.3), attitude(0.0, 0.5, mask=3, rate=0.3)],
+)
+def test_turn_rates(message):
+    _, speed, rate = steady(Bench().guided(), message)
+    assert math.radians(rate) == pytest.approx(0.3, abs=0.02)
+    assert 0.0 < speed <= 1.05
+
+
+def test_velocity_and_rate_in_body_frame_reverses():
+    _, speed, _ = steady(Bench().guided(), velocity(-1.0, 0.0, frame=8, mask=1479))
+    assert speed == pytest.approx(-1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        attitude(1.0, 0.5, mask=7 | 64),  # thrust ignored: dropped
+        attitude(1.0, 0.5, target=ID + 1),
+        attitude(math.nan, 0.5),
+        attitude(1.0, math.inf),
+        velocity(1.0, 1.0, frame=3),
+        velocity(math.nan, 1.0),
+        velocity(1.0, 1.0, mask=3527 & ~64),  # an acceleration
+    ],
+)
+def test_what_is_dropped_is_dropped_silently(message):
+    bench = Bench().guided()
+    start = bench.hull.state[:3].copy()
+    heard = len(bench.heard)
+    bench.run(2.0, message)
+    assert (bench.hull.state[:3] == start).all()
+    assert {m.get_type() for _, m in bench.heard[heard:]} <= {"HEARTBEAT", "STATUSTEXT"}
+
+
+def test_outside_guided_and_disarmed_nothing_moves():
+    for mode in (0, 4, 5):
+        bench = Bench().guided()
+        bench.command(MODE, 1, mode)
+        before = len(bench.heard)
+        bench.run(2.0, attitude(1.0, 0.5))
+        assert bench.hull.state[L.SPEED] == 0.0
+        assert "COMMAND_ACK" not in {m.get_type() for _, m in bench.heard[before:]}
+    bench = Bench().guided()
+    bench.command(ARM, 0)
+    bench.run(2.0, attitude(1.0, 0.5))
+    assert bench.hull.state[L.SPEED] == 0.0
+
+
+@pytest.mark.parametrize(("speed_mps", "still_after_s", "run_m"), [(1.0, 3.9, 3.4), (2.0, 4.7, 7.7), (3.0, 5.6, 13.2)])
+def test_commands_time_out_as_measured(speed_mps, still_after_s, run_m):
+    bench = Bench("surveyor", parameters={"WP_SPEED": 3.0}).guided()
+    bench.run(60.0, attitude(0.0, speed_mps / 3.0))
+    start_s, y = bench.now_s, bench.hull.state[L.Y]
+    assert bench.hull.speed_mps == pytest.approx(speed_mps, abs=0.05)
+    while bench.hull.speed_mps > 0.1:
+        bench.run(0.1)
+    assert bench.now_s - start_s == pytest.approx(still_after_s, abs=0.25)
+    furthest = bench.hull.state[L.Y]
+    assert furthest - y == pytest.approx(run_m, rel=0.08)
+    assert "target not received last 3secs, stopping" in bench.texts()
+    bench.run(30.0)
+    assert furthest - bench.hull.state[L.Y] == pytest.approx(2.0, abs=0.2)  # it backs up
+    assert (bench.last("HEARTBEAT").custom_mode, bench.last("HEARTBEAT").system_status) == (15, 4)
+    bench.run(3.0, attitude(0.0, 0.5))
+    assert bench.hull.speed_mps > 0.2  # resumes at the next command
+
+
+@pytest.mark.parametrize(("every_s", "kept"), [(2.5, True), (3.34, False)])
+def test_commands_must_come_every_three_seconds(every_s, kept):
+    bench = Bench().guided()
+    bench.run(20.0, attitude(0.0, 0.5), every_s)
+    assert ("target not received last 3secs, stopping" not in bench.texts()) is kept
+
+
+def test_later_firmware_takes_the_time_from_a_parameter():
+    bench = Bench(firmware=LATER_FIRMWARE, parameters={"GUID_TIMEOUT": 1.0}).guided()
+    bench.say(attitude(0.0, 0.5))
+    bench.run(1.2)
+    assert "target not received last 1secs, stopping" in bench.texts()
+
+
+def heartbeat(bench):
+    bench.say(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+
+
+def test_ground_station_failsafe_is_off_by_default_and_holds_when_on():
+    bench = Bench().guided()
+    heartbeat(bench)
+    bench.run(10.0, attitude(0.0, 0.5))
+    assert bench.last("HEARTBEAT").custom_mode == 15
+    bench = Bench(parameters={"FS_GCS_ENABLE": 1}).guided()
+    bench.run(8.0, attitude(0.0, 0.5))
+    assert bench.last("HEARTBEAT").custom_mode == 15  # never heard of one
+    heartbeat(bench)
+    start_s = bench.now_s
+    bench.run(10.0, attitude(0.0, 0.5))
+    assert "Radio Failsafe" in bench.texts()
+    assert bench.last("HEARTBEAT").custom_mode == 4
+    when = next(t for t, m in bench.heard if m.get_type() == "STATUSTEXT" and "Failsafe" in m.text)
+    assert when - start_s == pytest.approx(6.5, abs=0.15)
+    heartbeat(bench)
+    bench.run(1.0, attitude(0.0, 0.5))
+    assert bench.last("HEARTBEAT").custom_mode == 4  # GUIDED must be asked for again
+
+
+@pytest.mark.parametrize(("asked_hz", "rate_hz"), [(4, 4), (10, 10), (20, 20), (40, 40), (200, 40)])
+def test_rates_of_messages(asked_hz, rate_hz):
+    bench = Bench()
+    bench.run(0.1)
+    assert stream(bench, GPI, asked_hz) == mavlink.MAV_RESULT_ACCEPTED
+    bench.run(10.0)
+    times = bench.times("GLOBAL_POSITION_INT")
+    assert len(times) == pytest.approx(10 * rate_hz, abs=5)
+    gaps = [b - a for a, b in itertools.pairwise(times)]
+    assert max(gaps) <= 1.0 / rate_hz + 0.021
+    assert min(gaps) >= 0.019
+    bench.command(INTERVAL, GPI, -1)
+    before = len(bench.times("GLOBAL_POSITION_INT"))
+    bench.run(1.0)
+    assert len(bench.times("GLOBAL_POSITION_INT")) == before
+
+
+def test_only_heartbeats_come_unasked_and_groups_can_be_asked_for():
+    bench = Bench()
+    bench.run(5.0)
+    assert {m.get_type() for _, m in bench.heard} == {"HEARTBEAT", "STATUSTEXT"}
+    assert len(bench.times("HEARTBEAT")) == 5
+    bench.say(mavlink.MAVLink_request_data_stream_message(ID, 1, mavlink.MAV_DATA_STREAM_POSITION, 5, 1))
+    bench.run(2.0)
+    assert len(bench.times("GLOBAL_POSITION_INT")) == pytest.approx(10, abs=1)
+    bench.command(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL, GPI)
+    assert bench.last("MESSAGE_INTERVAL").interval_us == 200_000
+
+
+def test_telemetry_says_where_the_hull_is():
+    bench = Bench(y_axis_deg=37.0).guided()
+    for message in (GPI, LOCAL, ATTITUDE, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN):
+        stream(bench, message, 10)
+    bench.run(10.0, attitude(math.radians(100.0), 0.5))
+    told, hull = bench.last("GLOBAL_POSITION_INT"), bench.hull
+    x, y = bench.frame.to_field_m(told.lat * 1e-7, told.lon * 1e-7)
+    assert (x, y) == pytest.approx((hull.state[L.X], hull.state[L.Y]), abs=0.02)
+    assert told.hdg / 100.0 == pytest.approx(math.degrees(hull.heading_rad) + 37.0, abs=0.02)
+    assert math.degrees(bench.last("ATTITUDE").yaw) == pytest.approx(told.hdg / 100.0, abs=0.02)
+    assert math.hypot(told.vx, told.vy) / 100.0 == pytest.approx(hull.speed_mps, abs=0.02)
+    assert math.degrees(math.atan2(told.vy, told.vx)) == pytest.approx(told.hdg / 100.0, abs=2.0)
+    local, origin = bench.last("LOCAL_POSITION_NED"), bench.last("GPS_GLOBAL_ORIGIN")
+    x0, y0 = bench.frame.to_field_m(origin.latitude * 1e-7, origin.longitude * 1e-7)
+    dx, dy = bench.frame.turn_to_field(local.y, local.x)
+    assert (x0 + dx, y0 + dy) == pytest.approx((x, y), abs=0.05)
+    assert told.time_boot_ms / 1000.0 == pytest.approx(bench.now_s, abs=0.11)
+
+
+def test_commanded_heading_is_true_north():
+    bench = Bench(y_axis_deg=37.0).guided()
+    heading, _, _ = steady(bench, attitude(math.radians(100.0), 0.5))
+    assert heading == pytest.approx(63.0, abs=2.0)
+
+
+def test_parameters():
+    bench = Bench()
+
+    def read(name=b"", index=-1):
+        before = len(bench.heard)
+        bench.say(mavlink.MAVLink_param_request_read_message(ID, 1, name, index))
+        return [m for _, m in bench.heard[before:]]
+
+    assert read(b"WP_SPEED")[0].param_value == 2.0  # the platform's top speed
+    assert read(b"NO_SUCH_NAME") == []
+    assert read(index=10_000) == []
+    bench.say(mavlink.MAVLink_param_set_message(ID, 1, b"WP_SPEED", 1.25, 9))
+    assert bench.last("PARAM_VALUE").param_value == 1.25
+    bench.say(mavlink.MAVLink_param_set_message(ID, 1, b"WP_SPEED", math.nan, 9))
+    assert read(b"WP_SPEED")[0].param_value == 1.25
+    before = len(bench.heard)
+    bench.say(mavlink.MAVLink_param_request_list_message(ID, 1))
+    told = [m for _, m in bench.heard[before:]]
+    assert len(told) == told[0].param_count == len({m.param_id for m in told})
+    assert read(index=3)[0].param_id == told[3].param_id
+
+
+def test_wp_speed_zero_means_no_motion():
+    bench = Bench(parameters={"WP_SPEED": 0.0}).guided()
+    bench.run(5.0, attitude(0.0, 1.0))
+    assert bench.hull.speed_mps == 0.0
+
+
+def test_unknown_parameters_are_explained():
+    with pytest.raises(ConfigError, match="did you mean WP_SPEED"):
+        Bench(parameters={"WPSPEED": 1.0})
+
+
+def test_version_and_time_are_told():
+    bench = Bench()
+    bench.run(1.5)
+    bench.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    version = bench.last("AUTOPILOT_VERSION")
+    assert version.flight_sw_version >> 16 == (4 << 8 | 6)
+    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    bench.say(mavlink.MAVLink_timesync_message(0, 12345))
+    assert (bench.last("TIMESYNC").ts1, bench.last("TIMESYNC").tc1) == (12345, 1_500_000_000)
+
+
+def test_goes_to_a_place_and_stays():
+    bench = Bench().guided()
+    latitude, longitude = bench.frame.to_geodetic_deg(30.0, 10.0)
+    bench.say(
+        mavlink.MAVLink_set_position_target_global_int_message(
+            0, ID, 1, 6, 3576, round(latitude * 1e7), round(longitude * 1e7), 0, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+    )
+    bench.run(40.0)
+    assert math.dist(bench.hull.state[:2], (30.0, 10.0)) < 4.0
+    assert bench.texts() == ["ArduPilot Ready"]  # a place does not time out
+
+
+def test_restart_forgets_all_but_parameters():
+    bench = Bench(boot_s=2.0)
+    bench.run(2.1)
+    bench.guided()
+    stream(bench, GPI, 20)
+    bench.say(mavlink.MAVLink_param_set_message(ID, 1, b"WP_SPEED", 1.5, 9))
+    bench.run(5.0, attitude(0.0, 1.0))
+    assert bench.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == mavlink.MAV_RESULT_ACCEPTED
+    speed = bench.hull.speed_mps
+    before = len(bench.heard)
+    bench.run(1.0, attitude(0.0, 1.0))
+    assert {m.get_type() for _, m in bench.heard[before:]} == {"HEARTBEAT", "STATUSTEXT"}
+    assert bench.last("HEARTBEAT").custom_mode == 0
+    assert 0.0 < bench.hull.speed_mps < speed  # it runs on without motors
+    assert bench.command(ARM, 1) == mavlink.MAV_RESULT_FAILED
+    bench.run(1.2)
+    bench.guided()
+    assert bench.boat.autopilot.vehicle.parameters["WP_SPEED"] == 1.5
+
+
+KEY = hashlib.sha256(b"test").digest()
+
+
+def signing_bench():
+    bench = Bench(key=KEY)
+    bench.ground.signing.secret_key = KEY
+    bench.ground.signing.timestamp = bench.boat.autopilot._gate._latest
+    bench.ground.signing.sign_outgoing = True
+    return bench
+
+
+def test_signed_packets_are_obeyed_and_answers_are_signed():
+    bench = signing_bench()
+    bench.run(1.1)
+    assert bench.command(MODE, 1, 15) == 0
+    assert all(packet[2] & 1 for packet in bench.packets)
+    bench.reader.signing.secret_key = KEY
+    bench.run(2.0)  # decoding checks the signatures
+
+
+def test_unsigned_replayed_and_wrongly_signed_packets_are_refused():
+    bench = signing_bench()
+    bench.run(0.1)
+    message = mavlink.MAVLink_command_long_message(ID, 1, MODE, 0, 1, 15, 0, 0, 0, 0, 0)
+    packet = bytes(message.pack(bench.ground))
+    bench.boat.hear(packet, 0.1)
+    assert bench.boat.autopilot.vehicle.mode == 15
+    bench.command(MODE, 1, 4)
+    bench.boat.hear(packet, 0.1)  # again
+    assert bench.boat.autopilot.vehicle.mode == 4
+    bench.ground.signing.sign_outgoing = False
+    assert bench.command(MODE, 1, 15) is None
+    bench.ground.signing.sign_outgoing = True
+    bench.ground.signing.secret_key = bytes(32)
+    bench.ground.signing.timestamp += 10**9  # far ahead: it must not lock the rightful one out
+    assert bench.command(MODE, 1, 15) is None
+    assert bench.boat.autopilot.counts["refused"] == 3
+    bench.ground.signing.secret_key = KEY
+    bench.ground.signing.timestamp -= 10**9
+    assert bench.command(MODE, 1, 15) == 0
+
+
+def test_keys_of_another_length_are_refused():
+    from steerclear.experiments.sim_boats.signing import check_key
+
+    with pytest.raises(ConfigError, match="32"):
+        check_key(b"short")

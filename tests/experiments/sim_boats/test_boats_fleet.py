@@ -1,0 +1,336 @@
+import itertools
+import math
+import socket
+import time
+
+import pytest
+from boat_links import READY, station
+from pymavlink import mavutil
+from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import layout as L
+
+HERE = "127.0.0.1"
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind((HERE, 0))
+        return probe.getsockname()[1]
+
+
+def alone(**settings):
+    return SimFleet([SimBoat("b", start=(10.0, 10.0, 0.0))], autopilot=READY, **settings)
+
+
+@pytest.mark.parametrize("kind", ["", "udpout", "udpin", "tcp"])
+def test_boats_behind_every_kind_of_link(kind):
+    port = free_port(socket.SOCK_STREAM if kind == "tcp" else socket.SOCK_DGRAM)
+    address = f"{kind}:{HERE}:{port}" if kind else ""
+    fleet = SimFleet([SimBoat("b", address=address, system_id=9)], autopilot=READY)
+    with station(fleet) as ground:
+        assert fleet.addresses["b"] == address or not kind
+        ground.run(0.5)
+        ground.call()
+        ground.guide(9)
+        ground.run(3.0, lambda: ground.steer(9, 1.0, 0.5))
+        assert ground.of("HEARTBEAT", 9)[-1].custom_mode == 15
+        assert len(ground.of("GLOBAL_POSITION_INT", 9)) > 30
+        assert fleet.states()["b"][L.SPEED] > 0.3
+
+
+def test_a_boat_that_dials_finds_a_server_that_comes_later():
+    port = free_port(socket.SOCK_STREAM)
+    fleet = SimFleet([SimBoat("b", address=f"tcpin:{HERE}:{port}")], autopilot=READY)
+    fleet.advance(0.2)
+    server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        server.bind((HERE, port))
+        server.listen(1)
+        server.settimeout(5.0)
+        deadline = time.monotonic() + 10.0
+        data = b""
+        server.setblocking(False)
+        peer = None
+        while len(data) < 20 and time.monotonic() < deadline:
+            fleet.advance(1.0)
+            time.sleep(0.05)
+            try:
+                peer = peer or server.accept()[0]
+                peer.settimeout(0.1)
+                data += peer.recv(4096)
+            except (BlockingIOError, TimeoutError):
+                continue
+        assert data[0] == 0xFD
+    finally:
+        if peer is not None:
+            peer.close()
+        server.close()
+        fleet.close()
+
+
+def test_boats_share_a_port_and_hear_only_what_is_for_them():
+    address = f"udpout:{HERE}:{free_port()}"
+    boats = [SimBoat(f"b{i}", address=address, system_id=10 + i) for i in range(3)]
+    fleet = SimFleet(boats, autopilot=READY)
+    with station(fleet) as ground:
+        assert set(fleet.addresses.values()) == {address}
+        ground.run(0.2)
+        ground.guide(11)
+        ground.run(3.0, lambda: ground.steer(11, 1.0, 0.5))
+        moving = {name: state[L.SPEED] > 0.1 for name, state in fleet.states().items()}
+        assert moving == {"b0": False, "b1": True, "b2": False}
+        assert {m.get_srcSystem() for m in ground.heard} == {10, 11, 12}
+        assert fleet.boats["b0"].autopilot.counts["taken"] <= 1  # the heartbeat for all
+
+
+@pytest.mark.parametrize(
+    ("boats", "match"),
+    [
+        ([], "at least one"),
+        ([SimBoat("a"), SimBoat("a")], "name of its own"),
+        ([SimBoat("a", address="serial:/dev/ttyUSB0:57600")], "cannot simulate"),
+        ([SimBoat("a", address="udpout:127.0.0.1:x")], "cannot simulate"),
+        ([SimBoat("a", address="udpout:10.1.2.3:14550")], "not on this machine"),
+        ([SimBoat("a", system_id=300)], "system id 300"),
+        ([SimBoat("a", team=2)], "in no team"),
+        ([SimBoat("a", address=None, policy="medium")], "no game"),
+        ([SimBoat("a", platform="yacht")], "unknown platform"),
+        ([SimBoat("a"), SimBoat("b", team=1, address=None, policy="nobody")], "scripted policies only"),
+    ],
+)
+def test_boats_that_cannot_be_are_refused(boats, match):
+    with pytest.raises(ConfigError, match=match):
+        SimFleet(boats)
+
+
+def test_two_boats_of_one_id_on_a_port_are_refused():
+    address = f"udpout:{HERE}:{free_port()}"
+    boats = [SimBoat("a", address=address, system_id=3), SimBoat("b", address=address, system_id=3)]
+    with pytest.raises(ConfigError, match="system id 3"):
+        SimFleet(boats)
+    again = SimFleet([SimBoat("a", address=address)])  # the port was given back
+    again.close()
+
+
+def test_a_taken_port_is_one_clear_error():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((HERE, 0))
+        with pytest.raises(ConfigError, match="choose a free port"):
+            SimFleet([SimBoat("a", address=f"udpout:{HERE}:{other.getsockname()[1]}")])
+
+
+def test_the_same_seed_gives_the_same_sensors():
+    def seen(seed):
+        with alone(noise=1.0, seed=seed, radio=RadioSettings(loss=0.3)) as _:
+            pass
+        fleet = alone(noise=1.0, seed=seed)
+        fleet.advance(5.0)
+        fleet.close()
+        return fleet.boats["b"].seen
+
+    assert seen(3) == seen(3)
+    assert seen(3) != seen(4)
+
+
+def test_lives_by_its_clock_in_a_thread():
+    with alone(speed=5.0) as fleet:
+        start = time.monotonic()
+        while fleet.time_s < 5.0:
+            time.sleep(0.02)
+            assert time.monotonic() - start < 30.0
+        wall_s = time.monotonic() - start
+        assert fleet.is_running
+        with pytest.raises(ConfigError, match="runs by itself"):
+            fleet.advance(1.0)
+    assert not fleet.is_running
+    assert wall_s >= 0.9
+    assert fleet.cpu_s > 0.0
+    fleet.close()  # again
+
+
+def test_loss_and_delay_of_the_radio():
+    fleet = alone(radio=RadioSettings(loss=0.4, delay_s=0.3))
+    with station(fleet) as ground:
+        for _ in range(40):
+            ground.call()
+            ground.guide(1)
+            ground.run(0.1)
+        ground.heard.clear()
+        ground.run(20.0)
+        told = ground.positions(1)
+        assert 0.45 * 400 < len(told) < 0.75 * 400
+        assert fleet.boats["b"].down.lost > 100
+        assert fleet.boats["b"].up.lost > 20
+        assert told[-1][0] == pytest.approx(fleet.time_s - 0.3, abs=0.5)
+
+
+def faulty(kind, **options):
+    """Positions told before and during a fault, of a boat that runs north at 1 m/s, and the station."""
+    fleet = alone()
+    with station(fleet) as ground:
+        ground.run(0.2)
+        ground.guide(1)
+        ground.run(10.0, lambda: ground.steer(1, 0.0, 0.5))
+        ground.heard.clear()
+        ground.run(2.0, lambda: ground.steer(1, 0.0, 0.5))
+        before = ground.positions(1)
+        ground.heard.clear()
+        fleet.fault("b", kind, **options)
+        ground.run(3.0, lambda: ground.steer(1, 0.0, 0.5))
+        yield before, ground.positions(1), ground
+        fleet.clear("b")
+        ground.heard.clear()
+        ground.run(3.0, lambda: ground.steer(1, 0.0, 0.5))
+        yield ground.positions(1)
+
+
+def test_telemetry_stops_while_commands_still_arrive():
+    drill = faulty("telemetry_stop")
+    _, during, ground = next(drill)
+    assert during == []
+    assert ground.fleet.boats["b"].is_commanded
+    assert len(next(drill)) > 40
+
+
+def test_link_loss_ends_in_the_boats_own_time_out():
+    drill = faulty("link_loss")
+    _, during, ground = next(drill)
+    assert during == []
+    ground.run(0.3)
+    assert not ground.fleet.boats["b"].is_commanded
+    assert len(next(drill)) > 40
+
+
+def test_commands_are_lost_one_way():
+    drill = faulty("commands_lost")
+    _, during, ground = next(drill)
+    assert len(during) > 40
+    ground.run(0.3)
+    assert not ground.fleet.boats["b"].is_commanded
+    drill.close()
+
+
+def test_frozen_positions_have_fresh_time_stamps():
+    drill = faulty("freeze")
+    before, during, _ = next(drill)
+    assert len({place[1:] for place in during}) == 1
+    assert during[-1][0] - during[0][0] > 2.0
+    assert math.dist(during[-1][1:], before[-1][1:]) < 0.3
+    assert next(drill)[-1][2] > before[-1][2] + 4.0
+
+
+def test_positions_jump():
+    drill = faulty("jump", distance_m=30.0, course_deg=90.0)
+    before, during, _ = next(drill)
+    assert during[0][1] - before[-1][1] == pytest.approx(30.0, abs=0.5)
+    assert next(drill)[-1][1] == pytest.approx(before[-1][1], abs=0.5)
+
+
+def test_the_compass_is_off():
+    drill = faulty("compass", offset_deg=30.0)
+    _, _, ground = next(drill)
+    ground.run(5.0, lambda: ground.steer(1, 0.0, 0.5))
+    told = ground.of("GLOBAL_POSITION_INT", 1)[-1]
+    assert math.remainder(told.hdg / 100.0, 360.0) == pytest.approx(0.0, abs=3.0)  # it believes to do as told
+    assert math.degrees(math.atan2(told.vy, told.vx)) == pytest.approx(-30.0, abs=3.0)
+    drill.close()
+
+
+def test_telemetry_is_late():
+    drill = faulty("late", delay_s=1.0)
+    _, during, ground = next(drill)
+    assert ground.fleet.time_s - during[-1][0] == pytest.approx(1.0, abs=0.15)
+    drill.close()
+
+
+def test_telemetry_is_out_of_order():
+    drill = faulty("out_of_order")
+    before, during, _ = next(drill)
+    assert all(b[0] >= a[0] for a, b in itertools.pairwise(before))
+    assert sum(b[0] < a[0] for a, b in itertools.pairwise(during)) > 5
+    drill.close()
+
+
+def test_telemetry_is_duplicated():
+    drill = faulty("duplicate", copies=3)
+    before, during, _ = next(drill)
+    assert len(during) / 3.0 > 2.0 * len(before) / 2.0
+    drill.close()
+
+
+def test_telemetry_is_corrupted():
+    drill = faulty("corrupt", share=0.5)
+    before, during, _ = next(drill)
+    assert len(during) / 3.0 < 0.8 * len(before) / 2.0
+    drill.close()
+
+
+def test_restart_power_off_and_a_pilots_hand():
+    drill = faulty("restart")
+    _, during, ground = next(drill)
+    assert len(during) < 5
+    assert not ground.fleet.boats["b"].autopilot.vehicle.armed
+    drill.close()
+    drill = faulty("power_off")
+    _, during, ground = next(drill)
+    assert not ground.of("HEARTBEAT", 1)
+    next(drill)
+    assert ground.of("HEARTBEAT", 1)
+    drill = faulty("mode", number=4)
+    next(drill)[2].run(0.1)
+    drill.close()
+
+
+def test_a_fault_ends_by_itself():
+    drill = faulty("telemetry_stop", duration_s=1.0)
+    _, during, _ = next(drill)
+    assert 30 < len(during) < 45
+    drill.close()
+
+
+@pytest.mark.parametrize(
+    ("boat", "kind", "options", "match"),
+    [
+        ("c", "jump", {}, "no simulated boat"),
+        ("b", "jmp", {}, "did you mean 'jump'"),
+        ("b", "xyz", {}, "faults are"),
+        ("b", "jump", {"far": 1}, "far"),
+    ],
+)
+def test_faults_that_do_not_exist_are_refused(boat, kind, options, match):
+    fleet = alone()
+    try:
+        with pytest.raises(ConfigError, match=match):
+            fleet.fault(boat, kind, **options)
+    finally:
+        fleet.close()
+
+
+def test_a_boat_can_be_put_somewhere():
+    fleet = alone()
+    try:
+        fleet.place("b", 20.0, 5.0, 90.0, 1.0)
+        fleet.advance(0.1)
+        x, y, heading, speed = fleet.states()["b"][:4]
+        assert (x, y, heading) == pytest.approx((20.1, 5.0, 90.0), abs=0.05)
+        assert speed == pytest.approx(1.0, abs=0.2)
+    finally:
+        fleet.close()
+
+
+def test_boats_read_their_clocks_between_ticks():
+    with alone() as fleet:
+        link = mavutil.mavlink_connection(fleet.addresses["b"], dialect="ardupilotmega", source_system=255)
+        try:
+            told = []
+            for i in range(20):
+                link.mav.timesync_send(0, 1000 + i)
+                answer = link.recv_match(type="TIMESYNC", blocking=True, timeout=5.0)
+                told.append(answer.tc1)
+                time.sleep(0.003)
+        finally:
+            link.close()
+    assert told == sorted(told)
+    assert any(nanoseconds % 20_000_000 for nanoseconds in told)
