@@ -22,8 +22,8 @@ from ..play.spec import check_seed
 from ..result_files import NEW, write_json
 from ..sim_boats import AutopilotSettings, RadioSettings, SimFleet, Water
 from ..sim_boats.demo import demo_fleet, off_platform
+from ..sim_boats.faults import Plan, parse_incident
 from ..sim_boats.fleet import Hulls
-from ..sim_boats.incidents import Plan, parse_incident
 from ..sim_boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
 from . import deploying as d
 from . import options as o

@@ -1,12 +1,17 @@
-"""Faults of one boat that can be switched on and off while it runs."""
+"""Faults of simulated boats: one table of kinds, switched on and off while boats run, or planned for a moment.
+
+A planned fault is written ``BOAT:KIND@TIME[+DURATION][,OPTION=VALUE...]``.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
+import json
 import math
-from collections.abc import Callable
-from typing import Any
+import re
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from steerclear.shield.bridge.frame import FieldFrame
@@ -15,6 +20,9 @@ from steerclear.shield.exceptions import ConfigError
 from .autopilot import Autopilot
 from .hull import Order, Steer
 from .sensing import Bend, Radio, Snapshot
+
+if TYPE_CHECKING:
+    from .fleet import SimFleet
 
 Change = Callable[[Snapshot, float], Snapshot]
 """A fault of what the autopilot knows of itself: the truth and the time in, what it believes out."""
@@ -44,10 +52,6 @@ class Fault:
     compass_off_rad: float = 0.0
 
 
-def _drop(packet: bytes) -> list[tuple[float, bytes]]:
-    return []
-
-
 class Faults:
     """The faults of one boat.
 
@@ -61,10 +65,8 @@ class Faults:
     def __init__(
         self, autopilot: Autopilot, down: Radio, up: Radio, frame: FieldFrame, random: np.random.Generator
     ) -> None:
-        self._autopilot = autopilot
+        self.autopilot, self.frame, self.random = autopilot, frame, random
         self._down, self._up = down, up
-        self._frame = frame
-        self._random = random
         self._active: dict[str, Fault] = {}
 
     @property
@@ -82,6 +84,11 @@ class Faults:
         """Age of what the position feed says of the boat, s."""
         return max((fault.feed_late_s for fault in self._active.values()), default=0.0)
 
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Kinds that act now."""
+        return tuple(self._active)
+
     def misled(self, order: Order) -> Order:
         """What the hull does under an order, the compass being what it is."""
         off = sum(fault.compass_off_rad for fault in self._active.values())
@@ -89,10 +96,11 @@ class Faults:
             return order
         return Steer((order.heading_rad - off) % (2.0 * math.pi), order.speed_mps)
 
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Kinds that act now."""
-        return tuple(self._active)
+    def sensed(self, truth: Snapshot, now_s: float) -> Snapshot:
+        """What the autopilot believes."""
+        for fault in self._active.values():
+            truth = truth if fault.change is None else fault.change(truth, now_s)
+        return truth
 
     def start(self, kind: str, now_s: float, duration_s: float = math.inf, **options: Any) -> None:
         """Begin a fault, see `KINDS`.
@@ -100,20 +108,15 @@ class Faults:
         Raises:
             ConfigError: an unknown kind or option, or an option that cannot be used.
         """
-        make = KINDS.get(kind)
-        if make is None:
-            near = difflib.get_close_matches(kind, KINDS, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"faults are {', '.join(KINDS)}"
-            raise ConfigError(f"unknown fault {kind!r}; {hint}")
+        check_kind(kind)
         try:
-            fault = make(self, now_s, **options)
+            fault = KINDS[kind](self, now_s, **options)
         except TypeError as error:
             raise ConfigError(f"fault {kind!r}: {error}") from None
-        if fault is None:
-            return
-        fault.ends_s = now_s + duration_s
-        self._active[kind] = fault
-        self._bend()
+        if fault is not None:
+            fault.ends_s = now_s + duration_s
+            self._active[kind] = fault
+            self._bend()
 
     def stop(self, kind: str | None = None) -> None:
         """End a fault, or all."""
@@ -126,115 +129,215 @@ class Faults:
         for name in [name for name, fault in self._active.items() if now_s >= fault.ends_s]:
             self.stop(name)
 
-    def sensed(self, truth: Snapshot, now_s: float) -> Snapshot:
-        """What the autopilot believes."""
-        for fault in self._active.values():
-            if fault.change is not None:
-                truth = fault.change(truth, now_s)
-        return truth
-
     def _bend(self) -> None:
         self._down.bends = [fault.down for fault in self._active.values() if fault.down is not None]
         self._up.bends = [fault.up for fault in self._active.values() if fault.up is not None]
 
-    def _telemetry_stop(self, now_s: float) -> Fault:
-        return Fault(down=_drop, hidden=True)
 
-    def _commands_lost(self, now_s: float) -> Fault:
-        return Fault(up=_drop)
+def check_kind(kind: str) -> None:
+    """See that there is such a fault.
 
-    def _link_loss(self, now_s: float) -> Fault:
-        return Fault(down=_drop, up=_drop, hidden=True)
+    Raises:
+        ConfigError: there is none.
+    """
+    if kind not in KINDS:
+        near = difflib.get_close_matches(kind, KINDS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"faults are {', '.join(KINDS)}"
+        raise ConfigError(f"unknown fault {kind!r}; {hint}")
 
-    def _freeze(self, now_s: float) -> Fault:
-        kept = self._autopilot.snapshot
-        return Fault(change=lambda truth, time_s: dataclasses.replace(kept, time_s=time_s))
 
-    def _jump(self, now_s: float, distance_m: float = 30.0, course_deg: float = 90.0) -> Fault:
-        course = math.radians(course_deg)
-        dx, dy = distance_m * math.sin(course), distance_m * math.cos(course)
+def _drop(packet: bytes) -> list[tuple[float, bytes]]:
+    return []
 
-        def moved(truth: Snapshot, time_s: float) -> Snapshot:
-            x, y = truth.x_m + dx, truth.y_m + dy
-            latitude, longitude = self._frame.to_geodetic_deg(x, y)
-            return dataclasses.replace(truth, x_m=x, y_m=y, latitude_deg=latitude, longitude_deg=longitude)
 
-        return Fault(change=moved)
+def _telemetry_stop(boat: Faults, now_s: float) -> Fault:
+    """Nothing comes from the boat; it still obeys."""
+    return Fault(down=_drop, hidden=True)
 
-    def _gps_lost(self, now_s: float) -> Fault:
-        """From now on it reckons: the last velocity, from the last place."""
-        kept = self._autopilot.snapshot
 
-        def reckoned(truth: Snapshot, time_s: float) -> Snapshot:
-            (vx, vy), past_s = kept.velocity_mps, time_s - kept.time_s
-            x, y = kept.x_m + vx * past_s, kept.y_m + vy * past_s
-            latitude, longitude = self._frame.to_geodetic_deg(x, y)
-            place = {"x_m": x, "y_m": y, "latitude_deg": latitude, "longitude_deg": longitude}
-            return dataclasses.replace(truth, **place, velocity_mps=(vx, vy), speed_mps=kept.speed_mps, has_fix=False)
+def _commands_lost(boat: Faults, now_s: float) -> Fault:
+    """Nothing reaches the boat; it still tells."""
+    return Fault(up=_drop)
 
-        return Fault(change=reckoned, hidden=True)
 
-    def _compass(self, now_s: float, offset_deg: float = 30.0) -> Fault:
-        offset = math.radians(offset_deg)
+def _link_loss(boat: Faults, now_s: float) -> Fault:
+    """Nothing comes from the boat, and nothing reaches it."""
+    return Fault(down=_drop, up=_drop, hidden=True)
 
-        def turned(truth: Snapshot, time_s: float) -> Snapshot:
-            return dataclasses.replace(truth, heading_rad=truth.heading_rad + offset)
 
-        return Fault(change=turned, compass_off_rad=offset)
+def _freeze(boat: Faults, now_s: float) -> Fault:
+    """Position, speed and heading stay, time stamps go on."""
+    kept = boat.autopilot.snapshot
+    return Fault(change=lambda truth, time_s: dataclasses.replace(kept, time_s=time_s))
 
-    def _late(self, now_s: float, delay_s: float = 1.0) -> Fault:
-        return Fault(down=lambda packet: [(delay_s, packet)], feed_late_s=delay_s)
 
-    def _out_of_order(self, now_s: float, spread_s: float = 0.3) -> Fault:
-        return Fault(down=lambda packet: [(spread_s * self._random.random(), packet)])
+def _jump(boat: Faults, now_s: float, distance_m: float = 30.0, course_deg: float = 90.0) -> Fault:
+    """The position it tells is `distance_m` (30) off along `course_deg` (90) of the field."""
+    course = math.radians(course_deg)
+    dx, dy = distance_m * math.sin(course), distance_m * math.cos(course)
+    return Fault(change=lambda truth, time_s: truth.moved_to(boat.frame, truth.x_m + dx, truth.y_m + dy))
 
-    def _duplicate(self, now_s: float, copies: int = 2, spread_s: float = 0.2) -> Fault:
-        def copied(packet: bytes) -> list[tuple[float, bytes]]:
-            late = [spread_s * self._random.random() for _ in range(copies - 1)]
-            return [(0.0, packet), *((delay, packet) for delay in late)]
 
-        return Fault(down=copied)
+def _gps_lost(boat: Faults, now_s: float) -> Fault:
+    """The fix is lost, and the autopilot says so; the position it tells goes on, reckoned from the last speed."""
+    kept = boat.autopilot.snapshot
 
-    def _corrupt(self, now_s: float, share: float = 0.5) -> Fault:
-        def damaged(packet: bytes) -> list[tuple[float, bytes]]:
-            if self._random.random() >= share:
-                return [(0.0, packet)]
-            data = bytearray(packet)
-            for _ in range(self._random.integers(1, 4)):
-                data[self._random.integers(len(data))] ^= 1 << int(self._random.integers(8))
-            return [(0.0, bytes(data))]
+    def reckoned(truth: Snapshot, time_s: float) -> Snapshot:
+        (vx, vy), past_s = kept.velocity_mps, time_s - kept.time_s
+        place = truth.moved_to(boat.frame, kept.x_m + vx * past_s, kept.y_m + vy * past_s)
+        return dataclasses.replace(place, velocity_mps=(vx, vy), speed_mps=kept.speed_mps, has_fix=False)
 
-        return Fault(down=damaged)
+    return Fault(change=reckoned, hidden=True)
 
-    def _restart(self, now_s: float) -> None:
-        self._autopilot.reboot_wanted = True
 
-    def _power_off(self, now_s: float) -> Fault:
-        self._autopilot.reboot_wanted = True
-        return Fault(down=_drop, up=_drop, dark=True, hidden=True)
+def _compass(boat: Faults, now_s: float, offset_deg: float = 30.0) -> Fault:
+    """The heading it tells and steers by is `offset_deg` (30) off: it runs that much to the other side."""
+    offset = math.radians(offset_deg)
+    return Fault(
+        change=lambda truth, time_s: dataclasses.replace(truth, heading_rad=truth.heading_rad + offset),
+        compass_off_rad=offset,
+    )
 
-    def _mode(self, now_s: float, number: int = 4) -> None:
-        self._autopilot.vehicle.set_mode(number, now_s)
 
-    def _disarm(self, now_s: float) -> None:
-        self._autopilot.vehicle.disarm()
+def _late(boat: Faults, now_s: float, delay_s: float = 1.0) -> Fault:
+    """Every packet comes `delay_s` (1.0) later."""
+    return Fault(down=lambda packet: [(delay_s, packet)], feed_late_s=delay_s)
+
+
+def _out_of_order(boat: Faults, now_s: float, spread_s: float = 0.3) -> Fault:
+    """Every packet comes up to `spread_s` (0.3) later, each its own."""
+    return Fault(down=lambda packet: [(spread_s * boat.random.random(), packet)])
+
+
+def _duplicate(boat: Faults, now_s: float, copies: int = 2, spread_s: float = 0.2) -> Fault:
+    """Every packet comes `copies` (2) times within `spread_s` (0.2)."""
+
+    def copied(packet: bytes) -> list[tuple[float, bytes]]:
+        return [(0.0, packet), *((spread_s * boat.random.random(), packet) for _ in range(copies - 1))]
+
+    return Fault(down=copied)
+
+
+def _corrupt(boat: Faults, now_s: float, share: float = 0.5) -> Fault:
+    """1 to 3 bits of a `share` (0.5) of packets are turned."""
+
+    def damaged(packet: bytes) -> list[tuple[float, bytes]]:
+        if boat.random.random() >= share:
+            return [(0.0, packet)]
+        data = bytearray(packet)
+        for _ in range(boat.random.integers(1, 4)):
+            data[boat.random.integers(len(data))] ^= 1 << int(boat.random.integers(8))
+        return [(0.0, bytes(data))]
+
+    return Fault(down=damaged)
+
+
+def _restart(boat: Faults, now_s: float) -> None:
+    """The autopilot boots again; parameters stay, modes and streams do not."""
+    boat.autopilot.reboot_wanted = True
+
+
+def _power_off(boat: Faults, now_s: float) -> Fault:
+    """It is off until cleared."""
+    boat.autopilot.reboot_wanted = True
+    return Fault(down=_drop, up=_drop, dark=True, hidden=True)
+
+
+def _mode(boat: Faults, now_s: float, number: int = 4) -> None:
+    """A pilot's hand: mode `number` (4, HOLD), until he gives it back."""
+    boat.autopilot.vehicle.set_mode(number, now_s)
+
+
+def _disarm(boat: Faults, now_s: float) -> None:
+    """A pilot's hand: motors off, until he arms it."""
+    boat.autopilot.vehicle.armed = False
 
 
 KINDS: dict[str, Callable[..., Fault | None]] = {
-    "telemetry_stop": Faults._telemetry_stop,
-    "commands_lost": Faults._commands_lost,
-    "link_loss": Faults._link_loss,
-    "freeze": Faults._freeze,
-    "jump": Faults._jump,
-    "gps_lost": Faults._gps_lost,
-    "compass": Faults._compass,
-    "late": Faults._late,
-    "out_of_order": Faults._out_of_order,
-    "duplicate": Faults._duplicate,
-    "corrupt": Faults._corrupt,
-    "restart": Faults._restart,
-    "power_off": Faults._power_off,
-    "mode": Faults._mode,
-    "disarm": Faults._disarm,
+    make.__name__.removeprefix("_"): make
+    for make in (
+        *(_telemetry_stop, _commands_lost, _link_loss, _freeze, _jump, _gps_lost, _compass, _late, _out_of_order),
+        *(_duplicate, _corrupt, _restart, _power_off, _mode, _disarm),
+    )
 }
-"""Makers of faults by kind; `mode` and `disarm` are a pilot's hand on the boat and last until undone."""
+"""Makers of faults by kind: what each does is its docstring, as the page of the boats shows it."""
+
+
+def faults_page() -> str:
+    """The table of faults for the documentation, in Markdown."""
+    rows = [f"| `{kind}` | {make.__doc__} |" for kind, make in KINDS.items()]
+    return "\n".join(["| kind | what happens |", "|---|---|", *rows])
+
+
+_FORM = re.compile(
+    r"(?P<boat>[^:@,]+):(?P<kind>\w+)@(?P<at>[\d.]+)(?:\+(?P<lasts>[\d.]+))?(?P<options>(?:,\w+=[^,]+)*)"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Incident:
+    """One fault to come.
+
+    Attributes:
+        boat: its name.
+        kind: see `KINDS`.
+        at_s: simulated time, s.
+        lasts_s: s; inf: to the end.
+        options: of the fault.
+    """
+
+    boat: str
+    kind: str
+    at_s: float
+    lasts_s: float = math.inf
+    options: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+
+def parse_incident(text: str) -> Incident:
+    """One planned fault, such as ``blue_1:jump@60+10,distance_m=30``.
+
+    Raises:
+        ConfigError: it is of another form, or of an unknown kind.
+    """
+    found = _FORM.fullmatch(text.strip())
+    if found is None:
+        raise ConfigError(f"cannot read the fault {text!r}; give BOAT:KIND@SECONDS or BOAT:KIND@SECONDS+DURATION")
+    check_kind(found["kind"])
+    try:
+        at_s, lasts_s = float(found["at"]), float(found["lasts"] or math.inf)
+        pairs = (pair.partition("=") for pair in found["options"].split(",") if pair)
+        options = {name: json.loads(value) for name, _, value in pairs}
+    except ValueError:
+        raise ConfigError(f"the fault {text!r} holds something that is not a number") from None
+    return Incident(found["boat"], found["kind"], at_s, lasts_s, options)
+
+
+class Plan:
+    """Faults to come, in order of time.
+
+    Args:
+        incidents: all of them.
+        fleet: the boats.
+
+    Raises:
+        ConfigError: a boat that is not simulated.
+    """
+
+    def __init__(self, incidents: Iterable[Incident], fleet: SimFleet) -> None:
+        self._waiting = sorted(incidents, key=lambda incident: incident.at_s)
+        self._fleet = fleet
+        for incident in self._waiting:
+            fleet.boat(incident.boat)
+
+    def look(self) -> list[Incident]:
+        """Begin those whose time has come, and say which.
+
+        Raises:
+            ConfigError: an option the fault does not have.
+        """
+        begun = []
+        while self._waiting and self._waiting[0].at_s <= self._fleet.time_s:
+            incident = self._waiting.pop(0)
+            self._fleet.fault(incident.boat, incident.kind, duration_s=incident.lasts_s, **incident.options)
+            begun.append(incident)
+        return begun

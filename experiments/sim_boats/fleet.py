@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import selectors
-import socket
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,9 +18,9 @@ from steerclear.env.record_meta import DEFAULT_SEPARATION_M
 from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
-from steerclear.shield.bridge.fleet_settings import BoatSettings, MoosLinkSettings
+from steerclear.shield.bridge.fleet_settings import MoosLinkSettings
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.signing import read_key
+from steerclear.shield.bridge.links import key_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
@@ -32,36 +31,37 @@ from .boat import Boat, Setting
 from .game import Game, game_of, playing, start_places
 from .hull import STEP_S, Weather
 from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
-from .signing import check_key
 from .truth import Approach, TruthRecord, record_of
 from .wires import Ports, near
 from .world import PositionHub, World
 
+LOG = logging.getLogger(__name__)
+
+TICK_S = 0.02
+"""How often autopilots look at their clocks and send, s."""
+_TICKS_PER_STEP = round(STEP_S / TICK_S)
 _APART_M = 6.0
+_LONGEST_LAG_S = 1.0
+"""Further behind its clock than this, a fleet lets the time go instead of living it in a rush."""
+_LONGEST_WAIT_S = 0.1
+"""Of the machine's time: how soon the end is noticed."""
 
 Hulls = Callable[[str, Platform], Platform]
-
-
-def as_fleet(fleet: FleetFile | str | Path) -> FleetFile:
-    """A fleet file, read when a path is given.
-
-    Raises:
-        FleetFileError: it cannot be used.
-    """
-    return fleet if isinstance(fleet, FleetFile) else load_fleet(fleet)
+"""What a boat, by its name and its platform of the file, really is."""
 
 
 def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> list[SimBoat]:
     """The boats of a file; those of the game that the file's runner does not command are driven by ``opponents``.
 
-    One of these that has a link tells where it is there, and obeys it as soon as it is commanded. ``hulls`` says what a
-    boat, by its name and its platform of the file, really is.
+    One of these that has a link tells where it is there, and obeys it as soon as it is commanded. Boats outside the
+    game lie along the geofence's lower edge.
     """
     boats = []
-    commanded = {boat.name for boat in _commanded(fleet)}
     for i, boat in enumerate(fleet.boats):
         platform = fleet.platform_of[boat.name]
-        driven = boat.agent is not None and boat.name not in commanded
+        ours = fleet.team_of[boat.name] == fleet.team_number
+        commanded = boat.link is not None and boat.commanded and ours
+        beside = (fleet.geofence.xmin_m + 2.0 + _APART_M * i, fleet.geofence.ymin_m + 2.0, 90.0)
         boats.append(
             SimBoat(
                 name=boat.name,
@@ -69,23 +69,12 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
                 team=fleet.team_of[boat.name],
                 system_id=0 if boat.link is None else boat.link.system_id,
                 address=None if boat.link is None else boat.link.address,
-                policy=opponents if driven else "",
-                start=None if boat.agent is not None else _beside(fleet, i),
+                policy=opponents if boat.agent is not None and not commanded else "",
+                start=None if boat.agent is not None else beside,
                 gate=boat.link.gate if isinstance(boat.link, MoosLinkSettings) else "helm",
             )
         )
     return boats
-
-
-def _commanded(fleet: FleetFile) -> list[BoatSettings]:
-    """Boats that a runner of the file commands, be it one process or one per boat."""
-    ours = [boat for boat in fleet.boats if boat.link is not None and boat.commanded]
-    return [boat for boat in ours if fleet.team_of[boat.name] == fleet.team_number]
-
-
-def _beside(fleet: FleetFile, number: int) -> tuple[float, float, float]:
-    """Place of a boat outside the game: along the geofence's lower edge."""
-    return fleet.geofence.xmin_m + 2.0 + _APART_M * number, fleet.geofence.ymin_m + 2.0, 90.0
 
 
 def settings_of(fleet: FleetFile) -> dict[str, Any]:
@@ -101,167 +90,11 @@ def settings_of(fleet: FleetFile) -> dict[str, Any]:
         "y_axis_deg": fleet.field.y_axis_deg,
         "feed_to": fleet.position_listeners(),
         "separation_m": fleet.shield_config.separation_m,
-        "key": None if fleet.signing is None else read_key(fleet.signing.key_file),
+        "key": key_of(fleet),
     }
     if fleet.agent_ids:
         settings["preset"] = game_config(fleet).replace(dt_s=STEP_S)
     return settings
-
-
-def check_boats(boats: Sequence[SimBoat], noise: float) -> None:
-    """Check what single boats cannot.
-
-    Raises:
-        ConfigError: no boat, two of one name, or noise out of range.
-    """
-    if not boats or len({boat.name for boat in boats}) < len(boats):
-        raise ConfigError("give at least one boat, each with a name of its own")
-    if not 0.0 <= noise <= 100.0:
-        raise ConfigError(f"noise is {noise}; give 0 for none, 1 as measured, at most 100")
-
-
-def build_boats(
-    boats: Sequence[SimBoat],
-    config: GameConfig | None,
-    setting: Setting,
-    ports: Ports,
-    seed: int,
-    random_start: bool,
-) -> dict[str, Boat]:
-    """Boats at their start, plugged in, by name.
-
-    Raises:
-        ConfigError: a place, an address or a system id cannot be used.
-    """
-    places = start_places(boats, config, seed if random_start else None)
-    seeds = np.random.SeedSequence(seed).spawn(len(boats))
-    built = {}
-    for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
-        boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
-        ports.plug_in(boat)
-        built[spec.name] = boat
-    return built
-
-
-def build_world(
-    boats: Mapping[str, Boat],
-    config: GameConfig | None,
-    weather: tuple[Water, Setting],
-    hub: PositionHub | None,
-    seed: int,
-    waits: bool,
-) -> World:
-    """The world of built boats.
-
-    Raises:
-        ConfigError: a policy cannot be used.
-    """
-    everyone = list(boats.values())
-    players = [everyone[i] for i in playing([boat.spec for boat in everyone])]
-    driven = {i: boat.spec.policy for i, boat in enumerate(players) if boat.spec.policy}
-    game = None if config is None else Game(config, driven, seed)
-    water, setting = weather
-    gusts = Weather(water, setting.frame, np.random.default_rng([seed, 0x9057]))
-    return World(everyone, gusts, game, players, hub, waits)
-
-
-logger = logging.getLogger(__name__)
-
-_LONGEST_LAG_S = 1.0
-"""Further behind its clock than this, a fleet lets the time go instead of living it in a rush."""
-_LONGEST_WAIT_S = 0.1
-"""Of the machine's time: how soon the end is noticed."""
-
-
-class Pace:
-    """Calls ``tick`` once every ``tick_s`` of the clock, and ``receive`` when there is something to read.
-
-    Args:
-        clock: the clock.
-        tick_s: s.
-        tick: lives one tick.
-        receive: reads what came in; gets how far the clock is past the latest tick, s.
-
-    Attributes:
-        cpu_s: processor time of the thread, s.
-        let_go_s: time that was not lived because the machine was too slow, s.
-    """
-
-    def __init__(self, clock: Clock, tick_s: float, tick: Callable[[], None], receive: Callable[[float], None]) -> None:
-        self.clock = clock
-        self.let_go_s = 0.0
-        self.cpu_s = 0.0
-        self._tick_s = tick_s
-        self._tick = tick
-        self._receive = receive
-        self._sockets: Callable[[], list[socket.socket]] = list
-        self._thread: threading.Thread | None = None
-        self._ends = threading.Event()
-
-    @property
-    def is_running(self) -> bool:
-        """Whether the thread runs."""
-        return self._thread is not None and self._thread.is_alive()
-
-    def start(self, sockets: Callable[[], list[socket.socket]]) -> None:
-        """Start the thread.
-
-        Args:
-            sockets: those to wake for.
-
-        Raises:
-            ConfigError: it runs already.
-        """
-        if self.is_running:
-            raise ConfigError("the fleet runs already")
-        self._sockets = sockets
-        self._ends.clear()
-        self._thread = threading.Thread(target=self._run, name="sim-boats", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the thread; may be called again."""
-        self._ends.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-
-    def _run(self) -> None:
-        due = self.clock.now_s() + self._tick_s
-        began_s = time.thread_time()
-        while not self._ends.is_set():
-            lag = self.clock.now_s() - due
-            if lag < 0.0:
-                self._wait(due)
-                continue
-            if lag > _LONGEST_LAG_S:
-                logger.warning("simulated boats are %.1f s behind their clock and let the time go", lag)
-                due += lag
-                self.let_go_s += lag
-            self._receive(min(lag, _LONGEST_LAG_S) + self._tick_s)
-            self._tick()
-            due += self._tick_s
-            self.cpu_s = time.thread_time() - began_s
-
-    def _wait(self, due_s: float) -> None:
-        """Wait until then or until there is something to read, and read it."""
-        left = (due_s - self.clock.now_s()) / getattr(self.clock, "speed", 1.0)
-        patience = min(max(left, 0.0), _LONGEST_WAIT_S)
-        sockets = self._sockets()
-        if not sockets:
-            time.sleep(patience)
-            return
-        with selectors.DefaultSelector() as selector:
-            for entry in sockets:
-                selector.register(entry, selectors.EVENT_READ)
-            readable = bool(selector.select(patience))
-        if readable:
-            self._receive(self.clock.now_s() - due_s + self._tick_s)
-
-
-TICK_S = 0.02
-"""How often autopilots look at their clocks and send, s."""
-_TICKS_PER_STEP = round(STEP_S / TICK_S)
 
 
 class SimFleet:
@@ -291,6 +124,12 @@ class SimFleet:
         random_start: draw start places from ``seed`` instead of taking the game's fixed ones.
         allow_remote: whether links may leave this machine.
 
+    Attributes:
+        boats: by name.
+        clock: the clock it lives by.
+        let_go_s: time that was not lived because the machine was too slow, s.
+        cpu_s: processor time of its thread, s.
+
     Raises:
         ConfigError: boats that contradict each other, an address that cannot be used, or a setting out of range.
     """
@@ -318,26 +157,48 @@ class SimFleet:
         random_start: bool = False,
         allow_remote: bool = False,
     ) -> None:
-        check_boats(boats, noise)
+        if not boats or len({boat.name for boat in boats}) < len(boats):
+            raise ConfigError("give at least one boat, each with a name of its own")
+        if not 0.0 <= noise <= 100.0:
+            raise ConfigError(f"noise is {noise}; give 0 for none, 1 as measured, at most 100")
         self.frame = FieldFrame(*origin, y_axis_deg)
         self._lock = threading.RLock()
         self._ticks = 0
         self._hub: PositionHub | None = None
         self._ports = Ports(allow_remote)
-        self._pace = Pace(MonotonicClock(speed) if clock is None else clock, TICK_S, self._tick, self._receive)
-        warp = float(getattr(self._pace.clock, "speed", 1.0))
+        self.clock: Clock = MonotonicClock(speed) if clock is None else clock
+        self.let_go_s = self.cpu_s = 0.0
+        self._thread: threading.Thread | None = None
+        self._ends = threading.Event()
         parts = (autopilot or AutopilotSettings(), radio or RadioSettings())
-        setting = Setting(self.frame, *parts, noise, check_key(key), warp)
+        setting = Setting(self.frame, *parts, noise, key, float(getattr(self.clock, "speed", 1.0)))
         config = game_of(boats, preset, rules or {})
         try:
-            self.boats = build_boats(boats, config, setting, self._ports, seed, random_start)
+            self.boats = self._built(boats, config, setting, seed, random_start)
             listeners = [near(to, allow_remote) for to in feed_to]
             self._hub = PositionHub(listeners, self.frame, noise, key) if feed_to else None
-            self._world = build_world(self.boats, config, (water or Water(), setting), self._hub, seed, waits)
+            everyone = list(self.boats.values())
+            players = [everyone[i] for i in playing(boats)]
+            driven = {i: boat.spec.policy for i, boat in enumerate(players) if boat.spec.policy}
+            game = None if config is None else Game(config, driven, seed)
+            weather = Weather(water or Water(), self.frame, np.random.default_rng([seed, 0x9057]))
+            self._world = World(everyone, weather, game, players, self._hub, waits)
         except BaseException:
             self.close()
             raise
         self._world.record_radius_m = separation_m if record else None
+
+    def _built(
+        self, boats: Sequence[SimBoat], config: GameConfig | None, setting: Setting, seed: int, random_start: bool
+    ) -> dict[str, Boat]:
+        """Boats at their start, plugged in, by name."""
+        places = start_places(boats, config, seed if random_start else None)
+        seeds = np.random.SeedSequence(seed).spawn(len(boats))
+        built = {}
+        for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
+            built[spec.name] = boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
+            self._ports.plug_in(boat)
+        return built
 
     @classmethod
     def from_file(
@@ -355,7 +216,7 @@ class SimFleet:
             FleetFileError: the file cannot be used.
             ConfigError: a setting cannot be used.
         """
-        file = as_fleet(fleet)
+        file = fleet if isinstance(fleet, FleetFile) else load_fleet(fleet)
         return cls(boats_of(file, opponents, hulls), **{**settings_of(file), **settings})
 
     @property
@@ -369,24 +230,9 @@ class SimFleet:
         return {name: boat.system_id for name, boat in self.boats.items()}
 
     @property
-    def clock(self) -> Clock:
-        """The clock it lives by."""
-        return self._pace.clock
-
-    @property
     def time_s(self) -> float:
         """Simulated time since the start, s."""
         return self._ticks * TICK_S
-
-    @property
-    def let_go_s(self) -> float:
-        """Time that was not lived because the machine was too slow, s."""
-        return self._pace.let_go_s
-
-    @property
-    def cpu_s(self) -> float:
-        """Processor time of its thread, s."""
-        return self._pace.cpu_s
 
     @property
     def is_playing(self) -> bool:
@@ -396,7 +242,7 @@ class SimFleet:
     @property
     def is_running(self) -> bool:
         """Whether its thread is alive."""
-        return self._pace.is_running
+        return self._thread is not None and self._thread.is_alive()
 
     @property
     def truth(self) -> TruthRecord | None:
@@ -472,7 +318,7 @@ class SimFleet:
         Raises:
             ConfigError: the thread is running.
         """
-        if self._pace.is_running:
+        if self.is_running:
             raise ConfigError("the fleet runs by itself; call advance only on one that was not started")
         for _ in range(round(seconds / TICK_S)):
             self._receive(0.0)
@@ -484,12 +330,19 @@ class SimFleet:
         Raises:
             ConfigError: it runs already.
         """
+        if self.is_running:
+            raise ConfigError("the fleet runs already")
         self._world.warm_up()
-        self._pace.start(self._ports.sockets)
+        self._ends.clear()
+        self._thread = threading.Thread(target=self._live, name="sim-boats", daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         """Stop the thread and give the sockets back; may be called again."""
-        self._pace.stop()
+        self._ends.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
         self._ports.close()
         if self._hub is not None:
             self._hub.close()
@@ -512,6 +365,34 @@ class SimFleet:
         if name not in self.boats:
             raise ConfigError(f"no simulated boat is named {name!r}; there are {', '.join(self.boats)}")
         return self.boats[name]
+
+    def _live(self) -> None:
+        """Live the clock's time, a tick after the other, and read what comes in between."""
+        due_s = self.clock.now_s() + TICK_S
+        began_s = time.thread_time()
+        while not self._ends.is_set():
+            lag_s = self.clock.now_s() - due_s
+            if lag_s < 0.0:
+                self._wait(due_s)
+                continue
+            if lag_s > _LONGEST_LAG_S:
+                LOG.warning("simulated boats are %.1f s behind their clock and let the time go", lag_s)
+                due_s += lag_s
+                self.let_go_s += lag_s
+            self._receive(min(lag_s, _LONGEST_LAG_S) + TICK_S)
+            self._tick()
+            due_s += TICK_S
+            self.cpu_s = time.thread_time() - began_s
+
+    def _wait(self, due_s: float) -> None:
+        """Wait until then or until there is something to read, and read it."""
+        left_s = (due_s - self.clock.now_s()) / getattr(self.clock, "speed", 1.0)
+        patience_s = min(max(left_s, 0.0), _LONGEST_WAIT_S)
+        with selectors.DefaultSelector() as selector:
+            for number in self._ports.sockets():
+                selector.register(number, selectors.EVENT_READ)
+            if selector.select(patience_s):
+                self._receive(self.clock.now_s() - due_s + TICK_S)
 
     def _receive(self, since_tick_s: float) -> None:
         with self._lock:

@@ -46,15 +46,6 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Reach:
-    """Go to a place of the field, m, at a speed, m/s, and stay."""
-
-    x_m: float
-    y_m: float
-    speed_mps: float
-
-
-@dataclass(frozen=True)
 class Keep:
     """Stop and stay.
 
@@ -78,7 +69,7 @@ class Coast:
     """Motors off."""
 
 
-Order = Steer | Bear | Turn | Reach | Keep | Actuate | Coast
+Order = Steer | Bear | Turn | Keep | Actuate | Coast
 
 
 STEP_S = 0.1
@@ -243,7 +234,7 @@ _BACK_UP_PER_S = 0.17
 _BACK_UP_ENDS_M = 0.1
 _RETURN_BEYOND_M = 3.0
 _RETURN_SPEED_MPS = 0.5
-_REACHED_M = 2.0
+_RETURNED_M = 1.0
 
 
 class Helmsman:
@@ -269,8 +260,6 @@ class Helmsman:
             self.hull.bear(order.error_deg, order.speed_mps)
         elif isinstance(order, Turn):
             self.hull.turn(order.rate_rads, order.speed_mps)
-        elif isinstance(order, Reach):
-            self._go_to((order.x_m, order.y_m), order.speed_mps, _REACHED_M)
         elif isinstance(order, Keep):
             self._keep(order)
         elif isinstance(order, Actuate):
@@ -302,18 +291,12 @@ class Helmsman:
     def _stay(self) -> None:
         station = self._station or self._place()
         off = math.dist(station, self._place())
-        self._returning = off > (_REACHED_M / 2.0 if self._returning else _RETURN_BEYOND_M)
+        self._returning = off > (_RETURNED_M if self._returning else _RETURN_BEYOND_M)
         if self._returning:
-            self._go_to(station, _RETURN_SPEED_MPS, 0.0)
+            x, y = self._place()
+            self.hull.steer(math.atan2(station[0] - x, station[1] - y), _RETURN_SPEED_MPS)
         else:
             self.hull.stop()
-
-    def _go_to(self, place: tuple[float, float], speed_mps: float, radius_m: float) -> None:
-        x, y = self._place()
-        if math.dist(place, (x, y)) <= radius_m:
-            self.hull.stop()
-        else:
-            self.hull.steer(math.atan2(place[0] - x, place[1] - y), speed_mps)
 
     def _place(self) -> tuple[float, float]:
         return float(self.hull.state[L.X]), float(self.hull.state[L.Y])

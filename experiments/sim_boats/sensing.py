@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from steerclear.shield.bridge.frame import FieldFrame
@@ -45,6 +45,11 @@ class Snapshot:
     speed_mps: float
     turn_rate_rads: float
     has_fix: bool = True
+
+    def moved_to(self, frame: FieldFrame, x_m: float, y_m: float) -> Snapshot:
+        """The same at another place of the field, m."""
+        latitude, longitude = frame.to_geodetic_deg(x_m, y_m)
+        return replace(self, x_m=x_m, y_m=y_m, latitude_deg=latitude, longitude_deg=longitude)
 
 
 class Sensors:
@@ -130,7 +135,3 @@ class Radio:
         """Packets that have arrived by now."""
         while self._waiting and self._waiting[0][0] <= now_s + 1e-9:
             yield heapq.heappop(self._waiting)[2]
-
-    def clear(self) -> None:
-        """Forget what is under way."""
-        self._waiting.clear()

@@ -11,7 +11,7 @@ from enum import IntEnum
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.exceptions import ConfigError
 
-from .hull import STEP_S, Coast, Keep, Order, Reach, Steer, Turn
+from .hull import STEP_S, Coast, Keep, Order, Steer, Turn
 from .settings import AutopilotSettings
 
 
@@ -136,7 +136,7 @@ class Vehicle:
         self.booted_s = now_s
         self.armed = False
         self.mode = Mode(int(self.parameters["INITIAL_MODE"]))
-        self.target: Steer | Turn | Reach | None = None
+        self.target: Steer | Turn | None = None
         self._target_s = -math.inf
         self._timed_out = False
         self._gcs_s = math.inf
@@ -172,10 +172,6 @@ class Vehicle:
         self.armed = True
         return True
 
-    def disarm(self) -> None:
-        """Motors off."""
-        self.armed = False
-
     def set_mode(self, number: int, now_s: float) -> bool:
         """Change mode; refusals are explained in a text."""
         if number not in list(Mode):
@@ -191,7 +187,7 @@ class Vehicle:
         self.target, self._timed_out = None, False
         return True
 
-    def take(self, target: Steer | Turn | Reach, now_s: float) -> bool:
+    def take(self, target: Steer | Turn, now_s: float) -> bool:
         """Obey a target from now on; in any other mode than GUIDED it is ignored."""
         if self.mode is not Mode.GUIDED:
             return False
@@ -205,7 +201,7 @@ class Vehicle:
     def tick(self, now_s: float) -> None:
         """Look at the clocks: targets that grew old, ground stations gone silent."""
         limit = self._timeout_s()
-        if isinstance(self.target, (Steer, Turn)) and now_s - self._target_s > limit:
+        if self.target is not None and now_s - self._target_s > limit:
             self.say(WARNING, f"target not received last {limit:g}secs, stopping")
             self.target, self._timed_out = None, True
         patience = self.parameters["FS_GCS_TIMEOUT"] + self.parameters["FS_TIMEOUT"]

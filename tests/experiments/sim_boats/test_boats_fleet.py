@@ -2,11 +2,15 @@ import itertools
 import math
 import socket
 import time
+from pathlib import Path
 
+import numpy as np
 import pytest
 from boat_links import READY, station
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
+from steerclear.experiments.sim_boats.faults import faults_page
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
@@ -17,6 +21,11 @@ def free_port(kind=socket.SOCK_DGRAM):
     with socket.socket(socket.AF_INET, kind) as probe:
         probe.bind((HERE, 0))
         return probe.getsockname()[1]
+
+
+def test_the_page_of_faults_is_made_of_the_code():
+    page = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
+    assert f"<!-- faults -->\n{faults_page()}\n<!-- /faults -->" in page
 
 
 def alone(**settings):
@@ -105,6 +114,29 @@ def test_boats_that_cannot_be_are_refused(boats, match):
         SimFleet(boats)
 
 
+def test_any_bytes_are_survived():
+    random = np.random.default_rng(1)
+    fleet = alone()
+    host, port = fleet.addresses["b"].removeprefix("udpout:").split(":")
+    good = bytes(
+        mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 4, 0, 0, 0, 0, 0).pack(mavlink.MAVLink(None, 255))
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hostile:
+        for k in range(1000):
+            data = bytearray(good) if k % 2 else bytearray(random.bytes(int(random.integers(1, 300))))
+            data[random.integers(len(data))] ^= 1 << int(random.integers(8))
+            hostile.sendto(bytes(data), (host, int(port)))
+            if k % 50 == 0:
+                fleet.advance(0.1)
+    with station(fleet) as ground:
+        counts = fleet.boats["b"].autopilot.counts
+        assert counts["taken"] < 3  # a checksum of 16 bits lets hardly any through
+        assert not fleet.boats["b"].is_held
+        ground.guide(1)
+        ground.run(3.0, lambda: ground.steer(1, 1.0, 0.5))
+        assert fleet.states()["b"][L.SPEED] > 0.3
+
+
 def test_two_boats_of_one_id_on_a_port_are_refused():
     address = f"udpout:{HERE}:{free_port()}"
     boats = [SimBoat("a", address=address, system_id=3), SimBoat("b", address=address, system_id=3)]
@@ -117,7 +149,7 @@ def test_two_boats_of_one_id_on_a_port_are_refused():
 def test_a_taken_port_is_one_clear_error():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind((HERE, 0))
-        with pytest.raises(ConfigError, match="choose a free port"):
+        with pytest.raises(ConfigError, match="give another port"):
             SimFleet([SimBoat("a", address=f"udpout:{HERE}:{other.getsockname()[1]}")])
 
 

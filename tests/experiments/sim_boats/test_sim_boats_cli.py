@@ -8,7 +8,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.docs_keys import SIM_BOATS, undocumented
 from steerclear.experiments.sim_boats import SimFleet
 from steerclear.experiments.sim_boats.demo import demo_fleet, demo_text
-from steerclear.experiments.sim_boats.incidents import Incident, parse_incident
+from steerclear.experiments.sim_boats.faults import Incident, parse_incident
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
@@ -56,7 +56,7 @@ def test_a_fleet_from_its_file(fleet_path, tmp_path):
         assert list(fleet.addresses) == ["blue_1", "blue_2", "blue_3"]
         assert fleet.system_ids["blue_3"] == 3
         assert {fleet.boats[name].spec.policy for name in ("red_1", "red_2", "red_3")} == {"rammer"}
-        assert fleet.boats["blue_1"].autopilot._gate is not None
+        assert fleet.boats["blue_1"].autopilot._codec.signs
         assert fleet.frame == parse_fleet(text).frame
     finally:
         fleet.close()
