@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from .deploy.plain import DEPLOY as _DEPLOY
-from .deploy.referee import REFEREE as _REFEREE
-from .deploy.replay import REPLAY as _REPLAY
+from .deploy.keys import DEPLOY as _DEPLOY
+from .deploy.keys import REFEREE as _REFEREE
+from .deploy.keys import REPLAY as _REPLAY
 from .encounters.attack import KEYS as _ATTACK
 from .encounters.figures import KEYS as _ENCOUNTERS
 from .metrics import GAME_COLUMNS, GOAL_KEYS, breach_column, columns_of, game_metrics_of, meanings_of

@@ -22,8 +22,9 @@ from steerclear.shield.exceptions import ConfigError
 
 from ..deploy.dashboard import Dashboard
 from ..deploy.demo import Demo, demo_file
+from ..deploy.keys import figure_rows
 from ..deploy.orders import Orders, Surface
-from ..deploy.plain import PlainLines, distance_words, logging_aside
+from ..deploy.plain import PlainLines, logging_aside
 from ..deploy.rules import game_config
 from ..deploy.run import deploy as run_boats
 from ..play.spec import check_seed
@@ -158,15 +159,6 @@ def _table(figures: dict[str, float]) -> Table:
     table = Table(title="the run", title_justify="left", show_header=False)
     table.add_column("")
     table.add_column("", justify="right")
-    rows = (
-        ("turns", f"{figures['ticks']:.0f}"),
-        ("commands changed by the shield", f"{100.0 * figures['changed_share']:.1f} %"),
-        ("closest approach of our boats, as believed", distance_words(figures["closest_m"])),
-        ("turns with a declared response", f"{figures['ticks_with_actions']:.0f}"),
-        ("turn began late, 999 of 1000 within", f"{1e3 * figures['jitter_p999_s']:.1f} ms"),
-        ("telemetry read to command sent, 99 of 100 within", f"{1e3 * figures['read_to_sent_p99_s']:.1f} ms"),
-        ("turns missed", f"{figures['missed_turns']:.0f}"),
-    )
-    for row in rows:
+    for row in figure_rows(figures):
         table.add_row(*row)
     return table

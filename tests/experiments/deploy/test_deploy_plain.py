@@ -13,7 +13,8 @@ import time
 import numpy as np
 import pytest
 from deploy_ticks import Stream
-from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m, distance_words, logging_aside
+from steerclear.experiments.deploy.keys import FIGURES, figure_rows
+from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m, logging_aside
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
     NICENESS,
@@ -79,8 +80,9 @@ def test_a_boat_alone_has_no_closest_approach(fleet_of):
     sink.close()
     assert "no other boat, " in said[0]
     assert "inf" not in said[0]
-    assert distance_words(math.inf) == "no other boat"
-    assert distance_words(3.456) == "3.46 m"
+    rows = dict(figure_rows({figure.key: 3.456 for figure in FIGURES} | {"closest_m": math.inf}))
+    assert rows["closest approach of our boats, as believed"] == "no other boat"
+    assert rows["turn began late, 999 of 1000 within"] == "3456.0 ms"
 
 
 def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_response_changes(ticks):

@@ -1,7 +1,8 @@
 """Drills of boats that run MOOS: something fails while the gate filters, and the time to each response is measured.
 
-Run it as a script for the table: ``python tests/shield/bridge/moos/drills.py``. Where ``MOOSDB`` is on the path the
-drills that need only a MOOSDB are run beside the real one as well, elsewhere it says so.
+Run it as a script for the table: ``python tests/shield/bridge/moos/drills.py``. Where ``MOOSDB`` is on the path
+the drills are run beside the real one as well, and where all of MOOS-IvP is, three against three are played on it
+(``drills.py mission``: that alone); elsewhere it says so.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ sys.path.insert(0, os.path.dirname(__file__))
 
 from moos_boats import fleet_text, sim_of, until
 from real_db import RealDb
-from steerclear.experiments.boats import moos as boats_of_moos
+from steerclear.experiments.sim_boats import moos as boats_of_moos
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -391,14 +392,20 @@ def drill_all(chosen):
 
 
 def main():
-    say("On the stand-in:")
-    drill_all(sys.argv[1:])
-    if shutil.which("MOOSDB") is None:
-        say("MOOSDB is not on the path: only the stand-in was drilled")
-        return
-    say("Beside MOOSDB:")
-    boats_of_moos.StandInDb = RealDb
-    drill_all(sys.argv[1:])
+    import real_mission  # it needs this module
+
+    if sys.argv[1:] != ["mission"]:
+        say("On the stand-in:")
+        drill_all(sys.argv[1:])
+        if shutil.which("MOOSDB") is None:
+            say("MOOSDB is not on the path: only the stand-in was drilled")
+            return
+        say("Beside MOOSDB:")
+        boats_of_moos.StandInDb = RealDb
+        drill_all(sys.argv[1:])
+    say(real_mission.missing() or "On the real MOOS-IvP, 3 against 3:")
+    for what, value in {} if real_mission.missing() else real_mission.play().items():
+        say(f"| {what} | {value:.4g} |")
 
 
 if __name__ == "__main__":

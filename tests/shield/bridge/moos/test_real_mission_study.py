@@ -1,0 +1,14 @@
+"""The 3 v 3 mission on the real MOOS-IvP, where it is installed: ``pytest -m study -s``."""
+
+import pytest
+from real_mission import missing, play
+
+pytestmark = [pytest.mark.study, pytest.mark.skipif(bool(missing()), reason=missing())]
+
+
+def test_three_against_three_on_the_real_stack():
+    found = play()
+    assert found["turns under way"] > 0.7 * found["turns"]
+    assert found["separation violations with teammates"] == 0.0
+    assert found["separation violations with opponents"] == 0.0
+    assert found["decided again the same"] == found["decisions"] > 0.9 * found["turns"]
