@@ -115,6 +115,15 @@ class Canvas:
 
 COLOURS = ("bright_blue", "bright_red", "bright_white")
 """Of blue, red and boats outside the game."""
+SYMBOLS = (
+    ("small circle and line", "a boat in its team's colour, and the way it makes in 2 s"),
+    ("large circle", "around a boat of ours: its separation radius, where nobody else should be"),
+    ("yellow circle", "how wrong the boat's place may be, where that is more than 0.5 m"),
+    ("grey circles", "obstacles, and the circle of our flag, that our boats keep out of"),
+    ("solid box, dotted box", "the field, and the geofence"),
+    ("⚑", "a flag, where it is now"),
+)
+"""What is drawn, for the operator's page."""
 AHEAD_S = 2.0
 """The line before a boat is the way it makes in this time, s."""
 MARGIN_M = 4.0

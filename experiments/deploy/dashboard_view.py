@@ -1,4 +1,7 @@
-"""What the dashboard shows of one moment: banner, table of boats, what is in effect; draws nothing by itself."""
+"""What the dashboard shows of one moment: banner, table of boats, what is in effect; draws nothing by itself.
+
+Banners, columns, reasons and keys are data with their meaning, of which the operator's page is made.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,11 @@ from rich.table import Table
 from rich.text import Text
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import BoatReading, Contact, Tick
-from steerclear.shield.decision import Decision, Reason
+from steerclear.shield.decision import Decision
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array
 
+from .dashboard_lines import BANNERS, COLUMNS, DROPPED, KEYS, MARKS, WHY, Column
 from .dashboard_map import COLOURS, Drawing, FieldMap
 
 LOOK_AHEAD_S = 60.0
@@ -64,65 +68,27 @@ def _approach(fleet: Fleet, velocity: Array, i: int, j: int) -> Approach:
     return Approach(fleet.names[i], fleet.names[j], distance_m, math.hypot(*closest.tolist()), in_s)
 
 
+WIDE = 150
+"""From this many columns on the table stands beside the map."""
+MOST_ACTIONS = 6
+SILENT_S = 1.0
+"""A loop without a tick for so long is shown as standing still."""
 GAP = 1
-"""Between columns, characters."""
+"""Between columns of the table, characters."""
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of the table.
-
-    Attributes:
-        title: its head; cells are given by it.
-        width: characters that its longest cell needs.
-        rank: columns of higher ranks are left out first where there is no room.
-        right: whether it holds numbers.
-    """
-
-    title: str
-    width: int
-    rank: int
-    right: bool = True
-
-
-COLUMNS = (
-    Column("boat", 10, 0, right=False),
-    Column("hdg", 4, 4),
-    Column("m/s", 5, 3),
-    Column("age", 5, 2),
-    Column("wanted", 9, 0),
-    Column("sent", 9, 0),
-    Column("why", 9, 1, right=False),
-    Column("margin", 6, 1),
-    Column("closest", 14, 2, right=False),
-    Column("bound by", 12, 5, right=False),
-)
-"""What was wanted and sent stands there whole in every terminal of 30 columns; a command is ``12.5 359°``."""
-GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 60))
-"""Where room that is left over goes, in this order, each up to a width."""
 BESIDE = sum(column.width + GAP for column in COLUMNS) + 12
-"""Width with every column, ``closest`` whole: what the table has beside the map. Below it ``bound by`` is left out."""
-NEVER_CUT = ("wanted", "sent")
+"""Width with every column: what the table has beside the map. Below it ``bound by`` is left out."""
+KEY_LINE = "   ".join(f"{key} {words}" for key, words, _ in KEYS)
 
 
-def fitting(width: int) -> dict[str, int]:
-    """Columns that a width has room for, with the width of each; what is left over goes to those that may grow."""
+def fitting(width: int) -> list[Column]:
+    """Columns that a width has room for."""
     shown = [column for column in COLUMNS if width >= BESIDE or column.title != "bound by"]
-    while len(shown) > 1 and _needed(shown) > width:
-        last = max(shown, key=lambda column: (column.rank, COLUMNS.index(column)))
-        if last.rank == 0:
-            break
-        shown.remove(last)
-    widths = {column.title: column.width for column in shown}
-    left = width - _needed(shown)
-    for title, most in GROWING:
-        more = max(0, min(left, most - widths[title])) if title in widths else 0
-        if more:
-            widths[title] += more
-            left -= more
-    if left < 0:  # a terminal too narrow for the least: names go first
-        widths["boat"] = max(1, widths["boat"] + left)
-    return widths
+    for title in DROPPED:
+        if sum(column.width + GAP for column in shown) > width:
+            shown = [column for column in shown if column.title != title]
+    return shown
 
 
 def boats_table(width: int, rows: list[Mapping[str, Any]]) -> Table:
@@ -132,44 +98,24 @@ def boats_table(width: int, rows: list[Mapping[str, Any]]) -> Table:
         width: characters there are.
         rows: cells by title; those left out are empty.
     """
-    widths = fitting(width)
-    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, width=max(1, width), header_style="bold")
-    for column in COLUMNS:
-        if column.title in widths:
-            table.add_column(
-                column.title,
-                width=widths[column.title],
-                no_wrap=True,
-                overflow="crop" if column.title in NEVER_CUT else "ellipsis",
-                justify="right" if column.right else "left",
-            )
+    columns = fitting(width)
+    table = Table(
+        box=None, padding=(0, GAP, 0, 0), pad_edge=False, width=max(1, width), header_style="bold", expand=True
+    )
+    tight = max(0, sum(column.width + GAP for column in columns) - width)
+    for title, least, ratio, _ in columns:
+        whole = title in ("wanted", "sent")
+        table.add_column(
+            title,
+            width=max(1, least - tight) if title == "boat" else least,
+            ratio=ratio or None,
+            no_wrap=True,
+            overflow="crop" if whole else "ellipsis",
+            justify="left" if ratio or title == "why" else "right",
+        )
     for row in rows:
-        table.add_row(*(row.get(title, "") for title in widths))
+        table.add_row(*(row.get(column.title, "") for column in columns))
     return table
-
-
-def _needed(columns: list[Column]) -> int:
-    return sum(column.width + GAP for column in columns)
-
-
-WIDE = 150
-"""From this many columns on the table stands beside the map."""
-MOST_ACTIONS = 6
-SILENT_S = 1.0
-"""A loop without a tick for so long is shown as standing still."""
-KEYS = "SPACE or s STOP ALL   r resume   o overrides   t take back   q end"
-WHY = {
-    Reason.PASSED: ("passed", "green"),
-    Reason.QP: ("QP", "cyan"),
-    Reason.QP_RELAXED: ("QP slack", "yellow"),
-    Reason.BACKUP: ("backup", "yellow"),
-    Reason.BEST_EFFORT: ("best eff.", "bold red"),
-    Reason.HELD: ("held", "magenta"),
-    Reason.NOT_COVERED: ("-", "dim"),
-    Reason.RIGHT_OF_WAY: ("way", "cyan"),
-    Reason.LIMITED: ("limit", "yellow"),
-    Reason.STOPPED: ("stopped", "bold red"),
-}
 
 
 @dataclass(frozen=True)
@@ -227,7 +173,7 @@ class View:
         screen.split_column(
             Layout(self._head(moment), size=2),
             body,
-            Layout(Group(*lower, Text(KEYS, "reverse")), size=min(height, max(3, rows // 2))),
+            Layout(Group(*lower, Text(KEY_LINE, "reverse")), size=min(height, max(3, rows // 2))),
         )
         return screen
 
@@ -242,22 +188,10 @@ class View:
         return Group(line, self._banner(moment))
 
     def _banner(self, moment: Moment) -> Text:
-        if moment.stopped:
-            how = "by their links, past the shield" if moment.hard else "through the shield (again, then y: past it)"
-            return _bar(f" STOP ALL by {moment.stopped}: boats are told to stop {how}; r resumes", "bold white on red")
-        if moment.ended:
-            return _bar(f" The run ends ({moment.ended}): boats are left stopped", "bold black on yellow")
-        if moment.tick is None:
-            return _bar(" Nothing yet", "black on yellow")
-        silent_s = moment.now_s - moment.tick.began_s
-        if silent_s > SILENT_S:
-            return _bar(f" The loop stands still: no tick for {silent_s:.1f} s", "bold white on red")
-        count = len(moment.tick.actions)
-        if moment.tick.fleet is None:
-            return _bar(" No boat's state is known: boats are told to stop", "bold white on red")
-        if count:
-            return _bar(f" {count} response{'s' if count > 1 else ''} in effect, see below", "black on yellow")
-        return _bar(" All within limits", "black on green")
+        name, values = _state(moment)
+        banner = BANNERS[name]
+        text = f" {banner.words.format(*values)}".ljust(500)
+        return Text(text, banner.style, no_wrap=True, overflow="crop")
 
     def _boats(self, moment: Moment, width: int) -> Table:
         tick = moment.tick
@@ -273,12 +207,12 @@ class View:
             if reading is not None:
                 rows.append(name | _own(reading, decisions.get(boat.name), tick, self._near(near.get(boat.name))))
             else:
-                rows.append(name | _other(contacts.get(boat.name), moment.now_s, self._limit_s()))
+                rows.append(name | _other(contacts.get(boat.name), moment.now_s, self._fleet.limits.contact.max_age_s))
         return boats_table(width, rows)
 
     def _name(self, name: str, game: Mapping[str, Any]) -> Text:
         status = (game.get("boats") or {}).get(name) or {}
-        marks = "".join(mark for mark, key in (("⚑", "has_flag"), ("T", "tagged"), ("O", "oob")) if status.get(key))
+        marks = "".join(mark for mark, key, _ in MARKS if status.get(key))
         text = Text(name, COLOURS[self._fleet.team_of.get(name, 2)])
         return text.append(f" {marks}", "bold yellow") if marks else text
 
@@ -290,8 +224,22 @@ class View:
         when = f" in {approach.in_s:.0f} s" if approach.in_s > 0.5 else " now"
         return Text(f"{approach.other} {approach.closest_m:.1f} m{when}", style)
 
-    def _limit_s(self) -> float:
-        return self._fleet.limits.contact.max_age_s
+
+def _state(moment: Moment) -> tuple[str, tuple[Any, ...]]:
+    """Which of `BANNERS` stands there, and what is filled in: the worst that is so."""
+    tick = moment.tick
+    if moment.stopped:
+        return "hard" if moment.hard else "soft", (moment.stopped,)
+    if moment.ended:
+        return "ended", (moment.ended,)
+    if tick is None:
+        return "nothing", ()
+    if moment.now_s - tick.began_s > SILENT_S:
+        return "silent", (moment.now_s - tick.began_s,)
+    if tick.fleet is None:
+        return "unknown", ()
+    count = len(tick.actions)
+    return ("effect", (f"{count} response{'s' if count > 1 else ''}",)) if count else ("fine", ())
 
 
 def _lower(moment: Moment, columns: int) -> list[Text]:
@@ -333,7 +281,7 @@ def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text
     margin = Text("free" if decision.certificate_m == math.inf else f"{decision.certificate_m:.1f}")
     if decision.certificate_m < 0.0:
         margin.stylize("bold red")
-    why = {"why": Text(*WHY[decision.reason]), "bound by": ", ".join(decision.binding)}
+    why = {"why": Text(*WHY[decision.reason][:2]), "bound by": ", ".join(decision.binding)}
     return {**cells, "wanted": wanted, "margin": margin, **why}
 
 
@@ -359,10 +307,6 @@ def _score(game: Mapping[str, Any]) -> str:
     if game.get("over"):
         text += ", over"
     return f"{text} ({game['note']})" if game.get("note") else text
-
-
-def _bar(text: str, style: str) -> Text:
-    return Text(text.ljust(500), style, no_wrap=True, overflow="crop")
 
 
 def _age(age_s: float) -> str:

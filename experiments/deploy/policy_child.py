@@ -5,16 +5,14 @@ Reads pickled `Orders`, then snapshots; answers JSON.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
 import pickle
 import threading
 import time
+from multiprocessing.connection import Connection
 from typing import Any
-
-from .worker import read_message, write_message
 
 FAILED = 3
 """Exit status when the policy could not be loaded; the answer before it says why."""
@@ -26,8 +24,8 @@ GRACE_S = 5.0
 class Slot:
     """Holds the latest snapshot, filled by a thread, so that a slow policy skips those it was too late for."""
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+    def __init__(self, snapshots: Connection) -> None:
+        self._snapshots = snapshots
         self._ready = threading.Condition()
         self._message: bytes | None = None
         threading.Thread(target=self._fill, name="snapshots", daemon=True).start()
@@ -41,10 +39,9 @@ class Slot:
 
     def _fill(self) -> None:
         while True:
-            message = None
-            with contextlib.suppress(OSError):
-                message = read_message(self._descriptor)
-            if message is None:
+            try:
+                message = self._snapshots.recv_bytes()
+            except (OSError, EOFError):
                 time.sleep(GRACE_S)  # the runner is gone, and the supervisor ends all this, whatever the policy is at
                 os._exit(0)
             with self._ready:
@@ -54,8 +51,10 @@ class Slot:
 
 def serve(read_fd: int, write_fd: int, folder: str) -> int:
     """Load the policy the first message names and answer snapshots until the runner is gone."""
-    orders = read_message(read_fd)
-    if orders is None:
+    snapshots, answers = Connection(read_fd, writable=False), Connection(write_fd, readable=False)
+    try:
+        orders = snapshots.recv_bytes()
+    except EOFError:
         return 0
     from steerclear.shield.exceptions import SteerclearError
 
@@ -64,23 +63,23 @@ def serve(read_fd: int, write_fd: int, folder: str) -> int:
     try:
         player = load_player(pickle.loads(orders))
     except SteerclearError as error:
-        _answer(write_fd, {"failed": str(error)})
+        _answer(answers, {"failed": str(error)})
         return FAILED
-    _answer(write_fd, {"ready": True})
-    slot = Slot(read_fd)
+    _answer(answers, {"ready": True})
+    slot = Slot(snapshots)
     while True:
         snapshot = pickle.loads(slot.take())
         try:
             play = player.play(snapshot)
         except (SteerclearError, SystemExit) as error:
-            _answer(write_fd, {"number": snapshot.number, "commands": None, "problems": [_line(error)]})
+            _answer(answers, {"number": snapshot.number, "commands": None, "problems": [_line(error)]})
             continue
         rows = [[float(value) for value in row] if math.isfinite(row[0]) else None for row in play.commands]
-        _answer(write_fd, {"number": snapshot.number, "commands": rows, "problems": list(play.problems)})
+        _answer(answers, {"number": snapshot.number, "commands": rows, "problems": list(play.problems)})
 
 
-def _answer(write_fd: int, content: dict[str, Any]) -> None:
-    write_message(write_fd, json.dumps(content, allow_nan=False).encode())
+def _answer(answers: Connection, content: dict[str, Any]) -> None:
+    answers.send_bytes(json.dumps(content, allow_nan=False).encode())
 
 
 def _line(error: BaseException) -> str:

@@ -21,7 +21,8 @@ from steerclear.shield.words import plain_text
 
 from ..entries.sandbox import OVER, READY, Limits, end_group, end_marked, is_stopped
 
-HEAD = struct.Struct("<I")
+HEAD = struct.Struct("!i")
+"""Of a message, as `multiprocessing.connection` writes it, which is what the process has at its end."""
 MAX_BYTES = 1 << 20
 """A longer message is nothing either side sends."""
 
@@ -55,7 +56,7 @@ class FrameReader:
         messages = []
         while len(self._buffer) >= HEAD.size:
             (length,) = HEAD.unpack_from(self._buffer)
-            if length > MAX_BYTES:
+            if not 0 <= length <= MAX_BYTES:
                 raise Broken(f"a message of {length} bytes")
             if len(self._buffer) < HEAD.size + length:
                 break
@@ -130,32 +131,6 @@ class FrameWriter:
     def close(self) -> None:
         """Give the pipe's end back."""
         os.close(self._descriptor)
-
-
-def read_message(descriptor: int) -> bytes | None:
-    """The next message, waiting for it; None when the other end is gone. For the policy's process."""
-    head = _read_exactly(descriptor, HEAD.size)
-    if head is None:
-        return None
-    (length,) = HEAD.unpack(head)
-    return _read_exactly(descriptor, length)
-
-
-def write_message(descriptor: int, message: bytes) -> None:
-    """Send a message, waiting until it is in the pipe. For the policy's process."""
-    data = HEAD.pack(len(message)) + message
-    while data:
-        data = data[os.write(descriptor, data) :]
-
-
-def _read_exactly(descriptor: int, length: int) -> bytes | None:
-    data = b""
-    while len(data) < length:
-        more = os.read(descriptor, length - len(data))
-        if not more:
-            return None
-        data += more
-    return data
 
 
 SUPERVISE = """import sys

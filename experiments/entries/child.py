@@ -11,10 +11,10 @@ import pickle
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from multiprocessing.connection import Connection
 from typing import Any, cast
 
 from steerclear import policies
-from steerclear.experiments.deploy.worker import read_message, write_message
 from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
 from steerclear.shield.words import describe_error
@@ -26,7 +26,12 @@ from .sandbox import AGAIN
 def serve(read_fd: int, write_fd: int, folder: str) -> int:
     """Answer orders until the game is over or the runner is gone."""
     own, player = os.getpid(), Player()
-    while (message := read_message(read_fd)) is not None:
+    orders, answers = Connection(read_fd, writable=False), Connection(write_fd, readable=False)
+    while True:
+        try:
+            message = orders.recv_bytes()
+        except EOFError:
+            return 0
         order, *arguments = pickle.loads(message)
         if order == "over":
             os._exit(AGAIN)  # whatever threads the entry has left
@@ -34,8 +39,7 @@ def serve(read_fd: int, write_fd: int, folder: str) -> int:
         if os.getpid() != own:
             os._exit(0)  # the entry forked: its child has no part in the game
         _flush()
-        write_message(write_fd, json.dumps(answer).encode())
-    return 0
+        answers.send_bytes(json.dumps(answer).encode())
 
 
 class Player:

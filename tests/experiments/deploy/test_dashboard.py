@@ -10,6 +10,7 @@ import pty
 import termios
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,13 +20,15 @@ from rich.console import Console
 from steerclear.experiments.deploy import dashboard as dashboard_module
 from steerclear.experiments.deploy.controls import Controls, Keyboard
 from steerclear.experiments.deploy.dashboard import Dashboard
+from steerclear.experiments.deploy.dashboard_lines import WHY, dashboard_page
 from steerclear.experiments.deploy.dashboard_map import Canvas, FieldMap
-from steerclear.experiments.deploy.dashboard_view import Moment, View, approaches, fitting
+from steerclear.experiments.deploy.dashboard_view import Moment, View, approaches, boats_table
 from steerclear.experiments.terminal import SafeConsole
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.failsafe_table import DISABLES
 from steerclear.shield.bridge.messages import Action, BoatReading, Tick
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import BridgeError, ConfigError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.surroundings import Surroundings
@@ -157,6 +160,12 @@ def test_values_that_are_not_finite_are_dashes(stream):
     lines = shown(stream.fleet, Moment(dataclasses.replace(tick, readings=blank, policy_age_s=math.inf), 5.0))
     assert "policy never" in lines[0]
     assert row_of(lines, "blue_1").split()[1:4] == ["-", "-", "never"]
+
+
+def test_the_operators_page_tells_every_line():
+    page = (Path(__file__).parents[3] / "docs" / "boats.md").read_text()
+    assert f"<!-- dashboard -->\n{dashboard_page()}\n<!-- /dashboard -->" in page
+    assert set(WHY) == set(Reason)
 
 
 def test_closest_approaches_of_crossing_and_parting_boats():
@@ -497,11 +506,12 @@ def test_a_wide_terminal_shows_more(fleet_of_the_demo):
 
 @pytest.mark.parametrize("width", [1, 10, 30, 45, 60, 80, 99, 160, 400])
 def test_the_table_is_as_wide_as_it_may_be(width):
-    widths = fitting(width)
-    assert {"wanted", "sent"} <= set(widths)
-    if width >= 34:
-        assert sum(widths.values()) + len(widths) <= width
-        assert widths["wanted"] == widths["sent"] == 9
+    console = Console(file=io.StringIO(), width=width, color_system=None)
+    cells = {"boat": "b" * 32, "wanted": "12.5 359°", "sent": "-2.5 007°", "closest": "c" * 90, "why": "best eff."}
+    console.print(boats_table(width, [cells]))
+    lines = console.file.getvalue().splitlines()
+    assert all(len(line) <= width for line in lines)
+    assert width < 30 or ("12.5 359°" in lines[1] and "-2.5 007°" in lines[1])
 
 
 def test_names_from_outside_are_shown_and_not_obeyed(fleet_of_the_demo):
