@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 from steerclear.shield.bridge.drill import counted_words
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.preflight_checks import CheckResult
@@ -23,6 +22,35 @@ VALID_S = 12.0 * 3600.0
 
 DRILLED = ("course", "response", "model")
 """Checks that only a drill can make."""
+
+
+class KeptCheck(BaseModel):
+    """One check's result, as kept."""
+
+    model_config = ConfigDict(strict=True)
+
+    name: str
+    passed: bool
+    text: str
+    figures: dict[str, FiniteFloat]
+
+
+class Kept(BaseModel):
+    """A preflight.
+
+    Attributes:
+        fleet: fingerprint of the fleet file's text.
+        unix_s: when it ended, s since 1970.
+        refused: names of checks neither passed nor accepted.
+        checks: all results.
+    """
+
+    model_config = ConfigDict(strict=True)
+
+    fleet: str
+    unix_s: FiniteFloat
+    refused: list[str]
+    checks: list[KeptCheck]
 
 
 def fingerprint(text: str) -> str:
@@ -43,16 +71,12 @@ def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckR
     Raises:
         BridgeError: it cannot be written.
     """
-    content = {
-        "fleet": fingerprint(text),
-        "unix_s": time.time(),
-        "refused": list(refused),
-        "checks": [{"name": r.name, "passed": r.passed, "text": r.text, "figures": _plain(r.figures)} for r in results],
-    }
+    checks = [KeptCheck(name=r.name, passed=r.passed, text=r.text, figures=_finite(r.figures)) for r in results]
+    kept = Kept(fleet=fingerprint(text), unix_s=time.time(), refused=list(refused), checks=checks)
     path = path_of(fleet, boat)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+        path.write_text(kept.model_dump_json(indent=1), encoding="utf-8")
     except OSError as error:
         raise BridgeError(f"cannot write {path} ({error.strerror}); free space, or change log_dir") from None
     return path
@@ -67,69 +91,50 @@ def check_drill(
     fleet: FleetFile, text: str, boat: str | None, commanded: Sequence[str], accept: Sequence[str] = ()
 ) -> CheckResult:
     """These boats were drilled lately, with this very file, and did as their platforms foretell."""
-    remedy = "run steerclear preflight first"
     found = _read(path_of(fleet, boat))
-    if found is None:
-        return CheckResult("drill", False, f"no preflight of these boats; {remedy}")
-    if found.get("fleet") != fingerprint(text):
-        return CheckResult("drill", False, f"the fleet file has changed since its preflight; {remedy}")
-    age = time.time() - float(found.get("unix_s", -math.inf))
-    if not 0.0 <= age <= VALID_S:
-        return CheckResult("drill", False, f"the last preflight is {age / 3600.0:.0f} h old; {remedy}")
-    checks = {entry["name"]: entry for entry in found["checks"]}
-    missing = [f"{kind}:{name}" for name in commanded for kind in DRILLED if f"{kind}:{name}" not in checks]
-    if missing:
-        return CheckResult("drill", False, f"the last preflight lacks {', '.join(missing)}; {remedy}, with its drill")
-    bad = [name for name in found["refused"] if name in checks and name.split(":")[0] in DRILLED]
-    bad = [name for name in bad if name not in accept and name.split(":")[0] not in accept]
-    if bad:
-        return CheckResult("drill", False, f"{bad[0]}: {checks[bad[0]]['text']}")
+    why = "no preflight of these boats" if found is None else _outdated(found, text, commanded)
+    if found is None or why:
+        return CheckResult("drill", False, f"{why}; run steerclear preflight first")
+    texts = {check.name: check.text for check in found.checks}
+    for name in found.refused:
+        if name in texts and name.split(":")[0] in DRILLED and not {name, name.split(":")[0]} & set(accept):
+            return CheckResult("drill", False, f"{name}: {texts[name]}")
     delay = measured_delay_s(fleet, boat)
     counted = counted_words(fleet.shield_config.delay_s, fleet.dt_s)
+    minutes = (time.time() - found.unix_s) / 60.0
     figures = {} if delay is None else {"delay_s": delay}
-    return CheckResult("drill", True, f"boats drilled {age / 60.0:.0f} min ago{counted}", figures)
+    return CheckResult("drill", True, f"boats drilled {minutes:.0f} min ago{counted}", figures)
 
 
 def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:
     """Longest delay from command to effect that the drill measured, s; None: none was."""
     found = _read(path_of(fleet, boat))
-    delays = [
-        entry["figures"]["delay_s"]
-        for entry in ([] if found is None else found["checks"])
-        if entry["name"].startswith("response:") and "delay_s" in entry["figures"]
-    ]
-    return max(delays, default=None)
+    responses = [] if found is None else [c for c in found.checks if c.name.startswith("response:")]
+    return max((check.figures["delay_s"] for check in responses if "delay_s" in check.figures), default=None)
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def _outdated(found: Kept, text: str, commanded: Sequence[str]) -> str:
+    """Why a preflight does not count for these boats now; empty: it does."""
+    if found.fleet != fingerprint(text):
+        return "the fleet file has changed since its preflight"
+    age_s = time.time() - found.unix_s
+    if not 0.0 <= age_s <= VALID_S:
+        return f"the last preflight is {age_s / 3600.0:.0f} h old"
+    names = {check.name for check in found.checks}
+    missing = [f"{kind}:{name}" for name in commanded for kind in DRILLED if f"{kind}:{name}" not in names]
+    return f"the last preflight lacks {', '.join(missing)}, which its drill makes" if missing else ""
+
+
+def _read(path: Path) -> Kept | None:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if _is_sound(found):
-            return dict(found)
-        raise ValueError("it is of another form")
+        return Kept.model_validate_json(path.read_bytes())
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, RecursionError) as error:
-        LOG.warning("%s cannot be read (%s); it counts as missing", path, error)
+    except (OSError, ValidationError) as error:
+        why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        LOG.warning("%s cannot be read (%s); it counts as missing", path, why)
     return None
 
 
-def _is_sound(found: Any) -> bool:
-    """Whether a file's content is what `keep` writes, as far as it is read."""
-    if not isinstance(found, dict) or not isinstance(found.get("unix_s"), int | float):
-        return False
-    lists = found.get("checks"), found.get("refused")
-    if not all(isinstance(entries, list) for entries in lists):
-        return False
-    return all(isinstance(name, str) for name in lists[1]) and all(
-        isinstance(check, dict)
-        and isinstance(check.get("name"), str)
-        and isinstance(check.get("text"), str)
-        and isinstance(check.get("figures"), dict)
-        and all(isinstance(value, int | float) for value in check["figures"].values())
-        for check in lists[0]
-    )
-
-
-def _plain(figures: Any) -> dict[str, float]:
+def _finite(figures: Mapping[str, float]) -> dict[str, float]:
     return {name: float(value) for name, value in figures.items() if math.isfinite(value)}

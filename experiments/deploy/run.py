@@ -1,6 +1,7 @@
 """Runs on boats: checks, a black box, boats that obey; they are always left stopped.
 
-`deploy` lets a policy play, `preflight` checks and drills, `sea_trial` drives the manoeuvres a boat is fitted to.
+`deploy` lets a policy play, `preflight` checks and drills, `sea_trial` drives the manoeuvres a boat is fitted to: all
+three are one `run_boats` with another driver.
 """
 
 from __future__ import annotations
@@ -33,13 +34,25 @@ from steerclear.shield.bridge.preflight_checks import SITUATION, Check, check_si
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.bridge.tracker import Tracker
 
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, check_accepted, may_start, read_fleet, refuse_early
+from .orders import (
+    LONGEST_MINUTES,
+    Orders,
+    Outcome,
+    Surface,
+    check_accepted,
+    may_start,
+    read_fleet,
+    refuse_early,
+)
 from .plain import Tally
 from .policy_process import PolicyProcess
 from .preflight_file import DRILLED, check_drill, keep
 from .quiet import ended_by_signals, undisturbed, warm_up
 from .rules import grounds_of
 from .sea_trial import SeaTrial, longest_s
+
+LOOK_S = 1.5
+"""How long boats are looked at before their situation is judged, s."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +142,16 @@ def run_boats(
             check_accepted(checks, orders.accept, elsewhere)
             session.connect(orders.connect_s)  # the first packets to boats; whatever needs none was refused by now
             if may_start(checks, orders.accept, surface, outcome) and drive is not None and not operator.ended:
-                with contextlib.closing(_black_box(session, text, policy, outcome)) as box:
+                header = header_of_fleet(
+                    fleet,
+                    text,
+                    policy=policy,
+                    commanded=session.links,
+                    clock_s=clock.now_s(),
+                    notes={f"accepted {check.name}": check.text for check in outcome.checks if not check.passed},
+                )
+                path = log_path(fleet.log_dir, ".mcap", session.begun_unix_s)
+                with contextlib.closing(McapWriter(path, header, key=session.key)) as box:
                     outcome.log = box.path
                     session.prepare()
                     drive(Begun(session, box, orders, surface, operator, outcome))
@@ -138,70 +160,48 @@ def run_boats(
     return outcome
 
 
-def _black_box(session: VehicleSession, text: str, policy: str, outcome: Outcome) -> McapWriter:
-    """Begin the log; checks that were accepted although they did not pass are noted."""
-    header = header_of_fleet(
-        session.fleet,
-        text,
-        policy=policy,
-        commanded=session.links,
-        clock_s=session.clock.now_s(),
-        notes={f"accepted {result.name}": result.text for result in outcome.checks if not result.passed},
-    )
-    return McapWriter(log_path(session.fleet.log_dir, ".mcap", session.begun_unix_s), header, key=session.key)
+def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
+    """Checks that move no boat, in the order to run: the log's, the links', the situation's.
 
-
-LOOK_S = 1.5
-"""How long boats are looked at before their situation is judged, s."""
+    Args:
+        session: open.
+        minutes: how long the run may take.
+    """
+    fleet, look = session.fleet, _Look(session)
+    disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
+    mavlink = {name: link for name, link in session.links.items() if isinstance(link, MavlinkLink)}
+    moos = {name: link for name, link in session.links.items() if isinstance(link, MoosLink)}
+    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
+    links = [*link_checks(mavlink, fleet.platform_of, session.clock), *fences, *moos_checks(moos, fleet)]
+    grounds = grounds_of(fleet)
+    situation = [
+        Check(name, lambda name=name: check_situation(name, fleet, look.tracker, grounds)) for name in SITUATION
+    ]
+    return [disk, *links, *situation]
 
 
 class _Look:
     """What is known of all boats after watching them for a while, when first asked for."""
 
-    def __init__(self, station: VehicleSession) -> None:
-        self._station = station
+    def __init__(self, session: VehicleSession) -> None:
+        self._session = session
 
     @cached_property
-    def roster(self) -> Tracker:
-        station = self._station
-        fleet, clock = station.fleet, station.clock
-        roster = Tracker(fleet, station.links)
+    def tracker(self) -> Tracker:
+        session = self._session
+        fleet, clock = session.fleet, session.clock
+        tracker = Tracker(fleet, session.links)
         due = clock.now_s()
         for _ in range(math.ceil(LOOK_S / fleet.dt_s)):
             due += fleet.dt_s
             clock.sleep_until(due)
-            readings = {name: link.read() for name, link in station.links.items()}
-            roster.update(clock.now_s(), readings, station.contacts())
-        return roster
-
-
-def checks_of(station: VehicleSession, minutes: float) -> list[Check]:
-    """Checks that move no boat, in the order to run.
-
-    Args:
-        station: connected.
-        minutes: how long the run may take.
-    """
-    fleet, look = station.fleet, _Look(station)
-    disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
-    mavlink = {name: link for name, link in station.links.items() if isinstance(link, MavlinkLink)}
-    moos = {name: link for name, link in station.links.items() if isinstance(link, MoosLink)}
-    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
-    links = [*link_checks(mavlink, fleet.platform_of, station.clock), *fences, *moos_checks(moos, fleet)]
-    grounds = grounds_of(fleet)
-    situation = [
-        Check(name, lambda name=name: check_situation(name, fleet, look.roster, grounds)) for name in SITUATION
-    ]
-    return [disk, *links, *situation]
-
-
-def drilled_check(station: VehicleSession, text: str, boat: str | None, accept: Sequence[str]) -> Check:
-    """The check that these boats were drilled lately, and did well but for what is accepted."""
-    return Check("drill", lambda: check_drill(station.fleet, text, boat, tuple(station.links), accept))
+            readings = {name: link.read() for name, link in session.links.items()}
+            tracker.update(clock.now_s(), readings, session.contacts())
+        return tracker
 
 
 def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | None = None) -> Outcome:
-    """Run boats.
+    """Run boats by a policy.
 
     Args:
         orders: what to run.
@@ -226,11 +226,13 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         warm_up(fleet)
         policy.start()
         publishers = _publishers(fleet, orders)
+        for publisher in publishers:
+            stack.callback(publisher.close)
 
         def opened(session: VehicleSession) -> list[Check]:
             if isinstance(policy, MoosNominal):
                 policy.use(session.links)
-            return [drilled_check(session, text, orders.boat, orders.accept)]
+            return [Check("drill", lambda: check_drill(fleet, text, orders.boat, tuple(session.links), orders.accept))]
 
         def drive(begun: Begun) -> None:
             timing, tally, outcome = Timing(), Tally(), begun.outcome
@@ -240,15 +242,8 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
             outcome.figures = {**timing.figures(), **tally.figures(), "missed_turns": float(loop.overruns.missed)}
             outcome.figures |= {f"margin_{name}_m": margin for name, margin in loop.model_error.margin_m.items()}
 
-        for publisher in publishers:
-            stack.callback(publisher.close)
         return run_boats(
-            orders,
-            surface,
-            operator,
-            (fleet, text),
-            orders.policy,
-            drive,
+            *(orders, surface, operator, (fleet, text), orders.policy, drive),
             clock=clock,
             opened=opened,
             elsewhere=DRILLED,
