@@ -129,7 +129,7 @@ REPLAY = {
     "complete": "whether it was closed properly; false after a crash",
     "made_by": "which version wrote it",
     "proved": "whether every decision is proved, of a log that is as it was written",
-    "chain.chained": "whether the log has a chain; those of older versions have none",
+    "chain.chained": "whether the log has a chain: every log that is read has one",
     "chain.keyed": "whether its links carry codes",
     "chain.codes_checked": "codes found right; 0 without --key",
     "chain.mended": "whether --mend wrote it from one that was cut off",

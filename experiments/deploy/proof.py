@@ -59,8 +59,6 @@ class SentCheck:
         self.cut: Counter[tuple[str, float]] = Counter()
         self._ours = [boat.name for boat in header.boats if boat.ours]
         self._is_team = header.config.coordination == "team"  # then nobody else steers a boat the shield decides for
-        self._tells_limits = header.version > 1
-        self._limits: dict[str, float] = {}
 
     def strayed(self, tick: Tick) -> list[Strayed]:
         """What does not fit in a tick."""
@@ -87,17 +85,10 @@ class SentCheck:
     def _is_speed(self, sent: Sent, decided_mps: float) -> bool:
         if sent.route == VelocityRoute.name:
             decided_mps = max(CREEP_MPS, decided_mps)
-        limit_mps = sent.limit_mps if self._tells_limits else self._limit_seen(sent, decided_mps)
-        allowed_mps = min(limit_mps, max(-limit_mps, decided_mps))
+        allowed_mps = min(sent.limit_mps, max(-sent.limit_mps, decided_mps))
         if abs(allowed_mps - decided_mps) > ROUNDED_MPS:
-            self.cut[sent.boat, limit_mps] += 1
+            self.cut[sent.boat, sent.limit_mps] += 1
         return abs(sent.speed_mps - allowed_mps) <= ROUNDED_MPS
-
-    def _limit_seen(self, sent: Sent, decided_mps: float) -> float:
-        """The limit of logs that do not tell it: the first speed that was cut; it never changes."""
-        if abs(sent.speed_mps) < abs(decided_mps) - ROUNDED_MPS:
-            self._limits.setdefault(sent.boat, abs(sent.speed_mps))
-        return self._limits.get(sent.boat, math.inf)
 
 
 def _decided(tick: Tick) -> dict[str, tuple[float, float]]:

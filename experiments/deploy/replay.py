@@ -64,10 +64,7 @@ class Replay:
 
     @property
     def proved(self) -> bool:
-        """Whether every decision of a log that is as it was written is proved.
-
-        Logs of version 1 have no chain, and one that was killed has no end: that is told, and they count as they are.
-        """
+        """Whether every decision of a log that is as it was written is proved; one that was killed has no end."""
         return self.proof.proved and self.chain.broken == 0 and not self.damage
 
     @property
@@ -294,9 +291,6 @@ def _show_log(console: Console, replay: Replay) -> None:
 
 def _show_chain(console: Console, replay: Replay) -> None:
     chain = replay.chain
-    if not chain.chained:
-        console.print(f"The log is not chained ({replay.made_by}): what was cut out or changed does not show.")
-        return
     if chain.broken:
         console.print("The log is not as it was written:", style="red")
         for text in chain.breaks[:MOST_ROWS]:

@@ -95,23 +95,6 @@ def test_a_heading_may_be_told_a_turn_further(ticks):
     assert strayed(tick) == []
 
 
-def test_a_limit_nobody_tells_is_the_first_that_was_met(ticks):
-    """Logs of the first version do not tell it; it never changes, and nothing goes beyond it."""
-    header = dataclasses.replace(HEADER, version=1, chain=None)
-    check = SentCheck(header)
-
-    def sent(decided_mps, sent_mps):
-        tick = with_sent(with_decided(ticks[5], decided_mps), speed_mps=sent_mps, heading_rad=1.0)
-        return [entry.what for entry in check.strayed(tick)]
-
-    assert sent(1.0, 1.0) == []
-    assert sent(2.0, 1.5) == []
-    assert sent(1.8, 1.5) == []
-    assert sent(2.0, 1.4) == ["speed"]
-    assert sent(2.0, 1.6) == ["speed"]
-    assert sent(1.0, 0.7) == ["speed"]
-
-
 def test_a_boat_told_nothing_is_found(ticks):
     tick = dataclasses.replace(ticks[5], sent={"blue_2": ticks[5].sent["blue_2"]})
     assert strayed(tick) == [("blue_1", "command")]
