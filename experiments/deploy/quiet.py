@@ -1,4 +1,4 @@
-"""What keeps a run in time and in order: compiling beforehand, few pauses, signals."""
+"""What keeps a run in time and in order: compiling beforehand, few pauses, real-time priority, signals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,9 +19,6 @@ from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import fresh_state, step_boat
 
 from .orders import boats_of
-
-NICENESS = -10
-"""Of the runner's threads while boats are steered, where the system allows that and no more."""
 
 LOOP_FIRST, OTHERS_FIRST = 2, 1
 """Real-time priorities of the loop's thread and of the runner's others, where the system allows them: before all other
@@ -67,58 +63,36 @@ def before_others() -> Iterator[None]:
     """
     own = threading.get_native_id()
     before = {task: place for task in _tasks() if (place := _place(task)) is not None}
-    for task in before:
-        with contextlib.suppress(OSError):  # each takes a right that few have; without it all goes on as it is
-            os.setpriority(os.PRIO_PROCESS, task, min(NICENESS, before[task].niceness))
-    if own in before and _schedule(own, before[own], LOOP_FIRST):
+    if own in before and _schedule(own, before[own][1], LOOP_FIRST):
         for task in before.keys() - {own}:
-            _schedule(task, before[task], OTHERS_FIRST)
+            _schedule(task, before[task][1], OTHERS_FIRST)
     try:
         yield
     finally:
-        for task, place in before.items():
-            _give_back(task, place)
+        for task, (policy, priority) in before.items():
+            for given in (policy, policy | os.SCHED_RESET_ON_FORK):  # few have the right to take the flag off
+                with contextlib.suppress(OSError):
+                    os.sched_setscheduler(task, given, os.sched_param(priority))
+                    break
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Policy, real-time priority and niceness of a thread."""
-
-    policy: int
-    priority: int
-    niceness: int
-
-
-def _place(task: int) -> _Place | None:
-    """What a thread has; None: it has ended."""
+def _place(task: int) -> tuple[int, int] | None:
+    """Policy and real-time priority of a thread; None: it has ended."""
     try:
-        priority = os.sched_getparam(task).sched_priority
-        return _Place(os.sched_getscheduler(task), priority, os.getpriority(os.PRIO_PROCESS, task))
+        return os.sched_getscheduler(task), os.sched_getparam(task).sched_priority
     except OSError:
         return None
 
 
-def _schedule(task: int, place: _Place, priority: int) -> bool:
+def _schedule(task: int, has: int, priority: int) -> bool:
     """Let a thread have at least a real-time priority; processes and threads it starts have none. Whether it has it."""
-    if place.priority >= priority:
+    if has >= priority:
         return True
     try:
         os.sched_setscheduler(task, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
-    except OSError:
+    except OSError:  # a right that few have; without it all goes on as it is
         return False
     return True
-
-
-def _give_back(task: int, place: _Place) -> None:
-    parameter = os.sched_param(place.priority)
-    for policy in (place.policy, place.policy | os.SCHED_RESET_ON_FORK):  # few have the right to take the flag off
-        try:
-            os.sched_setscheduler(task, policy, parameter)
-            break
-        except OSError:
-            continue
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, task, place.niceness)
 
 
 def _tasks() -> list[int]:

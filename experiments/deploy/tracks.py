@@ -71,18 +71,11 @@ class Tracks:
         return self.states[:, :, : L.Y + 1]
 
 
-@dataclass(frozen=True)
-class _Decided:
-    """One boat's part of one tick."""
-
-    wanted: tuple[float, float]
-    sent: tuple[float, float]
-    reason: int
-    intervened: bool
-    certificate_m: float
-
-
-_NOTHING = _Decided((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
+_DECIDED = np.dtype(
+    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("certificate_m", "f8")]
+)
+"""One boat's part of one tick."""
+_NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
 
 
 class TrackBuilder:
@@ -100,7 +93,7 @@ class TrackBuilder:
         self._ours: set[str] = set()
         self._fixes: dict[str, list[tuple[float, Array]]] = {boat.name: [] for boat in header.boats}
         self._times: list[float] = []
-        self._decided: list[dict[str, _Decided]] = []
+        self._decided: list[dict[str, Any]] = []
         self._games: list[Mapping[str, Any]] = []
 
     def add(self, tick: Tick) -> None:
@@ -142,7 +135,7 @@ class TrackBuilder:
         states = np.stack([_states(self._fixes[name], time_s) for name in names], axis=1)
         _fill(states, params)
         at = np.searchsorted(np.array(self._times) - _MATCH_S, time_s[:-1], side="right") - 1
-        rows = [[self._decided[k].get(name, _NOTHING) for name in names] for k in at]
+        decided = np.array([[self._decided[k].get(name, _NOTHING) for name in names] for k in at], dtype=_DECIDED)
         return Tracks(
             names=names,
             team=np.array([self._team[name] for name in names], dtype=np.int64),
@@ -154,10 +147,10 @@ class TrackBuilder:
             driven=np.array([[_driven(self._games[k], name) for name in names] for k in at]),
             games=[self._games[k] for k in at],
             dt_s=dt_s,
-            **_columns(rows),
+            **{column: decided[column] for column in decided.dtype.names or ()},
         )
 
-    def _decisions(self, tick: Tick) -> dict[str, _Decided]:
+    def _decisions(self, tick: Tick) -> dict[str, Any]:
         decisions = tick.decisions
         if decisions is None:
             return {}
@@ -167,7 +160,7 @@ class TrackBuilder:
                 continue  # team-mates with a shield of their own are steered by another process
             own_rad = float(decisions.fleet.heading_rad[i])
             self._ours.add(name)
-            found[name] = _Decided(
+            found[name] = (
                 decisions.wanted.absolute(i, own_rad),
                 decisions.sent.absolute(i, own_rad),
                 int(decisions.reason[i]),
@@ -175,16 +168,6 @@ class TrackBuilder:
                 float(decisions.certificate_m[i]),
             )
         return found
-
-
-def _columns(rows: list[list[_Decided]]) -> dict[str, Any]:
-    return {
-        "wanted": np.array([[entry.wanted for entry in row] for row in rows]),
-        "sent": np.array([[entry.sent for entry in row] for row in rows]),
-        "reason": np.array([[entry.reason for entry in row] for row in rows], dtype=np.int64),
-        "intervened": np.array([[entry.intervened for entry in row] for row in rows]),
-        "certificate_m": np.array([[entry.certificate_m for entry in row] for row in rows]),
-    }
 
 
 def _driven(game: Mapping[str, Any], name: str) -> bool:

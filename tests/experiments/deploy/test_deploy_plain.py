@@ -17,7 +17,6 @@ from steerclear.experiments.deploy.keys import FIGURES, figure_rows
 from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m, logging_aside
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
-    NICENESS,
     OTHERS_FIRST,
     before_others,
     ended_by_signals,
@@ -200,17 +199,13 @@ def test_asking_what_the_system_allows_leaves_these_tests_as_they_were():
 
 
 def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
-    before, nice, plain = sys.getswitchinterval(), os.getpriority(os.PRIO_PROCESS, 0), scheduled()
-    question = "import os; print(os.nice(0), os.sched_getscheduler(0))"
+    before, plain = sys.getswitchinterval(), scheduled()
+    question = "import os; print(os.sched_getscheduler(0))"
     with undisturbed():
         assert sys.getswitchinterval() < before
-        assert os.getpriority(os.PRIO_PROCESS, 0) in (nice, NICENESS)
         told = subprocess.run([sys.executable, "-c", question], capture_output=True, check=True, text=True).stdout
-        niceness, policy = map(int, told.split())
-        assert niceness >= min(0, nice)
-        assert policy & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
+        assert int(told) & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
     assert sys.getswitchinterval() == pytest.approx(before)
-    assert os.getpriority(os.PRIO_PROCESS, 0) == nice
     assert scheduled() == plain
 
 
@@ -251,8 +246,6 @@ class System:
         monkeypatch.setattr(os, "sched_getscheduler", lambda task: self._of(task)[0])
         monkeypatch.setattr(os, "sched_getparam", lambda task: os.sched_param(self._of(task)[1]))
         monkeypatch.setattr(os, "sched_setscheduler", self._give)
-        monkeypatch.setattr(os, "getpriority", lambda which, task: 3)
-        monkeypatch.setattr(os, "setpriority", lambda which, task, niceness: self._of(task))
 
     def _of(self, task):
         if task in self.gone:
@@ -284,7 +277,6 @@ def test_a_system_that_allows_nothing_is_no_fault(monkeypatch):
     def refuse(*_):
         raise PermissionError
 
-    monkeypatch.setattr(os, "setpriority", refuse)
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     with undisturbed():
         assert scheduled()[0] == os.SCHED_OTHER

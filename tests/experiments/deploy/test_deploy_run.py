@@ -2,9 +2,7 @@
 
 import contextlib
 import json
-import os
 import socket
-import stat
 import threading
 
 import pytest
@@ -24,7 +22,8 @@ from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import CheckResult
-from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, LinkError, PolicyError
+from steerclear.shield.bridge.session import VehicleSession
+from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, PolicyError
 from typer.testing import CliRunner
 
 SPEED = 5.0
@@ -156,12 +155,6 @@ def taken(path, kind):
     return entry
 
 
-@pytest.mark.parametrize("kind", ["link", "feed"])
-def test_a_port_that_is_taken_is_said_and_nothing_is_sent(fleet_file, kind):
-    with taken(fleet_file, kind), pytest.raises(BridgeError, match="in use"):
-        preflight(orders_of(fleet_file))
-
-
 def test_a_boat_that_does_not_answer_is_named(fleet_file):
     with pytest.raises(LinkError, match="blue_1"):
         preflight(orders_of(fleet_file, connect_s=0.5))
@@ -180,18 +173,43 @@ def test_a_policy_that_does_not_load_is_said_before_anything_is_opened(fleet_fil
 SECOND = """  - {name: blue_2, agent: agent_1, platform: heron, link: {kind: mavlink, address: "ADDRESS", system_id: 1}}
   - {name: red_1, agent: agent_2, platform: heron, contact: feed}
   - {name: red_2, agent: agent_3"""
-BAD = {
-    "unknown key": ("team: blue", "team: blue\ngeofense: {xmin_m: 0}", "did you mean 'geofence'"),
+FENCE, TEAM, FEED = "{xmin_m: -10, ymin_m: -10, xmax_m: 90, ymax_m: 50}", "team: blue", 'feed: {listen: "127.0.0.1:'
+UDP = "udpin:127.0.0.1:"
+MISTAKES = {
+    "unknown key": (TEAM, TEAM + "\ngeofense: {xmin_m: 0}", "did you mean 'geofence'"),
     "two boats with one id": ("  - {name: red_1, agent: agent_1", SECOND, "have one system_id, 1"),
     "missing platform": ("    platform: heron\n", "", "platform is missing"),
-    "no geofence": ("geofence: {xmin_m: -10, ymin_m: -10, xmax_m: 90, ymax_m: 50}\n", "", "geofence is missing"),
-    "key file readable by all": ("team: blue", "team: blue\nsigning: {key_file: my.key}", "chmod 600"),
-    "unknown rules": ("team: blue", "team: blue\npreset: chess", "chess"),
-    "nothing to command": ("team: blue", "team: red", "no boat of team red has a link"),
-    "no boat named": ("team: blue", "team: blue\ncoordination: per_boat", "--boat"),
+    "no geofence": (f"geofence: {FENCE}\n", "", "geofence is missing"),
+    "key file readable by all": (TEAM, TEAM + "\nsigning: {key_file: my.key}", "chmod 600"),
+    "unknown rules": (TEAM, TEAM + "\npreset: chess", "chess"),
+    "nothing to command": (TEAM, "team: red", "no boat of team red has a link"),
+    "no boat named": (TEAM, TEAM + "\ncoordination: per_boat", "--boat"),
     "system id of nobody": ("system_id: 1", "system_id: 0", "1 to 255"),
     "a feed that is no address": ("listen: ", "listen: x", "HOST:PORT"),
+    "no water left": (FENCE, "{xmin_m: 0, ymin_m: 0, xmax_m: 0.3, ymax_m: 50}", "too small"),
+    "too narrow": (FENCE, "{xmin_m: 0, ymin_m: 0, xmax_m: 1.5, ymax_m: 50}", "narrower"),
+    "error eats the water": (TEAM, TEAM + "\nshield: {position_error_m: 40.0}", "too small"),
+    "current eats the water": (TEAM, TEAM + "\nshield: {current_mps: 9.0, delay_s: 5.0}", "too small"),
+    "a rule nobody knows": (TEAM, TEAM + "\nrules: {name: x}", "unknown game setting"),
+    "a rule of another kind": (TEAM, TEAM + "\nrules: {catch_radius_m: far}", "catch_radius_m"),
+    "a circle of the rules that is none": (TEAM, TEAM + "\nrules: {circles: [[1, 2]]}", "rules"),
+    "log folder is a file": (TEAM, TEAM + "\nlog_dir: FLEET.yaml", "log"),
+    "log folder in a file": (TEAM, TEAM + "\nlog_dir: FLEET.yaml/logs", "log"),
+    "log folder of the system": (TEAM, TEAM + "\nlog_dir: /proc/steerclear", "log"),
+    "log folder with too long a name": (TEAM, TEAM + f"\nlog_dir: {'a' * 300}", "log"),
+    "no key": (TEAM, TEAM + "\nsigning: {key_file: none.key}", "signing key"),
+    "a key that is a folder": (TEAM, TEAM + "\nsigning: {key_file: .}", "signing key"),
+    "no such route": ("system_id: 1}", "system_id: 1, route: TELEPATHY}", "route"),
+    "no such host": (UDP, "udpin:no.such.host.invalid:", "no.such.host.invalid"),
+    "no such device": (UDP, "serial:/dev/none:", "none"),
+    "no such listener": (
+        FEED,
+        'feed: {publish: ["no.such.host.invalid:9"], listen: "127.0.0.1:',
+        "no.such.host.invalid",
+    ),
 }
+"""What is replaced in the file, and what is said."""
+ACCEPTED = ("disk", "geofence", "certificate", "known", "drill", "latency", "rates", "spread", "clock", "autopilot")
 
 
 def one_line_and_exit_2(command, path, *more):
@@ -199,23 +217,49 @@ def one_line_and_exit_2(command, path, *more):
     result = CliRunner().invoke(app, [command, str(path), *more])
     assert result.exit_code == 2, result.output
     (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("error: ")
+    assert line.isprintable()
     return line
 
 
-@pytest.mark.parametrize("name", BAD)
-@pytest.mark.parametrize("command", ["deploy", "preflight"])
-def test_a_bad_file_is_one_line_and_exit_2(fleet_file, name, command):
-    old, new, said = BAD[name]
+def mistaken(fleet_file, name):
+    """Put a mistake into the file; what is to be said of it."""
+    old, new, said = MISTAKES[name]
     text = fleet_file.read_text()
     assert old in text
     address = load_fleet(fleet_file).boats[0].link.address
     fleet_file.write_text(text.replace(old, new.replace("ADDRESS", address), 1))
-    key = fleet_file.parent / "my.key"
-    key.write_text("ab" * 32)
-    os.chmod(key, 0o644)
-    assert said in one_line_and_exit_2(command, fleet_file)
-    assert stat.S_IMODE(key.stat().st_mode) == 0o644
-    assert not [*fleet_file.parent.rglob("*.mcap"), *fleet_file.parent.rglob("*.tlog")], "nothing was begun"
+    (fleet_file.parent / "my.key").write_text("ab" * 32)
+    (fleet_file.parent / "my.key").chmod(0o644)
+    return said
+
+
+@pytest.fixture
+def no_packet(monkeypatch):
+    """Fails the test when boats are spoken to."""
+
+    def connect(self, timeout_s=0.0):
+        raise RuntimeError("packets were sent")
+
+    monkeypatch.setattr(VehicleSession, "connect", connect)
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+@pytest.mark.parametrize("command", ["deploy", "preflight"])
+def test_a_mistake_is_one_line_and_exit_2_before_any_packet(fleet_file, no_packet, name, command):
+    if (name, command) == ("no such listener", "preflight"):
+        pytest.skip("preflight publishes nothing")
+    said = mistaken(fleet_file, name)
+    accepted = [f"--accept={check}" for check in ACCEPTED]
+    assert said in one_line_and_exit_2(
+        command, fleet_file, "--policy=easy" if command == "deploy" else "--wait=1", *accepted
+    )
+    assert not list(fleet_file.parent.rglob("*.mcap")), "nothing was begun"
+
+
+def test_a_sound_file_gets_as_far_as_packets(fleet_file, no_packet):
+    with pytest.raises(RuntimeError, match="packets were sent"):
+        deploy(orders_of(fleet_file, connect_s=1.0))
 
 
 @pytest.mark.parametrize("command", ["deploy", "preflight"])
@@ -226,20 +270,30 @@ def test_a_port_that_is_taken_is_one_line_and_exit_2(fleet_file, kind, command):
     assert "in use" in line
 
 
-SENT_BY = ["unknown key", "two boats with one id", "missing platform", "no geofence", "key file readable by all"]
-
-
-@pytest.mark.parametrize("name", [*SENT_BY, "port taken"])
+@pytest.mark.parametrize("name", ["unknown key", "two boats with one id", "key file readable by all", "port taken"])
 def test_with_a_bad_file_nothing_is_sent_to_any_boat(fleet_file, boats, name):
-    old, new, _ = BAD.get(name, ("", "", ""))
-    address = load_fleet(fleet_file).boats[0].link.address
-    (fleet_file.parent / "my.key").write_text("ab" * 32)
-    os.chmod(fleet_file.parent / "my.key", 0o644)
-    fleet_file.write_text(fleet_file.read_text().replace(old, new.replace("ADDRESS", address), 1))
+    if name in MISTAKES:
+        mistaken(fleet_file, name)
     with taken(fleet_file, "feed") if name == "port taken" else contextlib.nullcontext():
         one_line_and_exit_2("deploy", fleet_file, "--speed", f"{SPEED:g}")
     counts = boats.boats["blue_1"].autopilot.counts
     assert counts["taken"] == counts["ignored"] == counts["refused"] == 0
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["[]", "{", "{}", "1", "[" * 5000, '{"checks": [1], "refused": [], "unix_s": 1}', "\u00e9",
+     '{"fleet": "", "checks": [{"name": "response:blue_1", "passed": true, "text": "", "figures": {"delay_s": "x"}}], '
+     '"refused": [], "unix_s": 1}',
+     '{"fleet": "", "checks": [], "refused": [[]], "unix_s": 1}',
+     '{"fleet": "", "checks": [], "refused": [], "unix_s": "now"}'],
+)  # fmt: skip
+def test_a_kept_preflight_of_a_wrong_form_counts_as_missing(fleet_file, content):
+    fleet = load_fleet(fleet_file)
+    path_of(fleet, None).parent.mkdir()
+    path_of(fleet, None).write_text(content)
+    assert measured_delay_s(fleet, None) is None
+    assert "no preflight" in check_drill(fleet, fleet_file.read_text(), None, ["blue_1"]).text
 
 
 def test_every_key_of_the_json_is_documented(fleet_file, boats, tmp_path):
