@@ -101,40 +101,38 @@ JUDGED_EVERY = 3
 
 @dataclass(frozen=True)
 class Judged:
-    """A fit and its held-out errors.
+    """A fit and its errors, by run.
 
     Attributes:
         fit: to all runs.
         seen: what the boat did at its hardest.
-        errors_m: (windows, 3) distances at `AHEAD_S` between places predicted and seen, of all runs, NaN: past its end.
-        whose: (windows,) number of the run.
-        held_out: (windows,) whether the run was predicted by a fit that did not know it.
         runs: all of them.
+        errors_m: of each run (windows, 3) distances at `AHEAD_S` between places predicted and seen, NaN: past its end.
+        held_out: of each run whether it was predicted by a fit that did not know it.
     """
 
     fit: Fit
     seen: Seen
-    errors_m: Array
-    whose: Array
-    held_out: Array
     runs: Sequence[Run]
+    errors_m: Sequence[Array]
+    held_out: Sequence[bool]
+
+    def errors_of(self, column: int, chosen: Callable[[int], bool]) -> Array:
+        """Errors at one of `AHEAD_S` of the runs whose numbers are chosen, m."""
+        parts = [errors[:, column] for n, errors in enumerate(self.errors_m) if chosen(n)]
+        joined = np.concatenate(parts) if parts else np.zeros(0)
+        return np.asarray(joined[np.isfinite(joined)])
 
     def quantile_m(self, column: int, share: float) -> float:
         """Quantile of the errors at one of `AHEAD_S`: the next larger one, of all errors when none is held out."""
-        errors = self.errors_m[self.held_out, column]
-        errors = errors[np.isfinite(errors)]
-        if len(errors) == 0:
-            errors = self.errors_m[np.isfinite(self.errors_m[:, column]), column]
-        if len(errors) == 0:
-            return float("nan")
+        errors = self.errors_of(column, lambda n: self.held_out[n])
+        errors = errors if len(errors) else self.errors_of(column, lambda n: True)
         rank = min(len(errors), int(np.ceil(share * (len(errors) + 1))))
-        return float(np.sort(errors)[rank - 1])
+        return float(np.sort(errors)[rank - 1]) if len(errors) else float("nan")
 
     def median_of_kind(self, kind: str, column: int = 1) -> float:
         """Median error of the runs of a kind, m; NaN: there is none."""
-        mine = np.array([self.runs[int(number)].kind == kind for number in self.whose], dtype=bool)
-        errors = self.errors_m[mine, column] if len(mine) else np.zeros(0)
-        errors = errors[np.isfinite(errors)]
+        errors = self.errors_of(column, lambda n: self.runs[n].kind == kind)
         return float(np.median(errors)) if len(errors) else float("nan")
 
     def margin(self) -> tuple[float, float]:
@@ -150,18 +148,14 @@ def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
     """Fit a model to all runs, and predict each run by a fit to the others of its kind."""
     around = model.around(seen)
     fit = fit_model(around, runs, seen.top_mps, around.starts())
-    part = _dealt(runs)
-    errors, whose, out = [], [], []
-    for fold in range(FOLDS):
-        left = [run for run, its in zip(runs, part, strict=True) if its != fold]
-        mine = [number for number, its in enumerate(part) if its == fold]
-        if not mine or not left:
-            continue
-        other = fit_model(around, left, seen.top_mps, [fit.vector], most=12)
-        _collect(around, other, runs, mine, seen, True, errors, whose, out)
-    _collect(around, fit, runs, [n for n, its in enumerate(part) if its < 0], seen, False, errors, whose, out)
-    joined = np.concatenate(errors) if errors else np.zeros((0, len(AHEAD_S)))
-    return Judged(fit, seen, joined, np.array(whose), np.array(out, dtype=bool), runs)
+    parts = _dealt(runs)
+    fits = {-1: fit}
+    for part in sorted(set(parts) - {-1}):
+        others = [run for run, its in zip(runs, parts, strict=True) if its != part]
+        fits[part] = fit_model(around, others, seen.top_mps, [fit.vector], most=12)
+    params = {part: around.platform(one.vector, "fitted", seen.top_mps).pack() for part, one in fits.items()}
+    errors = [at_times(params[part], run, fits[part].delay_s) for run, part in zip(runs, parts, strict=True)]
+    return Judged(fit, seen, runs, errors, [part >= 0 for part in parts])
 
 
 def _dealt(runs: Sequence[Run]) -> list[int]:
@@ -173,25 +167,6 @@ def _dealt(runs: Sequence[Run]) -> list[int]:
         counts[kind] = counts.get(kind, -1) + 1
         parts.append(counts[kind] % FOLDS if kinds.count(kind) > 1 else -1)
     return parts
-
-
-def _collect(
-    model: Model,
-    fit: Fit,
-    runs: Sequence[Run],
-    numbers: Sequence[int],
-    seen: Seen,
-    held_out: bool,
-    errors: list[Array],
-    whose: list[int],
-    out: list[bool],
-) -> None:
-    params = model.platform(fit.vector, "fitted", seen.top_mps).pack()
-    for number in numbers:
-        found = at_times(params, runs[number], fit.delay_s)
-        errors.append(found)
-        whose += [number] * len(found)
-        out += [held_out] * len(found)
 
 
 def at_times(params: Array, run: Run, delay_s: float) -> Array:
@@ -262,7 +237,9 @@ def measured_of(judged: Judged) -> dict[str, float]:
         **quantiles,
         "median_3_s_m": judged.quantile_m(1, 0.5),
         "runs": float(len(judged.runs)),
-        "held_out": float(len(set(judged.whose[judged.held_out].tolist()))),
+        "held_out": float(
+            sum(out and len(errors) > 0 for out, errors in zip(judged.held_out, judged.errors_m, strict=True))
+        ),
     }
     return {key: float(np.ceil(value * 1e3) / 1e3) for key, value in values.items() if np.isfinite(value)}
 
@@ -293,7 +270,7 @@ def results_of(found: dict[str, Judged], chosen: str, file: PlatformFile) -> dic
                 "name": run.name,
                 "seconds": run.seconds,
                 "shows": run.kind,
-                "held_out": bool(judged.held_out[judged.whose == n].all()),
+                "held_out": judged.held_out[n],
             }
             for n, run in enumerate(judged.runs)
         ],

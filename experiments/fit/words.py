@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from steerclear.shield.platforms import Platform, step_boat
@@ -114,45 +115,43 @@ def draw(judged: Judged, name: str, path: Path) -> None:
 
 def _telling(judged: Judged) -> list[int]:
     """Runs to show: of each kind the one predicted worst, then others."""
-    worst = {
-        n: float(np.nanmax(judged.errors_m[judged.whose == n][:, 1], initial=0.0)) for n in range(len(judged.runs))
-    }
+    worst = {n: float(np.nanmax(errors[:, 1], initial=0.0)) for n, errors in enumerate(judged.errors_m)}
     order = sorted(worst, key=lambda n: -worst[n])
     first = list({judged.runs[n].kind: n for n in reversed(order)}.values())
     return (first + [n for n in order if n not in first])[:RUNS]
 
 
-def _draw_run(axis: object, judged: Judged, params: np.ndarray, number: int) -> None:
+def _draw_run(axis: Any, judged: Judged, params: np.ndarray, number: int) -> None:
     run = judged.runs[number]
     errors = errors_of(params, run, judged.fit.delay_s, 30, AHEAD_STEPS)
-    axis.plot(run.seen[:, 0], run.seen[:, 1], color="0.6", linewidth=3, label="seen")  # type: ignore[attr-defined]
+    axis.plot(run.seen[:, 0], run.seen[:, 1], color="0.6", linewidth=3, label="seen")
     for w, error in enumerate(errors):
         places = run.seen[w * 30 + 1 : w * 30 + 1 + AHEAD_STEPS, :2] + error[:, :2]
-        axis.plot(places[:, 0], places[:, 1], "--", color="C0", linewidth=1.2)  # type: ignore[attr-defined]
-    axis.set_aspect("equal", adjustable="datalim")  # type: ignore[attr-defined]
-    axis.set_title(f"{run.name}: {run.kind}", fontsize=9)  # type: ignore[attr-defined]
-    axis.set_xlabel("x, m")  # type: ignore[attr-defined]
-    axis.set_ylabel("y, m")  # type: ignore[attr-defined]
+        axis.plot(places[:, 0], places[:, 1], "--", color="C0", linewidth=1.2)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_title(f"{run.name}: {run.kind}", fontsize=9)
+    axis.set_xlabel("x, m")
+    axis.set_ylabel("y, m")
 
 
-def _draw_errors(axis: object, judged: Judged) -> None:
+def _draw_errors(axis: Any, judged: Judged) -> None:
     medians = [judged.quantile_m(c, 0.5) for c in range(3)]
     tails = [judged.quantile_m(c, COVERED) for c in range(3)]
-    axis.plot(AHEAD_S, medians, "o-", label="median")  # type: ignore[attr-defined]
-    axis.plot(AHEAD_S, tails, "s-", label="99 of 100")  # type: ignore[attr-defined]
+    axis.plot(AHEAD_S, medians, "o-", label="median")
+    axis.plot(AHEAD_S, tails, "s-", label="99 of 100")
     begin, growth = judged.margin()
     margin = [begin + growth * (at - 1.0) for at in AHEAD_S]
-    axis.plot(AHEAD_S, margin, ":", color="C3", label="margin")  # type: ignore[attr-defined]
-    axis.set_xlabel("time ahead, s")  # type: ignore[attr-defined]
-    axis.set_ylabel("error of the place, m")  # type: ignore[attr-defined]
-    axis.set_title("runs it was not fitted to", fontsize=9)  # type: ignore[attr-defined]
-    axis.legend(fontsize=8)  # type: ignore[attr-defined]
+    axis.plot(AHEAD_S, margin, ":", color="C3", label="margin")
+    axis.set_xlabel("time ahead, s")
+    axis.set_ylabel("error of the place, m")
+    axis.set_title("runs it was not fitted to", fontsize=9)
+    axis.legend(fontsize=8)
 
 
-def _draw_spread(axis: object, judged: Judged) -> None:
-    errors = np.sort(judged.errors_m[np.isfinite(judged.errors_m[:, 1]), 1])
+def _draw_spread(axis: Any, judged: Judged) -> None:
+    errors = np.sort(judged.errors_of(1, lambda n: True))
     if len(errors):
-        axis.plot(errors, np.arange(1, len(errors) + 1) / len(errors))  # type: ignore[attr-defined]
-    axis.set_xlabel("error 3 s ahead, m")  # type: ignore[attr-defined]
-    axis.set_ylabel("share of moments")  # type: ignore[attr-defined]
-    axis.set_title(f"step {STEP_S:g} s", fontsize=9)  # type: ignore[attr-defined]
+        axis.plot(errors, np.arange(1, len(errors) + 1) / len(errors))
+    axis.set_xlabel("error 3 s ahead, m")
+    axis.set_ylabel("share of moments")
+    axis.set_title(f"step {STEP_S:g} s", fontsize=9)
