@@ -12,8 +12,9 @@ from steerclear.shield.platforms.files import to_text
 
 from ..fit.fitting import best_of, fit_runs, platform_file, results_of
 from ..fit.models import MODELS
+from ..fit.plot import draw
 from ..fit.reading import read_logs
-from ..fit.words import about_the_boat, draw, promise
+from ..fit.words import about_the_boat, promise
 from ..result_files import NEW, check_new, make_folder_of, write_json
 from . import options as o
 from .console import command, err, out
