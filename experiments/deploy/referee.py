@@ -10,10 +10,7 @@ from types import TracebackType
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.fleet_settings import LinkSettings
-from steerclear.shield.bridge.links import key_of, signing_of
-from steerclear.shield.bridge.mavlink.connection import Endpoint
-from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
+from steerclear.shield.bridge.links import LINK_MAKERS, BoatLink, LinkMaker, key_of
 from steerclear.shield.bridge.messages import Contact, contact_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
@@ -47,7 +44,7 @@ class Hearing:
         self.feed: FeedReceiver | None = None
         self._error_m = fleet.shield_config.position_error_m
         self._clock, self._max_age_s = clock, fleet.limits.contact.max_age_s
-        self._links: list[tuple[MavlinkLink, Endpoint, int]] = []
+        self._links: list[BoatLink] = []
         self._open = contextlib.ExitStack()
         try:
             if address is not None:
@@ -62,7 +59,7 @@ class Hearing:
 
     def contacts(self) -> Sequence[Contact]:
         """The latest contact of each boat heard of: of its own link, else of who was heard first and still speaks."""
-        told = [contact_of(link.read(), self._error_m) for link, _, _ in self._links]
+        told = [contact_of(link.read(), self._error_m) for link in self._links]
         heard = () if self.feed is None else self.feed.read()
         oldest_s = self._clock.now_s() - self._max_age_s
         found: dict[str, Contact] = {}
@@ -74,8 +71,8 @@ class Hearing:
 
     def close(self) -> None:
         """Give everything back, telling no boat anything; may be called again."""
-        for _, endpoint, system_id in self._links:
-            endpoint.detach(system_id)
+        for link in self._links:
+            link.release()
         self._links = []
         self._open.close()
 
@@ -88,22 +85,17 @@ class Hearing:
         self.close()
 
     def _connect(self, fleet: FleetFile, clock: Clock) -> None:
-        signing = signing_of(fleet)
-        endpoints: dict[str, Endpoint] = {}
+        makers: dict[str, LinkMaker] = {}
         for boat in fleet.boats:
             if boat.link is not None:
-                endpoint = endpoints.get(boat.link.address)
-                if endpoint is None:
-                    endpoint = endpoints[boat.link.address] = Endpoint(boat.link.address, clock, signing=signing)
-                    endpoint.open()
-                    self._open.callback(endpoint.close)
-                self._add(boat.name, boat.link, endpoint, fleet, clock)
-        for link, _, _ in self._links:
+                kind = boat.link.kind
+                maker = makers[kind] = makers.get(kind) or LINK_MAKERS[kind](fleet, clock, None)
+                self._links.append(maker.link(boat))
+        for maker in makers.values():
+            self._open.callback(maker.close)
+            maker.open()
+        for link in self._links:
             link.connect(CONNECT_S)
-
-    def _add(self, name: str, settings: LinkSettings, endpoint: Endpoint, fleet: FleetFile, clock: Clock) -> None:
-        link = MavlinkLink(name, endpoint, settings.system_id, fleet.frame, clock, rate_hz=settings.rate_hz)
-        self._links.append((link, endpoint, settings.system_id))
 
 
 logger = logging.getLogger(__name__)

@@ -25,13 +25,13 @@ boats:
 FEED = 'feed: {{listen: "127.0.0.1:{}", referee: "127.0.0.1:{}"}}'
 
 
-def fleet_of(feed=FEED):
+def fleet_of(feed=FEED, text=FLEET):
     ports = []
     for _ in range(4):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("127.0.0.1", 0))
             ports.append(probe.getsockname()[1])
-    return parse_fleet(FLEET.format(*ports, feed=feed.format(*ports[2:])))
+    return parse_fleet(text.format(*ports, feed=feed.format(*ports[2:])))
 
 
 def modes_of(boats):
@@ -51,9 +51,7 @@ def test_links_are_listened_to_and_left_as_they_were():
     clock = MonotonicClock()
     settings = {"autopilot": AutopilotSettings(boot_s=0.0), "feed_to": (), "waits": True}
     with SimFleet.from_file(fleet, **settings) as boats:
-        before = {
-            name: (boat.autopilot.vehicle.mode, boat.autopilot.vehicle.armed) for name, boat in boats.boats.items()
-        }
+        before = modes_of(boats)
         with Hearing(fleet, clock, links=True) as hearing:
             wait_for(lambda: len(hearing.contacts()) == 2)
             found = {contact.boat: contact for contact in hearing.contacts()}
@@ -65,11 +63,17 @@ def test_links_are_listened_to_and_left_as_they_were():
                 wait_for(lambda: hearing.feed.read())
             assert all(contact.fixed_s > now_s - 10.0 for contact in hearing.contacts()), "of two the fresher one"
         time.sleep(0.2)
-        after = {
-            name: (boat.autopilot.vehicle.mode, boat.autopilot.vehicle.armed) for name, boat in boats.boats.items()
-        }
-    assert after == before
+        assert modes_of(boats) == before
     assert isinstance(found["b1"], Contact)
+
+
+def test_boats_that_run_moos_are_heard_at_their_links_too():
+    link = '{{kind: mavlink, address: "udpin:127.0.0.1:{}", system_id: 1}}'
+    fleet = fleet_of(feed="", text=FLEET.replace(link, '"moos://127.0.0.1:{}"'))
+    with SimFleet.from_file(fleet, autopilot=AutopilotSettings(boot_s=0.0), feed_to=()) as boats:
+        with Hearing(fleet, MonotonicClock(), links=True) as hearing:
+            wait_for(lambda: {contact.boat for contact in hearing.contacts()} == {"b1", "r1"})
+        assert not boats.boats["b1"].is_commanded
 
 
 def test_it_must_be_told_where_to_hear():
