@@ -11,7 +11,7 @@ from steerclear.shield.platforms import layout as L
 
 BEYOND_M = 3.0
 LINE = TEXT.replace("xmax_m: 100, ymax_m: 60}", f"xmax_m: 100, ymax_m: 60, beyond_m: {BEYOND_M}, then: stop}}")
-STARTS = {"blue_1": (94.0, 20.0, 90.0), "blue_2": (10.0, 20.0, 90.0)}
+STARTS = {"blue_1": (99.0, 20.0, 90.0), "blue_2": (10.0, 20.0, 90.0)}
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def run(tmp_path_factory):
     """The log, and where the first boat was at each turn, m beyond the geofence."""
     beyond_m = []
     folder = tmp_path_factory.mktemp("stopped")
-    water = Water(current_mps=2.6, current_to_deg=90.0)  # faster than the boat: nothing brings it back
+    water = Water(current_mps=1.6, current_to_deg=90.0)  # it is over the line before it has turned round
     with Lake(folder, text=LINE, starts=STARTS, wants=((0.0, 1.57), (0.0, 1.57)), boxed=True, water=water) as lake:
         for _ in range(80):
             lake.turn()
