@@ -16,10 +16,25 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import ConfigError
 
+try:
+    import termios
+except ImportError:  # not a Unix: no key is read, Ctrl-C still ends the run
+    termios = None  # type: ignore[assignment]
+
 STOP_KEYS = (" ", "s", "S")
 BY = "keyboard"
 DURATIONS_S = (10.0, 30.0, 60.0, 300.0)
 DIGITS = "123456789abcdefgh"
+TITLES = {
+    "hard": "Stop past the shield, whatever is near? y: yes. Boats already stop through the shield",
+    "resume": "Take STOP ALL back? y: boats move again",
+    "take": "Take which boat back? Its pilot must have let go of it. It is logged. ESC leaves",
+    "take_sure": "{subject}: GUIDED and arming are asked for, and it obeys the policy. y: yes",
+    "condition": "Switch off which response, for a time? It is logged. ESC leaves",
+    "subject": "{condition}: for which boat?",
+    "duration": "{condition} of {whom}: for how long? It disables {disabled}",
+}
+"""What each menu asks."""
 
 
 class Controls:
@@ -39,15 +54,22 @@ class Controls:
         self._names = fleet.names
         self._ours = tuple(boat.name for boat in fleet.ours if boat.link is not None and boat.commanded)
         self._lock = threading.Lock()
-        self._open = ""
-        self._condition = self._subject = ""
-        self._said = ""
+        self._open = self._condition = self._subject = self._said = ""
+        self._confirmed: dict[str, Callable[[], object]] = {
+            "hard": lambda: operator.stop_all(BY),
+            "resume": lambda: operator.resume(BY),
+            "take_sure": lambda: operator.take_back(self._subject, BY),
+        }
 
     def press(self, key: str) -> None:
         """Act on a key; keys that mean nothing are ignored."""
         with self._lock:
             if key in STOP_KEYS:
                 self._stop()
+            elif self._open in self._confirmed:
+                asked, self._open = self._open, ""
+                if key in ("y", "Y"):
+                    self._confirmed[asked]()
             elif self._open:
                 self._choose(key)
             else:
@@ -58,17 +80,9 @@ class Controls:
         with self._lock:
             if not self._open:
                 return []
-            titles = {
-                "hard": "Stop past the shield, whatever is near? y: yes. Boats already stop through the shield",
-                "resume": "Take STOP ALL back? y: boats move again",
-                "take": "Take which boat back? Its pilot must have let go of it. It is logged. ESC leaves",
-                "take_sure": f"{self._subject}: GUIDED and arming are asked for, and it obeys the policy. y: yes",
-                "condition": "Switch off which response, for a time? It is logged. ESC leaves",
-                "subject": f"{self._condition}: for which boat?",
-                "duration": f"{self._condition} of {self._subject or 'all'}: for how long? It disables "
-                f"{DISABLES.get(self._condition, '')}",
-            }
-            return [titles[self._open], *self._entries(), *([self._said] if self._said else [])]
+            parts = {"condition": self._condition, "subject": self._subject, "whom": self._subject or "all"}
+            title = TITLES[self._open].format(**parts, disabled=DISABLES.get(self._condition, ""))
+            return [title, *self._entries(), *([self._said] if self._said else [])]
 
     def _stop(self) -> None:
         if not self._operator.stopped:
@@ -89,65 +103,42 @@ class Controls:
             self._open = "take"
 
     def _choose(self, key: str) -> None:
-        if self._open == "hard":
-            self._open = ""
-            if key in ("y", "Y"):
-                self._operator.stop_all(BY)
-            return
-        if self._open == "resume":
-            self._open = ""
-            if key in ("y", "Y"):
-                self._operator.resume(BY)
-            return
-        if self._open == "take_sure":
-            self._open = ""
-            if key in ("y", "Y"):
-                self._operator.take_back(self._subject, BY)
-            return
-        options = self._options()
+        options, menu = self._options(), self._open
+        self._open = ""
         if key not in DIGITS[: len(options)]:
-            self._open = ""
             return
         chosen = options[DIGITS.index(key)]
-        if self._open == "take":
+        if menu == "take":
             self._subject, self._open = chosen, "take_sure"
-        elif self._open == "condition":
+        elif menu == "condition":
             self._condition, self._open = chosen, "subject"
-        elif self._open == "subject":
+        elif menu == "subject":
             self._subject, self._open = "" if chosen == "all" else chosen, "duration"
         else:
             self._override(float(chosen))
 
     def _override(self, seconds: float) -> None:
-        self._open = ""
         try:
             self._operator.override(self._condition, self._subject, seconds, self._clock.now_s(), BY)
         except ConfigError as error:
             self._open, self._said = "condition", str(error)
 
     def _options(self) -> Sequence[str]:
-        if self._open == "take":
-            return self._ours[: len(DIGITS)]
-        if self._open == "condition":
-            return tuple(DISABLES)
-        if self._open == "subject":
-            return ("all", *self._names)[: len(DIGITS)]
-        return tuple(f"{seconds:g}" for seconds in DURATIONS_S)
+        return {
+            "take": self._ours[: len(DIGITS)],
+            "condition": tuple(DISABLES),
+            "subject": ("all", *self._names)[: len(DIGITS)],
+            "duration": tuple(f"{seconds:g}" for seconds in DURATIONS_S),
+        }.get(self._open, ())
 
     def _entries(self) -> list[str]:
-        if self._open in ("hard", "resume", "take_sure"):
-            return []
         options = self._options()
         if self._open == "condition":
             return [f" {key} {name}: disables {DISABLES[name]}" for key, name in zip(DIGITS, options, strict=False)]
         unit = " s" if self._open == "duration" else ""
-        return ["   ".join(f"{key} {name}{unit}" for key, name in zip(DIGITS, options, strict=False))]
+        line = "   ".join(f"{key} {name}{unit}" for key, name in zip(DIGITS, options, strict=False))
+        return [line] if line else []
 
-
-try:
-    import termios
-except ImportError:  # not a Unix: no key is read, Ctrl-C still ends the run
-    termios = None  # type: ignore[assignment]
 
 logger = logging.getLogger(__name__)
 
