@@ -11,26 +11,27 @@ from .dashboard_map import SYMBOLS
 
 
 class Column(NamedTuple):
-    """A column of the table: head, characters its longest cell needs, its share of room that is left over, meaning."""
+    """A column of the table: head, characters its longest cell needs, meaning."""
 
     title: str
     width: int
-    ratio: int
     meaning: str
 
 
 COLUMNS = (
-    Column("boat", 10, 1, "its name in its team's colour, and its marks"),
-    Column("hdg", 4, 0, "heading, degrees clockwise from the field's y axis"),
-    Column("m/s", 5, 0, "speed"),
-    Column("age", 5, 0, "seconds since its position was true; red: older than the limit"),
-    Column("wanted", 9, 0, "what the policy, or a response, wants: speed m/s and heading"),
-    Column("sent", 9, 0, "what the shield made of it, as it left; cyan: changed by the shield"),
-    Column("why", 9, 0, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
-    Column("margin", 6, 0, "how much more room than required its best manoeuvre keeps, m; red: less than required"),
-    Column("closest", 14, 3, "whom it meets closest when all hold course, how near and when; yellow: too near"),
-    Column("bound by", 12, 1, "what its command had to give way to"),
+    Column("boat", 10, "its name in its team's colour, and its marks"),
+    Column("hdg", 4, "heading, degrees clockwise from the field's y axis"),
+    Column("m/s", 5, "speed"),
+    Column("age", 5, "seconds since its position was true; red: older than the limit"),
+    Column("wanted", 9, "what the policy, or a response, wants: speed m/s and heading"),
+    Column("sent", 9, "what the shield made of it, as it left; cyan: changed by the shield"),
+    Column("why", 9, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
+    Column("margin", 6, "how much more room than required its best manoeuvre keeps, m; red: less than required"),
+    Column("closest", 14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
+    Column("bound by", 12, "what its command had to give way to"),
 )
+GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 400))
+"""Where room that is left over goes, in this order, each up to a width."""
 DROPPED = ("bound by", "hdg", "m/s", "age", "closest", "why", "margin")
 """What is left out of a terminal too narrow for all, in this order; wanted and sent stand in every one, whole."""
 WHY = {

@@ -22,7 +22,7 @@ from steerclear.shield.decision import Decision
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array
 
-from .dashboard_lines import BANNERS, COLUMNS, DROPPED, KEYS, MARKS, WHY, Column
+from .dashboard_lines import BANNERS, COLUMNS, DROPPED, GROWING, KEYS, MARKS, WHY
 from .dashboard_map import COLOURS, Drawing, FieldMap
 
 LOOK_AHEAD_S = 60.0
@@ -82,13 +82,20 @@ BESIDE = sum(column.width + GAP for column in COLUMNS) + 12
 KEY_LINE = "   ".join(f"{key} {words}" for key, words, _ in KEYS)
 
 
-def fitting(width: int) -> list[Column]:
-    """Columns that a width has room for."""
-    shown = [column for column in COLUMNS if width >= BESIDE or column.title != "bound by"]
+def fitting(width: int) -> dict[str, int]:
+    """Columns that a width has room for, with the width of each."""
+    widths = {column.title: column.width for column in COLUMNS if width >= BESIDE or column.title != "bound by"}
     for title in DROPPED:
-        if sum(column.width + GAP for column in shown) > width:
-            shown = [column for column in shown if column.title != title]
-    return shown
+        if sum(widths.values()) + GAP * len(widths) > width:
+            widths.pop(title, None)
+    left = width - sum(widths.values()) - GAP * len(widths)
+    for title, most in GROWING:
+        more = max(0, min(left, most - widths.get(title, most)))
+        if more:
+            widths[title] += more
+            left -= more
+    widths["boat"] = max(1, widths["boat"] + min(left, 0))  # a terminal too narrow for the least: names go first
+    return widths
 
 
 def boats_table(width: int, rows: list[Mapping[str, Any]]) -> Table:
@@ -98,23 +105,18 @@ def boats_table(width: int, rows: list[Mapping[str, Any]]) -> Table:
         width: characters there are.
         rows: cells by title; those left out are empty.
     """
-    columns = fitting(width)
-    table = Table(
-        box=None, padding=(0, GAP, 0, 0), pad_edge=False, width=max(1, width), header_style="bold", expand=True
-    )
-    tight = max(0, sum(column.width + GAP for column in columns) - width)
-    for title, least, ratio, _ in columns:
-        whole = title in ("wanted", "sent")
+    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, width=max(1, width), header_style="bold")
+    widths = fitting(width)
+    for title, wide in widths.items():
         table.add_column(
             title,
-            width=max(1, least - tight) if title == "boat" else least,
-            ratio=ratio or None,
+            width=wide,
             no_wrap=True,
-            overflow="crop" if whole else "ellipsis",
-            justify="left" if ratio or title == "why" else "right",
+            overflow="crop" if title in ("wanted", "sent") else "ellipsis",
+            justify="left" if title in ("boat", "why", "closest", "bound by") else "right",
         )
     for row in rows:
-        table.add_row(*(row.get(column.title, "") for column in columns))
+        table.add_row(*(row.get(title, "") for title in widths))
     return table
 
 

@@ -13,11 +13,13 @@ from steerclear.shield import Decisions, Shield, SteerclearError
 from steerclear.shield.bridge.blackbox import LogHeader
 from steerclear.shield.bridge.mavlink.commands import CREEP_MPS, VelocityRoute
 from steerclear.shield.bridge.messages import Sent, Tick
+from steerclear.shield.decision import Reason
 
 ROUNDED_MPS, ROUNDED_RAD = 1e-5, 1e-5
 """Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted."""
 OWN_STOP = "send"
-"""Condition of the action that declares that a link used its own stop for a boat that was decided for."""
+"""Condition of the action that declares that a link used its own stop for a boat that was decided for; where the shield
+decides `Reason.STOPPED`, the decision asks for it itself."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,10 @@ def _stops(sent: Sent) -> bool:
 
 
 def _declares_stop(tick: Tick, name: str) -> bool:
-    return any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
+    stopped = tick.decisions is not None and any(
+        (decision.boat, decision.reason) == (name, Reason.STOPPED) for decision in tick.decisions
+    )
+    return stopped or any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
 
 
 FIELDS = ("intervened", "reason", "certificate_m", "slack_m", "bound")
