@@ -10,8 +10,8 @@ from types import TracebackType
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.links import LINK_MAKERS, BoatLink, LinkMaker, key_of
-from steerclear.shield.bridge.messages import Contact, contact_of
+from steerclear.shield.bridge.links import LINK_MAKERS, key_of
+from steerclear.shield.bridge.messages import Contact, Link, LinkMaker, contact_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
 
@@ -44,7 +44,7 @@ class Hearing:
         self.feed: FeedReceiver | None = None
         self._error_m = fleet.shield_config.position_error_m
         self._clock, self._max_age_s = clock, fleet.limits.contact.max_age_s
-        self._links: list[BoatLink] = []
+        self._links: list[Link] = []
         self._open = contextlib.ExitStack()
         try:
             if address is not None:
