@@ -11,6 +11,7 @@ from steerclear.experiments.deploy.proof import SentCheck, prove
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.commands import AttitudeRoute, VelocityRoute
 from steerclear.shield.bridge.messages import Action, Sent
+from steerclear.shield.decision import Reason
 
 HEADER = header_of()
 
@@ -129,6 +130,16 @@ def test_a_links_own_stop_needs_its_declaration(ticks):
     assert strayed(with_actions(stopped, Action("blue_1", "navigation", "stop", "old"))) != []
     gone = with_actions(with_sent(stopped, speed_mps=1.0), Action("blue_1", "send", "stop", "not sent"))
     assert strayed(gone) != []
+
+
+def test_a_decided_stop_asks_for_the_links_own_stop_itself(ticks):
+    stopped = with_sent(with_decided(ticks[5], 0.0), speed_mps=0.0, heading_rad=0.3)
+    reason = stopped.decisions.reason.copy()
+    reason[0] = Reason.STOPPED
+    asked = dataclasses.replace(stopped, decisions=dataclasses.replace(stopped.decisions, reason=reason))
+    assert strayed(stopped) == [("blue_1", "heading")]
+    assert strayed(asked) == []
+    assert strayed(with_sent(asked, speed_mps=1.0)) != [], "that is no stop"
 
 
 def test_a_team_mate_of_another_process_is_not_ours_to_send_to(ticks):
