@@ -26,7 +26,10 @@ field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [160, 80]}
 geofence: {xmin_m: -40, ymin_m: -40, xmax_m: 200, ymax_m: 120}
 limits: {navigation: {max_age_s: 2.0, then: stop, lost_after_s: 5.0}, contact: {max_age_s: 3.0, then: slow}}
 boats:
-  - {name: blue_1, agent: agent_0, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:LINK", system_id: 1}}
+  - name: blue_1
+    agent: agent_0
+    platform: heron
+    link: {kind: mavlink, address: "udpin:127.0.0.1:LINK", system_id: 1}
   - {name: red_1, agent: agent_1, platform: heron, contact: feed}
 feed: {listen: "127.0.0.1:FEED"}
 """
