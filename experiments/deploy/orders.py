@@ -24,7 +24,7 @@ from steerclear.shield.platforms import fresh_state
 from steerclear.shield.surroundings import Surroundings
 
 from .preflight_file import measured_delay_s
-from .rules import game_config, grounds_of
+from .rules import game_config, game_obstacles
 
 LOG = logging.getLogger(__name__)
 
@@ -197,23 +197,23 @@ def refuse_early(fleet: FleetFile) -> None:
         FleetFileError: as `rehearse`, or the game's rules make no sense.
         BridgeError: as `check_log_folder`.
     """
-    rehearse(fleet, grounds_of(fleet))
+    rehearse(fleet, game_obstacles(fleet))
     check_log_folder(fleet.log_dir)
 
 
-def rehearse(fleet: FleetFile, grounds: Surroundings) -> None:
+def rehearse(fleet: FleetFile, fixed: Surroundings) -> None:
     """Build all that the loop will build of a file, once, as it will be at its first turn.
 
     Args:
         fleet: the file, with its measured delay.
-        grounds: static constraints of the game, see `grounds.grounds_of`.
+        fixed: static constraints of the game, see `rules.game_obstacles`.
 
     Raises:
         FleetFileError: the shield's settings leave nothing of the water, or it would refuse these boats.
     """
     try:
-        for fixed in StaticObstacles(fleet, grounds).forms:
-            Shield(fleet.shield_config, fixed)
+        for form in StaticObstacles(fleet, fixed).forms:
+            Shield(fleet.shield_config, form)
         boats_of(fleet).check()
     except SteerclearError as error:
         raise FleetFileError(f"the shield cannot be built for this file: {error}") from None

@@ -221,7 +221,7 @@ def _pair(counts: IntArray) -> tuple[int, int]:
     return int(counts[0, 0]), int(counts[0, 1])
 
 
-def grounds_of(fleet: FleetFile) -> Surroundings:
+def game_obstacles(fleet: FleetFile) -> Surroundings:
     """Obstacles of the game, and the circle of our own flag at home as ``stops``; nothing when no boat plays.
 
     Raises:

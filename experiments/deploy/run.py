@@ -48,7 +48,7 @@ from .plain import Tally
 from .policy_process import PolicyProcess
 from .preflight_file import DRILLED, check_drill, keep
 from .quiet import ended_by_signals, undisturbed, warm_up
-from .rules import grounds_of
+from .rules import game_obstacles
 from .sea_trial import SeaTrial, longest_s
 
 LOOK_S = 1.5
@@ -96,7 +96,7 @@ class Begun:
             shown = self.surface.sinks(fleet, self.operator, clock)
             for sink in (*sinks, *shown):
                 stack.callback(sink.close)
-            parts = self.session.parts(nominal, (self.box, *sinks, *shown), grounds_of(fleet), plays=plays)
+            parts = self.session.parts(nominal, (self.box, *sinks, *shown), game_obstacles(fleet), plays=plays)
             loop = ControlLoop(fleet, parts, self.operator, clock)
             begins(loop)
             with undisturbed():
@@ -173,10 +173,8 @@ def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
     moos = {name: link for name, link in session.links.items() if isinstance(link, MoosLink)}
     fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
     links = [*link_checks(mavlink, fleet.platform_of, session.clock), *fences, *moos_checks(moos, fleet)]
-    grounds = grounds_of(fleet)
-    situation = [
-        Check(name, lambda name=name: check_situation(name, fleet, look.tracker, grounds)) for name in SITUATION
-    ]
+    fixed = game_obstacles(fleet)
+    situation = [Check(name, lambda name=name: check_situation(name, fleet, look.tracker, fixed)) for name in SITUATION]
     return [disk, *links, *situation]
 
 

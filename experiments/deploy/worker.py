@@ -146,8 +146,8 @@ TAIL_BYTES = 4096
 """How much of what the policy prints is kept."""
 FOLDER = "steerclear-policy-"
 """First part of the name of a process's folder for temporary files."""
-KEEPER_S, GONE_S = 5.0, 10.0
-"""How long a keeper may take to end what it keeps, and any process to be gone once it was ended."""
+SUPERVISOR_S, GONE_S = 5.0, 10.0
+"""How long a supervisor may take to end what it watches, and any process to be gone once it was ended."""
 SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -210,7 +210,7 @@ class Worker:
 
     @property
     def pid(self) -> int:
-        """Number of the keeper's process."""
+        """Number of the supervisor's process."""
         return self._process.pid
 
     def messages(self) -> list[bytes]:
@@ -308,9 +308,9 @@ class Worker:
     def _clean(self) -> None:
         """Remove its folder once it is gone; that may take long, and the loop must not."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=KEEPER_S)
+            self._process.wait(timeout=SUPERVISOR_S)
         end_group(self._process.pid)
-        end_marked(self._folder)  # where code ended its keeper, what it started has nobody else to end it
+        end_marked(self._folder)  # where code ended its supervisor, what it started has nobody else to end it
         self.wait(GONE_S)
         shutil.rmtree(self._folder, ignore_errors=True)
 

@@ -12,7 +12,7 @@ from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
 from steerclear.experiments.deploy.plain import Tally
 from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
 from steerclear.experiments.deploy.proof import prove
-from steerclear.experiments.deploy.rules import game_config, grounds_of, player_names, state_of
+from steerclear.experiments.deploy.rules import game_config, game_obstacles, player_names, state_of
 from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
@@ -122,7 +122,7 @@ def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, e
         proof = prove(log.header, ticks)
     assert proof.same == proof.decisions > 10
     heard = [tick for tick in ticks if tick.game and tick.surroundings is not None]
-    assert any(tick.surroundings.stops == grounds_of(fleet).stops != () for tick in heard), "the own flag is home"
+    assert any(tick.surroundings.stops == game_obstacles(fleet).stops != () for tick in heard), "the own flag is home"
     assert len(ticks) == outcome.figures["ticks"]
     assert any(tick.sent["blue_1"].speed_mps > 0.5 for tick in ticks)
     assert ticks[0].shield_reset

@@ -6,7 +6,7 @@ import time
 import pytest
 from fleet_mutants import mutant
 from steerclear.experiments.deploy.orders import rehearse
-from steerclear.experiments.deploy.rules import grounds_of
+from steerclear.experiments.deploy.rules import game_obstacles
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import SteerclearError
 
@@ -20,7 +20,7 @@ def read(text):
     said = ""
     try:
         fleet = parse_fleet(text)
-        rehearse(fleet, grounds_of(fleet))
+        rehearse(fleet, game_obstacles(fleet))
     except SteerclearError as error:
         said = str(error)
     assert said.isprintable(), repr(said)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear.experiments.deploy.orders import rehearse
 from steerclear.experiments.deploy.player import NEED_NO_GAME, Orders, cast_of, load_player
-from steerclear.experiments.deploy.rules import grounds_of
+from steerclear.experiments.deploy.rules import game_obstacles
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetFileError
@@ -28,7 +28,7 @@ def file_of(team="blue", more=""):
 @pytest.mark.parametrize("more", ["", RESCUE])
 def test_waypoints_and_hold_steer_the_boat_of_the_page(team, more):
     fleet = file_of(team, more)
-    rehearse(fleet, grounds_of(fleet))
+    rehearse(fleet, game_obstacles(fleet))
     own = fleet.names.index("blue_1")
     seen = np.full((len(fleet.names), 4), np.nan)
     seen[own] = 30.0, 40.0, 90.0, 1.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.deploy.rules import game_config, grounds_of, state_of
+from steerclear.experiments.deploy.rules import game_config, game_obstacles, state_of
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.feed import game_state
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -39,7 +39,7 @@ class Played:
     def __init__(self, fleet):
         env = MctfEnv(game_config(fleet))
         self.env = ShieldedParallelEnv(env, Shield(fleet.shield_config), team=fleet.team)
-        self.water = StaticObstacles(fleet, grounds_of(fleet))
+        self.water = StaticObstacles(fleet, game_obstacles(fleet))
         self.shield = Shield(fleet.shield_config, fleet.surroundings)
         self.names = [boat.name for boat in fleet.boats if boat.agent is not None]
         self.reader = MctfReader(env)
@@ -87,14 +87,14 @@ def test_the_circle_is_the_one_the_simulator_gives_the_shield(fleet_of):
     for team in ("blue", "red"):
         fleet = fleet_of(team=team)
         reader = MctfReader(MctfEnv(game_config(fleet)))
-        assert grounds_of(fleet) == reader.surroundings(fleet.team_number, keep_out=True)
+        assert game_obstacles(fleet) == reader.surroundings(fleet.team_number, keep_out=True)
 
 
 def test_obstacles_of_the_rules_are_there_and_a_file_without_a_game_has_nothing(fleet_of):
     fleet = fleet_of(more="rules: {obstacles: {circle: [[2.0, [40.0, 20.0]]], polygon: [[[50, 5], [55, 5], [52, 9]]]}}")
-    grounds = grounds_of(fleet)
-    assert grounds.circles == ((40.0, 20.0, 2.0),)
-    assert grounds.polygons == (((50.0, 5.0), (55.0, 5.0), (52.0, 9.0)),)
+    fixed = game_obstacles(fleet)
+    assert fixed.circles == ((40.0, 20.0, 2.0),)
+    assert fixed.polygons == (((50.0, 5.0), (55.0, 5.0), (52.0, 9.0)),)
     alone = parse_fleet(
         """
 version: 1
@@ -104,9 +104,9 @@ team: blue
 boats: [{name: a, team: blue, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:1", system_id: 1}}]
 """
     )
-    assert grounds_of(alone) is OPEN_WATER
+    assert game_obstacles(alone) is OPEN_WATER
 
 
 def test_rules_that_make_no_game_are_one_clear_error(fleet_of):
     with pytest.raises(FleetFileError, match="flag_keepout"):
-        grounds_of(fleet_of(more="rules: {flag_keepout_m: -1.0}"))
+        game_obstacles(fleet_of(more="rules: {flag_keepout_m: -1.0}"))
