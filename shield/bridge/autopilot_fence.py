@@ -8,7 +8,7 @@ boat stopped there still runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..platforms import Platform, step_boat
 from ..platforms import layout as L
 from ..platforms.limits import cruise
 from .fleet_file import FleetFile
-from .mavlink.fence import FenceZone, Point
+from .mavlink.fence import FenceZone
 from .mavlink.vehicle import LinkHealth
 from .preflight_checks import CheckResult
 
@@ -26,6 +26,8 @@ CIRCLE_TYPE, POLYGON_TYPE = 2, 4
 DEFAULTS = {"FENCE_TYPE": 6.0, "FENCE_RADIUS": 150.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_MARGIN": 2.0}
 """Of ArduPilot Rover, for what was not heard."""
 STOPPED_SHARE, LONGEST_STOP_S = 0.02, 120.0
+PART_M, MOST_PARTS = 0.05, 100_000
+"""A fence's edges are looked at this finely, m, in no more parts; half a part is taken off."""
 
 Box = tuple[float, float, float, float]
 
@@ -103,58 +105,23 @@ def stopping_way_m(platform: Platform) -> float:
 
 def _room_m(zone: FenceZone, line: Box, fleet: FleetFile) -> float:
     """How far a zone's edge lies outside the hard line, m; negative: it cuts into it, or is on its wrong side."""
-    points = [fleet.frame.to_field_m(*place) for place in zone.places]
-    if not all(math.isfinite(value) for point in points for value in point) or not points:
+    points = np.array([fleet.frame.to_field_m(*place) for place in zone.places]).reshape(-1, 2)
+    if not len(points) or not np.isfinite(points).all():
         return -math.inf
-    corners = [(line[0], line[1]), (line[2], line[1]), (line[2], line[3]), (line[0], line[3])]
+    low, high = np.array(line[:2]), np.array(line[2:])
     if zone.radius_m > 0.0 or len(points) == 1:
-        far = [math.dist(points[0], corner) for corner in corners]
-        return zone.radius_m - max(far) if zone.inside else _to_box_m(points[0], line) - zone.radius_m
-    edges = [(points[k - 1], points[k]) for k in range(len(points))]
-    room = min(_apart_m(edge, line, corners) for edge in edges)
-    holds = _holds(points, corners[0])
-    return room if holds == zone.inside and room > 0.0 else -max(room, *(_depth_m(point, line) for point in points))
-
-
-def _to_box_m(point: Point, line: Box) -> float:
-    return math.hypot(
-        max(line[0] - point[0], 0.0, point[0] - line[2]), max(line[1] - point[1], 0.0, point[1] - line[3])
-    )
-
-
-def _depth_m(point: Point, line: Box) -> float:
-    """How far a point is inside the box, m; 0 outside."""
-    return max(0.0, min(point[0] - line[0], line[2] - point[0], point[1] - line[1], line[3] - point[1]))
-
-
-def _apart_m(edge: tuple[Point, Point], line: Box, corners: Sequence[Point]) -> float:
-    """Distance of an edge from the box, m; 0: it touches it or runs through."""
-    sides = [(corners[k - 1], corners[k]) for k in range(4)]
-    if any(_to_box_m(point, line) == 0.0 for point in edge) or any(_cross(edge, side) for side in sides):
-        return 0.0
-    return min(*(_to_box_m(point, line) for point in edge), *(_to_edge_m(corner, edge) for corner in corners))
-
-
-def _to_edge_m(point: Point, edge: tuple[Point, Point]) -> float:
-    a, along = np.array(edge[0]), np.subtract(edge[1], edge[0])
-    length = float(along @ along)
-    share = 0.0 if length == 0.0 else float(np.clip((np.array(point) - a) @ along / length, 0.0, 1.0))
-    return float(np.hypot(*(np.array(point) - a - share * along)))
-
-
-def _cross(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
-    def side(a: Point, b: Point, c: Point) -> float:
-        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-    apart_one = side(*one, other[0]) * side(*one, other[1])
-    return apart_one < 0.0 and side(*other, one[0]) * side(*other, one[1]) < 0.0
-
-
-def _holds(polygon: Sequence[Point], point: Point) -> bool:
-    """Whether a polygon holds a point: rays cross its edges an odd number of times."""
-    holds = False
-    for k in range(len(polygon)):
-        (x1, y1), (x2, y2) = polygon[k - 1], polygon[k]
-        if (y1 > point[1]) != (y2 > point[1]) and point[0] < x1 + (point[1] - y1) / (y2 - y1) * (x2 - x1):
-            holds = not holds
-    return holds
+        nearest, farthest = np.clip(points[0], low, high), np.where(points[0] < 0.5 * (low + high), high, low)
+        if zone.inside:
+            return zone.radius_m - math.dist(points[0], farthest)
+        return math.dist(points[0], nearest) - zone.radius_m
+    before = np.roll(points, 1, axis=0)
+    lengths = np.hypot(*(points - before).T)
+    parts = 1 + np.minimum(MOST_PARTS, lengths / PART_M).astype(int)
+    edge = np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(before, points, parts, strict=True)])
+    beyond = np.maximum(low - edge, edge - high)
+    room = float(np.hypot(*np.maximum(beyond, 0.0).T).min() - 0.5 * (lengths / parts).max())
+    (x1, y1), (x2, y2) = before.T, points.T
+    crossed = (y1 > low[1]) != (y2 > low[1])
+    x = x1[crossed] + (low[1] - y1[crossed]) / (y2 - y1)[crossed] * (x2 - x1)[crossed]
+    holds = bool((low[0] < x).sum() % 2)  # a ray from a corner of the hard line crosses the zone an odd number of times
+    return room if holds == zone.inside and room > 0.0 else -max(room, -float(beyond.max(axis=1).min()))
