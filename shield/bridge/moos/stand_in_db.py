@@ -47,6 +47,8 @@ class _Client:
     heard_s: float = field(default_factory=time.monotonic)
 
     def send(self, message: Message) -> None:
+        if self.writer.transport.is_closing():
+            return  # who reads finds out and drops it
         self.writer.write(pack_packet([message]))
         if self.writer.transport.get_write_buffer_size() > MOST_WAITING:
             self.writer.transport.abort()  # it does not read
@@ -123,8 +125,10 @@ class StandInDb:
             while self.frozen.is_set() and not self._ends.is_set():
                 time.sleep(LOOK_S)  # all of it, as a process that is stopped
         server.close()
-        for client in list(self._clients):
-            client.writer.transport.abort()
+        while self._clients:
+            for client in list(self._clients):
+                client.writer.transport.abort()
+            await asyncio.sleep(0.0)
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         client, packets = _Client(writer), PacketReader()
