@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete, Space
-from steerclear.shield.actions import DISCRETE, STOP, Command, Seat, check_agents, read_action
 from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.wrappers.actions import DISCRETE, STOP, Command, Seat, check_agents, read_action
 
 from .angles import heading_to, wrap_bearing
 from .config import GameConfig
@@ -78,7 +78,7 @@ def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
 class ActionDecoder:
     """Turns whatever a player sends into (speed m/s, relative heading deg).
 
-    The kind of each action is told from its type, whatever the boat's declared space, see `steerclear.shield.actions`;
+    The kind of each action is told from its type, whatever the boat's declared space, see `shield.wrappers.actions`;
     where "afp" is declared, whole numbers are field points.
 
     Args:

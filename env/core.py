@@ -10,8 +10,8 @@ import numpy as np
 from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
-from steerclear.shield.plan import LARGEST_COMMAND
 from steerclear.shield.shared import share
+from steerclear.shield.workspace import LARGEST_COMMAND
 
 from .advance import (
     CHUNK,

@@ -11,7 +11,7 @@ from typing import Any
 
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 from . import plots
 from .bench.report import bench_tables

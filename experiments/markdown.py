@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 from .tables import measured_text, number_text
 

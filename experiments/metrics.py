@@ -163,9 +163,12 @@ GAME_COLUMNS = {
 """Columns of a game's row that are no metrics."""
 
 REASONS = {
-    "qp": "the least change that leaves every boat a backup, found by the quadratic program",
+    "least_change": "the command nearest to the wanted one that leaves every boat what its backup keeps, by quadratic "
+    "program or line search",
+    "qp": "the least change of the quadratic program, as results of 0.8.0 and before name it",
     "qp_relaxed": "the program's answer where not all could be kept, better than any backup",
-    "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready",
+    "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready (in 0.8.0 "
+    "and before also a part of it)",
     "escape": "the same, as results of 0.2.0 and before name it",
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",

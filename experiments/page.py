@@ -14,7 +14,7 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 SCRIPT_SOURCES = "; script-src 'unsafe-inline'; img-src data:"
 """What a page with scripts of its own may use, as further directives of its security policy."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from typing import Any, TextIO
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 ERRORS = "steerclear-plain"
 """Name under which `plain` is known to Python's encoders."""

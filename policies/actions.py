@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from steerclear.shield.actions import short
 from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import GameError, PolicyError
+from steerclear.shield.wrappers.actions import short
 
 from .games import SeenGame, seen_game
 

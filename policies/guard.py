@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.words import describe_error
+from steerclear.shield.foreign import describe_error
 
 from .actions import HOLD, ActionReader
 from .games import seen_game

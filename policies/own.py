@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.words import describe_error
+from steerclear.shield.foreign import describe_error
 
 from .adapters import from_agents, from_callable
 from .protocol import TeamPolicy

@@ -6,7 +6,7 @@ import logging
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from steerclear.shield.words import plain_text
+from steerclear.shield.foreign import plain_text
 
 logger = logging.getLogger(__name__)
 

@@ -7,22 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from . import workspace as W
 from .arrays import NoNumbersError, numbers, truths, whole_numbers
 from .config import ShieldConfig
-from .deciders import Deciders
+from .decide import Deciders
 from .exceptions import ConfigError, FleetError
 from .filter.program import solver_of
 from .fleet import LARGEST, LARGEST_SPEED_MPS
-from .game_facts import facts_of_games, warn_of_distances
 from .jit import Array, BoolArray
-from .kept_barriers import KeptBarriers
-from .masks import BatchedMasks
+from .model import boats_of
 from .platforms import Platform
 from .platforms import layout as L
-from .same_games import check_same_games
-from .setup import boats_of
+from .shield import barriers_of
 from .surroundings import OPEN_WATER, Surroundings
-from .tracking.driving import driven_boats
 
 
 class BatchedShield:
@@ -42,7 +39,6 @@ class BatchedShield:
     Attributes:
         sent: (B, n, 2) commands of the last decisions; this and the others are written anew by every call.
         reason: (B, n) why each is what it is, values of `decision.Reason`.
-        certificate_m: (B, n) margins, m.
         serves: the team it has decided for since `reset`, where games use it; None: none yet.
 
     Raises:
@@ -72,22 +68,27 @@ class BatchedShield:
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
             )
         boats = boats_of(config, self.platforms, self.team)
-        self._barriers = KeptBarriers(config)
-        self._deciders = Deciders(config, games, boats, self._barriers.arrays, solver_of(config.solver))
-        self._static = surroundings.pack(config)
-        decided = self._deciders.decided
-        self.sent, self.reason, self.certificate_m = decided.sent, decided.reason, decided.certificate_m
+        self._barriers = barriers_of(config)
+        self._static = surroundings.pack(config, self._barriers.arrays)
+        self._deciders = Deciders(config, games, boats, self._static, solver_of(config.solver))
+        scene = self._deciders.scene
+        self.sent, self.reason = scene.sent, scene.reasons
         self.serves: int | None = None
+
+    @property
+    def certificate_m(self) -> Array:
+        """(B, n) margins of the last decisions, m."""
+        return self._deciders.scene.told[:, :, W.MARGIN_M]
 
     @property
     def cut_short(self) -> BoolArray:
         """(B,) which of the last decisions were ended by `ShieldConfig.search_limit`."""
-        return np.asarray(self._deciders.decided.cut_short.any(axis=1))
+        return np.asarray((self._deciders.scene.told[:, :, W.CUT_SHORT] != 0.0).any(axis=1))
 
     @property
     def remembered(self) -> dict[str, np.ndarray]:
         """What goes on from decision to decision, by name: live arrays, (B, ...). Copies written back go on there."""
-        return {**self._deciders.memory._asdict(), "pending": self._deciders.pending}
+        return {"memory": self._deciders.scene.memories, "pending": self._deciders.scene.pending}
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
@@ -134,10 +135,15 @@ class BatchedShield:
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        asked = self._deciders.asked
-        asked.state[:], asked.wanted[:], asked.ours[:] = state, wanted, ours
-        asked.visiting[:] = False if visiting is None else _shaped("visiting", visiting, games, truths)
-        asked.driven[:] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
+        given = self._deciders.scene.given
+        given[:, :, : L.N_STATE], given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1], given[:, :, W.OURS] = (
+            state,
+            wanted,
+            ours,
+        )
+        given[:, :, W.VISITING] = False if visiting is None else _shaped("visiting", visiting, games, truths)
+        given[:, :, W.DRIVEN :] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
+        given[:, :, W.HORIZON_S] = np.nan
         self._barriers.renew()
         self._deciders.decide(self._static)
         self._barriers.tell()
@@ -158,58 +164,9 @@ class BatchedShield:
             raise ConfigError(f"no boat is of team {team!r}; give one of {sorted(set(self.team))}")
         if self.flag_of not in (None, team):
             raise ConfigError(f"this shield keeps off the flag of team {self.flag_of}; build another for team {team}")
+        from .wrappers.games_shield import GamesFilter
+
         return GamesFilter(self, team, shield_autopilot)
-
-    def check_games(self, core: Any, team: int | None = None) -> None:
-        """Check that games are those the shield was built for: boats, teams, number and step.
-
-        The log says, once, if it keeps boats less far apart than the games count collisions.
-
-        Args:
-            core: the `BatchedMctf`.
-            team: the team it decides for; None: any.
-
-        Raises:
-            ConfigError: they are not.
-        """
-        check_same_games(core, len(self.reason), self.platforms, self.team, self.config.dt_s)
-        warn_of_distances(self.config, facts_of_games(core), team)
-
-
-class GamesFilter:
-    """The command filter of a shield for games, see `BatchedShield.filter_for`; copies of it decide by copies of it."""
-
-    def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
-        self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
-        self._checked: Any = None
-        self._masks: BatchedMasks | None = None
-
-    def __call__(self, core: Any, commands: Array) -> Array:
-        """Safe commands (B, n, 2) for games that the shield was built for.
-
-        Raises:
-            ConfigError: they are others, or it has begun to serve the other team.
-        """
-        if self._checked is not core:
-            self.shield.check_games(core, self.team)
-            self._checked = core
-        if self.shield.serves not in (None, self.team):
-            raise ConfigError("this shield has begun to serve the other team; build one for each, or reset() it")
-        self.shield.serves = self.team
-        return self.shield.decide(core.state, commands, *self._about(core))
-
-    def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array | None]:
-        """Boats to decide for, boats on the other side, and what drives those that the games drive."""
-        ours = (core.team == self.team) & ~core.is_disabled
-        ours = ours if self.shield_autopilot else ours & ~core.driven
-        return ours, ~core.on_side, driven_boats(core)
-
-    def safe_actions(self, core: Any, actions: Array) -> BoolArray:
-        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `masks`."""
-        if self._masks is None or self._masks.candidates != actions.shape[2]:
-            self._masks = BatchedMasks(self.shield, actions.shape[2])
-        ours, visiting, driven = self._about(core)
-        return self._masks.safe(core.state, actions, ours, visiting, driven)
 
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:

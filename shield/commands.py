@@ -13,8 +13,12 @@ from numpy.typing import ArrayLike
 
 from .arrays import NoNumbersError, numbers
 from .exceptions import FleetError
-from .hints import hint_at_headings
-from .jit import Array, BoolArray
+from .hints import hint_at_headings, hint_at_speed
+from .jit import Array, BoolArray, IntArray
+from .workspace import LARGEST_COMMAND, LIMITED, PASSED
+
+ROUNDING_MPS = 1e-6
+"""A speed beyond the limit by less is that limit, rounded: it passes as it is."""
 
 LARGEST_HEADING_RAD = 1e6
 """Absolute headings beyond this are no directions, rad: turns so many that the angle left in the number is lost."""
@@ -147,3 +151,29 @@ def _as_commands(values: ArrayLike) -> Array:
     if array.ndim != 2 or array.shape[1] != 2:
         raise FleetError(f"commands have shape {array.shape}; give (n, 2): speed m/s and heading per boat")
     return array
+
+
+def within_limits(
+    wanted: Commands, names: tuple[str, ...], controlled: BoolArray, highest: Array
+) -> tuple[Commands, BoolArray | None]:
+    """Nominal commands of own boats, with speeds their platforms do (n,), m/s, and (n,) which are cut, if any.
+
+    No platform is sent astern: none has a speed below 0 in its model. What is no command at all
+    (not finite, or beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
+    """
+    if wanted.of_game or len(wanted) == 0:
+        return wanted, None
+    speed = wanted.values[:, 0]
+    beyond = (speed > highest + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
+    cut: BoolArray = controlled & beyond & (np.abs(wanted.values) <= LARGEST_COMMAND).all(axis=1)
+    if not cut.any():
+        return wanted, None
+    first = int(np.argmax(cut))
+    hint_at_speed(names[first], float(speed[first]), float(highest[first]))
+    return wanted.within(cut, highest), cut
+
+
+def tell_of_limits(cut: BoolArray, changed: BoolArray, reason: IntArray) -> BoolArray:
+    """Name the reason of commands that were cut and nothing else; returns (n,) which are not what was wanted."""
+    reason[cut & (reason == PASSED)] = LIMITED
+    return changed | cut

@@ -35,14 +35,14 @@ class ShieldConfig:
         dt_s: step of the decision loop, s, and of the boat model where ``move_s`` is None.
         move_s: step of the boat model, s, where a command is held for several: ``dt_s`` is a whole number of them, in
             each of which the same relative heading is applied anew; None: a command is for one.
-        certificate: name of the certificate, see `backup.families.CERTIFICATES`.
+        certificate: name of the certificate, see `backup.family.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that team-mates hold course and take their share of the answer (for boats that cannot talk).
         solver: what solves the program: "active_set", the compiled solver, or a backend by its name in qpsolvers.
         adversary_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds its
             course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and of slow
             boats the more commands are changed. Against a boat that is slow it counts from when that is under way, see
-            `barriers.feared`.
+            `barriers.value_function`.
         profile: whom the opponents are taken for, see `PROFILES`: "players" of the game, "rammers" that are out to hit
             our boats, or boats that "hold-course".
         visitor_s: the same of an opponent on our side of the field, which can tag nobody there (`Fleet.visiting`), s;
@@ -122,7 +122,7 @@ class ShieldConfig:
     barriers: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        from .backup.families import CERTIFICATES
+        from .backup.family import CERTIFICATES
         from .filter.program import check_solver
 
         object.__setattr__(self, "barriers", _names(self.barriers))

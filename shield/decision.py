@@ -13,7 +13,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from . import plan
+from . import workspace
 from .barriers.static import STATIC
 from .commands import Commands
 from .exceptions import FleetError
@@ -24,32 +24,39 @@ from .jit import Array, BoolArray, IntArray
 class Reason(IntEnum):
     """Why a command is what it is."""
 
-    PASSED = plan.PASSED
+    PASSED = workspace.PASSED
     """The wanted command leaves every boat its backup; it is sent bit for bit."""
-    QP = plan.QP
-    """The least change between team-mates, found by the quadratic program, re-checked with the full boat model."""
-    QP_RELAXED = plan.QP_RELAXED
+    LEAST_CHANGE = workspace.LEAST_CHANGE
+    """The command nearest to the nominal one that keeps what the backups keep, found by what `Decision.solver` names
+    and re-checked with the full boat model."""
+    QP = workspace.LEAST_CHANGE
+    """The name in 0.8.0 and before, when it was said of the quadratic program's answers only."""
+    QP_RELAXED = workspace.QP_RELAXED
     """Of logs of 0.2.0 and before: the program's answer with slack. Nothing sends it any more."""
-    BACKUP = plan.BACKUP
-    """The boat's backup manoeuvre, which keeps clear of all boats; off team-mates and static constraints as much of it
-    as it takes."""
-    ESCAPE = plan.BACKUP
+    BACKUP = workspace.BACKUP
+    """The boat's backup manoeuvre, which keeps clear of all boats. In 0.8.0 and before also a part of it, which is a
+    `LEAST_CHANGE` now."""
+    ESCAPE = workspace.BACKUP
     """The name of `BACKUP` in 0.2.0 and before, for whoever stored it."""
-    BEST_EFFORT = plan.BEST_EFFORT
+    BEST_EFFORT = workspace.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
-    HELD = plan.HELD
+    HELD = workspace.HELD
     """The wanted command was not finite or absurdly large, or a registered barrier tells nothing where the boat is: the
     boat is told to stop on its course."""
-    NOT_COVERED = plan.NOT_COVERED
+    NOT_COVERED = workspace.NOT_COVERED
     """The shield does not decide for this boat."""
-    RIGHT_OF_WAY = plan.RIGHT_OF_WAY
+    RIGHT_OF_WAY = workspace.RIGHT_OF_WAY
     """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
-    LIMITED = plan.LIMITED
+    LIMITED = workspace.LIMITED
     """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its backup."""
-    STOPPED = plan.STOPPED
+    STOPPED = workspace.STOPPED
     """The boat is beyond the hard line, or would else touch an obstacle, where the settings say "stop"
     (`ShieldConfig.beyond_then`): it is told to stop on its course, and its link's own stop is asked for."""
 
+
+SOLVERS = (None, "qp", "line_search")
+"""What finds a least change, by its number in `Decisions.solver`: the quadratic program on linearised constraints,
+among team-mates; a line search between nominal command and backup, where constraints are curved."""
 
 FALLBACKS = {
     Reason.BACKUP: "backup manoeuvre",
@@ -81,6 +88,7 @@ class Decision:
             decisions read from a black box.
         cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
             the best that was verified until then.
+        solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: of another reason, or not known.
         outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
         feared_s: how long from now this boat, an opponent, was taken to do its worst before it holds its course, s
             (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
@@ -102,6 +110,7 @@ class Decision:
     cut_short: bool = False
     feared_s: float | None = None
     outside_m: float = 0.0
+    solver: str | None = None
 
     def __eq__(self, other: object) -> bool:
         return self._said() == other._said() if isinstance(other, Decision) else NotImplemented
@@ -134,6 +143,7 @@ class Decisions(Sequence[Decision]):
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
         cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
         feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
+        solver: (n,) what found each least change, places in `SOLVERS`; None: not known.
         barriers: names of the registered barriers that are kept.
         area: (xmin, ymin, xmax, ymax) of the field decided in, m; None: there is none.
 
@@ -154,6 +164,7 @@ class Decisions(Sequence[Decision]):
     no_table: BoolArray | None = None
     cut_short: BoolArray | None = None
     feared_s: Array | None = None
+    solver: IntArray | None = None
     barriers: tuple[str, ...] = ()
     area: tuple[float, float, float, float] | None = None
 
@@ -213,6 +224,7 @@ class Decisions(Sequence[Decision]):
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
             feared_s=self._feared_s(i),
             outside_m=float(self.outside_m[i]),
+            solver=None if self.solver is None else SOLVERS[int(self.solver[i])],
         )
 
     def _binding(self, bound: int) -> tuple[str, ...]:

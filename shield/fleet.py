@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ FIELD = "field"
 
 LARGEST = 1e9
 """Values beyond this (m, m/s, deg, percent) are faults of the source: squares of them lose the metres."""
-
 
 LARGEST_SPEED_MPS = 50.0
 """Speeds beyond this are faults of the source, m/s: such a boat would jump over the radius within a step."""
@@ -70,7 +68,7 @@ class Fleet:
         driven: (n, 4) of boats that something drives whose doing is known (a game, of tagged or disabled ones): speed
             m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
             sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
-            `barriers.foreseen`, unless they may be free before a backup ends, or are controlled.
+            `barriers.neighbours`, unless they may be free before a backup ends, or are controlled.
         adversary_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s; NaN, or
             None for all: as the settings say, see `ShieldConfig.adversary_s`; where that is 0 nobody is feared at all.
         visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
@@ -83,25 +81,24 @@ class Fleet:
     controlled: BoolArray
     names: tuple[str, ...]
     age_s: Array | None = None
-    position_error_m: Array | None = field(default=None)
+    position_error_m: Array | None = None
     driven: Array | None = None
     adversary_s: Array | None = None
     visiting: BoolArray | None = None
 
     def __post_init__(self) -> None:
-        """Bring arrays to the type and layout of compiled code; what cannot be is refused by `check`."""
-        for name, brought in _FORMS.items():
+        n = len(self.state) if hasattr(self.state, "__len__") else 0
+        for name, (brought, row) in _ARRAYS.items():
             value = getattr(self, name)
-            if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-                raise FleetError(f"{name} holds masked values; fill them in, or leave those boats out")
-            if isinstance(value, (list, tuple)):
-                brought = _FROM_LISTS.get(name, brought)
-            if isinstance(value, (np.ndarray, list, tuple)):
-                with suppress(NoNumbersError):
-                    object.__setattr__(self, name, brought(value))
+            if value is not None or name not in _OPTIONAL:
+                object.__setattr__(self, name, _rows(name, value, (n, *row), brought))
         for name in ("platforms", "names"):
-            if isinstance(getattr(self, name), (list, np.ndarray)):
-                object.__setattr__(self, name, tuple(getattr(self, name)))
+            value = getattr(self, name)
+            if isinstance(value, (str, bytes)) or not isinstance(value, (tuple, list, np.ndarray)):
+                raise FleetError(f"{name} is {value!r}; give one per boat, or build the fleet by Fleet.of")
+            if len(value) != n:
+                raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
+            object.__setattr__(self, name, tuple(value))
 
     @classmethod
     def of(
@@ -146,108 +143,56 @@ class Fleet:
                 same name, or one is called "field".
             PlatformError: a platform is unknown.
         """
-        position = _shaped("position_m", position_m, (None, 2))
+        position = _rows("position_m", position_m, (None, 2))
         n = len(position)
         state = np.zeros((n, L.N_STATE))
         state[:, L.X : L.Y + 1] = position
-        state[:, L.HEADING] = _headings_deg(heading_rad, heading_deg, n)
-        state[:, L.SPEED] = _shaped("speed_mps", speed_mps, (n,))
-        state[:, L.THRUST] = np.nan if thrust is None else _shaped("thrust", thrust, (n,))
-        state[:, L.SPEED_ERROR] = np.nan
-        state[:, L.HEADING_ERROR] = np.nan
+        state[:, L.SPEED] = _rows("speed_mps", speed_mps, (n,))
+        state[:, L.THRUST] = np.nan if thrust is None else _rows("thrust", thrust, (n,))
+        state[:, [L.SPEED_ERROR, L.HEADING_ERROR]] = np.nan
         if heading_error_rad is not None:
-            error_rad = _shaped("heading_error_rad", heading_error_rad, (n,))
+            error_rad = _rows("heading_error_rad", heading_error_rad, (n,))
             hint_at_headings("Fleet.of: heading_error_rad", error_rad, "give radians")
             state[:, L.HEADING_ERROR] = np.degrees(error_rad)
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, which the check below names
-            state[:, L.HEADING] = (state[:, L.HEADING] + 180.0) % 360.0 - 180.0
+            state[:, L.HEADING] = (_headings_deg(heading_rad, heading_deg, n) + 180.0) % 360.0 - 180.0
         hint_at_positions(position)
-        teams = _whole("team", team, n)
+        teams = _rows("team", team, (n,), whole_numbers).copy()
+        given = {"age_s": age_s, "position_error_m": position_error_m, "adversary_s": adversary_s, "visiting": visiting}
         fleet = cls(
             state=state,
             team=teams,
             platforms=_kinds(platforms, n),
-            controlled=teams == 0 if controlled is None else _yes_or_no("controlled", controlled, n),
+            controlled=teams == 0 if controlled is None else _rows("controlled", controlled, (n,), truths).copy(),
             names=tuple(f"boat_{i}" for i in range(n)) if names is None else _names(names),
-            age_s=_copied("age_s", age_s, n),
-            position_error_m=_copied("position_error_m", position_error_m, n),
-            adversary_s=_copied("adversary_s", adversary_s, n),
-            visiting=None if visiting is None else _yes_or_no("visiting", visiting, n),
+            **{
+                name: _rows(name, value, (n,), _ARRAYS[name][0]).copy()
+                for name, value in given.items()
+                if value is not None
+            },
         )
         fleet.check()
         _check_given(fleet)
-        if FIELD in fleet.names:
-            raise FleetError(f"names holds {FIELD!r}, by which decisions name walls and edges; give that boat another")
-        twins = sorted({name for name in fleet.names if fleet.names.count(name) > 1})
-        if twins:
-            raise FleetError(f"names holds {twins[0]!r} more than once; give every boat a name of its own")
         return fleet
 
     def __len__(self) -> int:
         return len(self.state)
 
     def check(self) -> None:
-        """Check shapes and values.
+        """Check values, which may have changed since the fleet was built.
 
         Raises:
-            FleetError: shapes do not fit together, a position, heading or speed is not finite or absurd, or an error
-                bound is not a length.
+            FleetError: a position, heading or speed is not finite or absurd, or an error bound is not a length.
         """
-        if not isinstance(self.state, np.ndarray):
-            raise FleetError(f"state is of {type(self.state).__name__}; give an array, or build the fleet by Fleet.of")
-        n = len(self.state) if self.state.ndim else 0
-        if self.state.ndim != 2 or self.state.shape[1] != L.N_STATE or self.state.dtype != np.float64:
-            raise FleetError(
-                f"state has shape {self.state.shape} of {self.state.dtype}; give (n, {L.N_STATE}) of float64, see "
-                "platforms.layout"
-            )
-        self._check_length("platforms", n)
-        self._check_length("names", n)
-        for name, kind, row in _ARRAYS:
-            value = getattr(self, name)
-            if value is None and name in _OPTIONAL:
-                continue
-            if not isinstance(value, np.ndarray) or value.dtype != kind or value.shape != (n, *row):
-                self._refuse(name, kind, n)
         if not sound(self.state):
             self._name_fault()
-        error = self.position_error_m
-        if error is not None and not ((error >= 0.0) & (error <= LARGEST)).all():
-            i = int(np.argmin((error >= 0.0) & (error <= LARGEST)))
-            raise FleetError(
-                f"position_error_m holds {error[i]} for boat {self.names[i]!r}: negative, not finite or beyond "
-                f"{LARGEST:g}; give a bound in m per boat"
-            )
-        fear = self.adversary_s
-        if fear is not None and (fear < 0.0).any():
-            i = int(np.argmax(fear < 0.0))
-            raise FleetError(
-                f"adversary_s holds a negative time for boat {self.names[i]!r} ({fear[i]:g}); give s per boat, 0 to "
-                "inf, or NaN where the settings say it"
-            )
-
-    def _check_length(self, name: str, n: int) -> None:
-        value = getattr(self, name)
-        flat = value.ndim == 1 if isinstance(value, np.ndarray) else hasattr(value, "__len__")
-        if not flat or isinstance(value, (str, bytes)):
-            raise FleetError(f"{name} is {value!r}; give one per boat, or build the fleet by Fleet.of")
-        if len(value) != n:
-            raise FleetError(f"{name} has {len(value)} entries for {n} boats; give one per boat")
-
-    def _refuse(self, name: str, kind: np.dtype[Any], n: int) -> None:
-        """Raise for an array that is not what compiled code takes."""
-        value = getattr(self, name)
-        if name == "controlled":
-            self._check_length(name, n)
-            found = getattr(value, "dtype", type(value).__name__)
-            raise FleetError(f"controlled is of {found}; give an array of True or False per boat")
-        if name != "driven":
-            self._check_length(name, n)
-        if not isinstance(value, np.ndarray):
-            raise FleetError(f"{name} is of {type(value).__name__}; give an array, or build the fleet by Fleet.of")
-        if name == "driven" and value.shape != (n, 4):
-            raise FleetError(f"driven has shape {value.shape}; give ({n}, 4): speed m/s, x m, y m, time s")
-        raise FleetError(f"{name} is of {value.dtype}; give {kind}, or build the fleet by Fleet.of")
+        if self.position_error_m is not None:
+            remedy = "give a bound in m per boat, 0 to {:g}"
+            _check_range(self, "position_error_m", self.position_error_m, 0.0, LARGEST, remedy)
+        if self.adversary_s is not None:
+            times_s = np.where(np.isnan(self.adversary_s), 0.0, self.adversary_s)
+            remedy = "give s per boat, 0 to {:g}, or NaN where the settings say it"
+            _check_range(self, "adversary_s", times_s, 0.0, np.inf, remedy)
 
     def _name_fault(self) -> None:
         """Raise for the first boat whose values cannot be used."""
@@ -285,49 +230,36 @@ class Fleet:
         return self.state[:, L.SPEED]
 
 
-def _laid_out(value: np.ndarray) -> np.ndarray:
-    """The array in the layout of compiled code; its type stays what it is."""
-    return np.require(np.asarray(value), None, ["C", "A", "W"])
-
-
+_ARRAYS: dict[str, tuple[Callable[[Any], Any], tuple[int, ...]]] = {
+    "state": (numbers, (L.N_STATE,)),
+    "team": (whole_numbers, ()),
+    "controlled": (truths, ()),
+    "age_s": (numbers, ()),
+    "position_error_m": (numbers, ()),
+    "driven": (numbers, (4,)),
+    "adversary_s": (numbers, ()),
+    "visiting": (truths, ()),
+}
+"""What brings each array to the type of compiled code, and the shape of a boat's row in it."""
 _OPTIONAL = ("age_s", "position_error_m", "driven", "adversary_s", "visiting")
 
-_ARRAYS: tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...] = (
-    ("team", np.dtype(np.int64), ()),
-    ("controlled", np.dtype(np.bool_), ()),
-    ("age_s", np.dtype(np.float64), ()),
-    ("position_error_m", np.dtype(np.float64), ()),
-    ("driven", np.dtype(np.float64), (4,)),
-    ("adversary_s", np.dtype(np.float64), ()),
-    ("visiting", np.dtype(np.bool_), ()),
-)
-"""Type of each array but the state, and shape of a boat's row in it."""
 
-_FORMS: dict[str, Callable[[Any], Any]] = {
-    "state": _laid_out,
-    "team": whole_numbers,
-    "controlled": _laid_out,
-    "age_s": numbers,
-    "position_error_m": numbers,
-    "driven": numbers,
-    "adversary_s": numbers,
-    "visiting": _laid_out,
-}
-_FROM_LISTS: dict[str, Callable[[Any], Any]] = {"state": numbers, "controlled": truths, "visiting": truths}
+def _rows(name: str, value: Any, shape: tuple[int | None, ...], brought: Callable[[Any], Any] = numbers) -> Any:
+    """Value as an array of that shape (None matches any length) that compiled code takes; nothing at all fits any.
 
-
-def _shaped(name: str, value: ArrayLike, shape: tuple[int | None, ...], bools: bool = False) -> Array:
-    """Value as a float array of that shape (None matches any length); nothing at all fits any."""
+    Raises:
+        FleetError: it is none.
+    """
     try:
-        array = numbers(value, bools)
+        array = brought(value)
     except NoNumbersError as error:
-        raise FleetError(f"{name} is not an array of numbers ({error})") from None
+        of = "True or False" if brought is truths else "whole numbers" if brought is whole_numbers else "numbers"
+        raise FleetError(f"{name} is not an array of {of} ({error}); give one, see Fleet.of") from None
     if array.shape == (0,) and shape[0] in (None, 0):
         array = array.reshape(0, *(entry or 0 for entry in shape[1:]))
-    fits = array.ndim == len(shape) and all(w is None or w == g for w, g in zip(shape, array.shape, strict=True))
-    if not fits:
-        wanted = tuple("n" if entry is None else entry for entry in shape)
-        raise FleetError(f"{name} has shape {array.shape}; expected {wanted}")
+    if array.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, array.shape, strict=True)):
+        expected = tuple("n" if entry is None else entry for entry in shape)
+        raise FleetError(f"{name} has shape {array.shape}; expected {expected}")
     return array
 
 
@@ -339,51 +271,51 @@ def _check_given(fleet: Fleet) -> None:
     Raises:
         FleetError: one is out of its range.
     """
-    errors_m, ages_s, thrusts = fleet.position_error_m, fleet.age_s, fleet.state[:, L.THRUST]
-    if errors_m is not None:
-        within = "give a bound in m from 0 to {:g}, not in mm; leave out boats whose place is not known"
-        _check_range(fleet, "position_error_m", errors_m, 0.0, np.full(len(fleet), LARGEST_ERROR_M), within)
-        hint_at_errors(errors_m)
-    if ages_s is not None:
-        within = "give seconds since its fix from 0 to {:g}, not the time of day, nor ms; leave out boats long gone"
-        _check_range(fleet, "age_s", ages_s, 0.0, np.full(len(fleet), LARGEST_AGE_S), within)
-    most = np.array([get_platform(kind).max_thrust for kind in fleet.platforms])
-    within = "give percent up to {:g} either way, not the pulse in us, or NaN where it is unknown"
-    rounded = most + 1e-6 * most  # of logs and float32
-    _check_range(fleet, "thrust", np.where(np.isnan(thrusts), 0.0, thrusts), -rounded, rounded, within)
+    if fleet.position_error_m is not None:
+        remedy = "give a bound in m from 0 to {:g}, not in mm; leave out boats whose place is not known"
+        _check_range(fleet, "position_error_m", fleet.position_error_m, 0.0, LARGEST_ERROR_M, remedy)
+        hint_at_errors(fleet.position_error_m)
+    if fleet.age_s is not None:
+        remedy = "give seconds since its fix from 0 to {:g}, not the time of day, nor ms; leave out boats long gone"
+        _check_range(fleet, "age_s", fleet.age_s, 0.0, LARGEST_AGE_S, remedy)
+    thrusts = np.where(np.isnan(fleet.state[:, L.THRUST]), 0.0, fleet.state[:, L.THRUST])
+    most = np.array([get_platform(kind).max_thrust for kind in fleet.platforms]) * (1.0 + 1e-6)  # of logs and float32
+    remedy = "give percent up to {:g} either way, not the pulse in us, or NaN where it is unknown"
+    _check_range(fleet, "thrust", thrusts, -most, most, remedy)
+    if FIELD in fleet.names:
+        raise FleetError(f"names holds {FIELD!r}, by which decisions name walls and edges; give that boat another")
+    twins = sorted({name for name in fleet.names if fleet.names.count(name) > 1})
+    if twins:
+        raise FleetError(f"names holds {twins[0]!r} more than once; give every boat a name of its own")
 
 
-def _check_range(fleet: Fleet, name: str, values: Array, low: Array | float, high: Array, remedy: str) -> None:
+def _check_range(fleet: Fleet, name: str, values: Array, low: Array | float, high: Array | float, remedy: str) -> None:
     """Raise for the first boat whose value is not within its range.
 
     Raises:
         FleetError: names the boat, the value and the ``remedy``, in which {} is its highest value.
     """
-    for i in np.flatnonzero(~((values >= low) & (values <= high)))[:1]:
-        raise FleetError(f"{name} of boat {fleet.names[i]!r} is {values[i]:g}; {remedy.format(high[i])}")
-
-
-def _copied(name: str, value: ArrayLike | None, n: int) -> Array | None:
-    """Values of n boats that the fleet keeps, if there are any."""
-    return None if value is None else _shaped(name, value, (n,)).copy()
+    bad = ~((values >= low) & (values <= high))
+    if bad.any():
+        i = int(np.argmax(bad))
+        most = float(np.broadcast_to(high, bad.shape)[i])
+        raise FleetError(f"{name} of boat {fleet.names[i]!r} is {values[i]:g}; {remedy.format(most)}")
 
 
 def _headings_deg(heading_rad: ArrayLike | None, heading_deg: ArrayLike | None, n: int) -> Array:
     """Headings in deg, from whichever was given."""
     if heading_deg is not None and heading_rad is None:
-        return _shaped("heading_deg", heading_deg, (n,))
+        return _rows("heading_deg", heading_deg, (n,))
     if heading_rad is None or heading_deg is not None:
         raise FleetError("give either heading_rad or heading_deg, clockwise from north")
-    found = _shaped("heading_rad", heading_rad, (n,))
+    found = _rows("heading_rad", heading_rad, (n,))
     hint_at_headings("Fleet.of: heading_rad", found, "give heading_deg")
     return np.degrees(found)
 
 
 def _names(names: Sequence[str]) -> tuple[str, ...]:
     """Names, each a text with something in it."""
-    if isinstance(names, (str, bytes)):
-        raise FleetError(f"names is the text {names!r}; give a list of names, one for each boat")
-    if not isinstance(names, Iterable):
+    if isinstance(names, (str, bytes)) or not isinstance(names, Iterable):
         raise FleetError(f"names is {names!r}; give a list of names, one for each boat")
     found = tuple(names)
     for name in found:
@@ -394,8 +326,6 @@ def _names(names: Sequence[str]) -> tuple[str, ...]:
 
 def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tuple[str | Platform, ...]:
     """Platforms of n boats, each a known one."""
-    if platforms is None:
-        raise FleetError("platforms is None; give a platform's name, or one for each boat")
     if not isinstance(platforms, (str, Platform, Iterable)):
         raise FleetError(f"platforms is {platforms!r}; give a platform's name, or one for each boat")
     kinds = (platforms,) * n if isinstance(platforms, (str, Platform)) else tuple(platforms)
@@ -404,21 +334,3 @@ def _kinds(platforms: str | Platform | Sequence[str | Platform], n: int) -> tupl
             raise FleetError(f"platforms holds {kind!r}; give names of platforms, or Platform objects")
         get_platform(kind)
     return tuple(get_platform(kind) if isinstance(kind, str) and is_path(kind) else kind for kind in kinds)
-
-
-def _yes_or_no(name: str, value: ArrayLike, n: int) -> BoolArray:
-    """Values as booleans; what is neither true nor false, as NaN, is refused."""
-    _shaped(name, value, (n,), bools=True)
-    try:
-        return truths(value).reshape(n).copy()
-    except NoNumbersError as error:
-        raise FleetError(f"{name} holds {error}") from None
-
-
-def _whole(name: str, values: ArrayLike, n: int) -> IntArray:
-    """Values of n boats as integers; fractions, NaN and what 64 bits do not hold are refused."""
-    _shaped(name, values, (n,), bools=True)
-    try:
-        return whole_numbers(values).reshape(n).copy()
-    except NoNumbersError as error:
-        raise FleetError(f"{name} holds {error}") from None

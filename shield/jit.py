@@ -51,7 +51,7 @@ def _compiled(function: F, counted: bool) -> F:
     if _whole_program() is None:
         return cast(F, numba.njit(**options)(function))
     options["nopython"] = True
-    name = f"{function.__module__}.{function.__qualname__}"
+    name = f"{function.__module__}.{function.__qualname__}.{function.__code__.co_firstlineno}"
     kept = _Kept(name, function.__code__.co_filename)
     return cast(F, _whole_program().Kernel(function, targetoptions=options, kept=kept))
 

@@ -1,35 +1,34 @@
-"""`Shield`: the fleet and the wanted commands in, safe commands out."""
+"""`Shield`: the fleet and the nominal commands in, safe commands out."""
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from .commands import Commands
+from . import workspace as W
+from .autopilots import Autopilots, all_known, to_turn, unknown_memory
+from .backup.paths import SAG_M
+from .barriers.registered import KeptBarriers
+from .commands import Commands, tell_of_limits, within_limits
 from .config import ShieldConfig
-from .deciders import Asked, Decided, Deciders
+from .decide import Deciders
 from .decision import Decisions
 from .exceptions import ConfigError, FleetError
-from .filter.limiting import tell_of_limits, within_limits
 from .filter.program import Solver, solver_of
 from .fleet import Fleet
-from .jit import Array, BoolArray
-from .kept_barriers import KeptBarriers
-from .masks import safe_of_fleet
-from .memory import part_of
-from .ordering import as_given, order_of, ordered
+from .jit import Array, BoolArray, IntArray
+from .model import boats_of, missing_tables
 from .platforms import layout as L
-from .scene import Boats, Static
-from .setup import boats_of, missing_tables, tuning_of
-from .surroundings import OPEN_WATER, Surroundings
-from .tracking.autopilots import Autopilots, all_known, unknown_memory
-from .tracking.remembering import Known, Stayed, carry_over, meets_new
-from .tracking.tracks import check_ages
-from .warming import tight_spot
+from .surroundings import OPEN_WATER, Surroundings, off_m
+from .tracks import carry_over, check_ages, steps_of_delay, who_stayed
+from .workspace import Boats, Static
+
+_NUMBER = re.compile(r"([0-9]+)")
 
 
 class Shield:
@@ -43,8 +42,8 @@ class Shield:
 
     with u the turn and speed of this step, chosen through the autopilot; against opponents the backup, and along edges
     as little of it as will do. What it remembers between calls is the backup
-    of each boat, its margins, the commands on their way and, where nobody tells it, its autopilot's memory, for as long
-    as the boat (name, platform, team) is in the fleet; the same sequence of inputs from `reset` on gives the same bits.
+    of each boat, its margins and the commands on their way, for as long as the boat (name, platform, team) is in the
+    fleet; the same sequence of inputs from `reset` on gives the same bits.
     It takes one call per step of the settings, and boats that do what was sent. It decides for one thread at a time:
     compiled code works on its arrays without the GIL.
 
@@ -71,8 +70,7 @@ class Shield:
             )
         self.config = config if config is not None else ShieldConfig.of(**settings)
         self.surroundings = surroundings
-        self._tuning = tuning_of(self.config)
-        self._barriers = KeptBarriers(self.config)
+        self._barriers = barriers_of(self.config)
         self._packed: dict[Surroundings, Static] = {}
         self._last_around: tuple[Surroundings, Static] | None = None
         self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
@@ -80,9 +78,9 @@ class Shield:
         self._deciders: Deciders | None = None
         self._boats: Boats | None = None
         self._missing: BoolArray | None = None
-        self._known: Known | None = None
-        self.serves: object | None = None
         self._autopilots: Autopilots | None = None
+        self._known: tuple[Any, ...] | None = None
+        self.serves: object | None = None
 
     @classmethod
     def for_game(cls, game: Any, **settings: Any) -> Shield:
@@ -108,8 +106,7 @@ class Shield:
     def warm_up(self, fleet: Fleet | None = None) -> None:
         """Compile what decisions run, so that the first one is as quick as any; the shield's memory is left alone.
 
-        Without it the first decision, and the first that changes a command, take 0.1 s and more, and minutes the first
-        time after an installation.
+        Without it the first decision takes a minute the first time after an installation, and 0.1 s at every start.
 
         Args:
             fleet: the boats to come, whose value tables are then read as well.
@@ -120,25 +117,25 @@ class Shield:
         if fleet is not None and not isinstance(fleet, Fleet):
             raise FleetError(f"warm_up takes a Fleet, not {type(fleet).__name__}; build it with Fleet.of(...)")
         for twin in (Shield(solver=self.config.solver), Shield(self.config)):  # by its settings there may be no room
-            twin.decide(*tight_spot())
+            twin.decide(*_tight_spot())
         if fleet is not None:
             fleet.check()
-            order = order_of(fleet.names)
-            twin._deciders_of(
-                fleet if order is None else ordered(fleet, Commands.relative_deg(fleet.state[:, :2]), order)[0]
-            )
+            twin._deciders_of(fleet, order_of(fleet.names))
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
 
+        Manoeuvres are found one boat at a time, in the order of names: the same boats get the same commands, bit for
+        bit, in whatever order a fleet lists them.
+
         Args:
             fleet: all boats seen now.
-            wanted: command of each boat, n rows; rows of boats not controlled are passed through. Speeds beyond what a
-                boat's platform does are cut first (not those of `Commands.game_deg`).
+            wanted: nominal command of each boat, n rows; rows of boats not controlled are passed through. Speeds beyond
+                what a boat's platform does are cut first (not those of `Commands.game_deg`).
             surroundings: static constraints now, when they differ from the ones given at construction.
 
         Returns:
-            One decision per boat, in the fleet's order, which decides nothing: see `ordering`.
+            One decision per boat, in the fleet's order.
 
         Raises:
             FleetError: fleet or commands are of another kind, shapes do not fit, a state is not finite or a track too
@@ -146,51 +143,43 @@ class Shield:
             ConfigError: the surroundings are of another kind or leave nothing of the field.
         """
         started = time.perf_counter()
-        if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
-            raise FleetError(
-                f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
-                "them with Fleet.of(...) and Commands.absolute_rad(...) or Commands.relative_deg(...)"
-            )
-        fleet.check()
-        if wanted.values.shape != (len(fleet), 2):
-            raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+        _check(fleet, wanted)
         order = order_of(fleet.names)
-        if order is None:
-            return self._decide(fleet, wanted, surroundings, started)
-        return as_given(self._decide(*ordered(fleet, wanted, order), surroundings, started), fleet, wanted, order)
-
-    def _decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None, started: float) -> Decisions:
-        """`decide`, of boats in the order of their names."""
-        boats, deciders = self._deciders_of(fleet)
+        place = np.argsort(order)
+        boats, deciders = self._deciders_of(fleet, order)
         check_ages(fleet, self.config)
-        within, cut = within_limits(wanted, fleet, boats.params)
-        seen, unknown = self._with_memory(fleet)
-        static = self._around(self.surroundings if surroundings is None else surroundings, deciders)
-        works = deciders.pending[0, 0].copy() if deciders.pending.size > 0 else None
-        self._ask(seen, within, deciders.asked)
+        highest = boats.params[place, L.MAX_SPEED]
+        within, cut = within_limits(wanted, fleet.names, fleet.controlled, highest)
+        state, unknown = self._with_memory(fleet, order)
+        works = deciders.scene.pending[0, 0].copy() if deciders.scene.pending.size > 0 else None
+        self._give(fleet, state[place], within, order, deciders.scene.given)
         self._barriers.renew()
-        decided = self._decided(static, deciders)
+        deciders.decide(self._around(self.surroundings if surroundings is None else surroundings, deciders))
         self._barriers.tell()
-        sent, changed, reason = within, decided.changed, decided.reason
-        if changed.any():
-            sent = within.replaced(changed, decided.sent, fleet.state[:, L.HEADING])
+        sent, changed, reason, told = self._decided(deciders)
+        sent, changed, reason, told = sent[place], changed[place], reason[place], told[place]
+        commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
             changed = tell_of_limits(cut, changed, reason)
-        if unknown is not None:
-            self._follow(unknown, works, sent, fleet, boats)
+        if self._autopilots is not None and unknown is not None:
+            sent_now = commands.as_relative_deg(fleet.state[:, L.HEADING])[order]
+            works = sent_now if works is None else to_turn(works, state)
+            self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
+        active = told[:, W.ACTIVE].astype(np.int64)
         return Decisions(
             fleet=fleet,
             wanted=wanted,
-            sent=sent,
+            sent=commands,
             intervened=changed,
             reason=reason,
-            certificate_m=decided.certificate_m,
-            slack_m=decided.slack_m,
-            bound=decided.bound,
+            certificate_m=told[:, W.MARGIN_M],
+            slack_m=told[:, W.SLACK_M],
+            bound=np.where(active >= 0, order[np.maximum(active, 0)], active),
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
-            cut_short=decided.cut_short,
-            feared_s=decided.feared_s,
+            cut_short=told[:, W.CUT_SHORT] != 0.0,
+            feared_s=told[:, W.FEARED_S],
+            solver=told[:, W.SOLVER].astype(np.int64),
             barriers=self.config.barriers,
             area=(self.surroundings if surroundings is None else surroundings).field,
         )
@@ -200,12 +189,12 @@ class Shield:
         """What goes on from decision to decision, by name: live arrays; empty before the first one."""
         if self._deciders is None:
             return {}
-        return {**self._deciders.memory._asdict(), "pending": self._deciders.pending}
+        return {"memory": self._deciders.scene.memories, "pending": self._deciders.scene.pending}
 
     def safe_actions(
         self, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
     ) -> BoolArray:
-        """Which of k candidate commands would pass as they are in this step, (n, k); see `masks`.
+        """Which of k candidate commands would pass as they are in this step, (n, k); see `wrappers.masks`.
 
         Each boat's candidate is judged beside its team-mates' candidates of the same number. It is for this step alone,
         and the shield stays behind it. What the shield remembers is left alone.
@@ -218,6 +207,8 @@ class Shield:
         Raises:
             FleetError: no candidates, or as `decide`.
         """
+        from .wrappers.masks import safe_of_fleet
+
         return safe_of_fleet(self, fleet, actions, surroundings)
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
@@ -235,102 +226,88 @@ class Shield:
 
         return wrap_policy(policy, self, read)
 
-    def _deciders_of(self, fleet: Fleet) -> tuple[Boats, Deciders]:
+    def _deciders_of(self, fleet: Fleet, order: IntArray) -> tuple[Boats, Deciders]:
         """Boat constants and deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
-        if self._boats is None or self._deciders is None or self._known is None or self._known != Known.of(fleet):
-            kinds = self.config, fleet.platforms, tuple(int(t) for t in fleet.team)
-            boats, self._missing = boats_of(*kinds), missing_tables(*kinds)
+        known = fleet.platforms, fleet.names, fleet.team.tobytes()
+        if self._boats is None or self._deciders is None or self._known is None or self._known[0] != known:
+            platforms, team = tuple(fleet.platforms[i] for i in order), tuple(int(fleet.team[i]) for i in order)
+            boats = boats_of(self.config, platforms, team)
+            keys = tuple(zip((fleet.names[i] for i in order), platforms, team, strict=True))
+            place = np.argsort(order)
+            self._missing = missing_tables(self.config, platforms, team)[np.ix_(place, place)]
+            self._missing.setflags(write=False)  # all decisions about these boats tell the same one
             number = 1 if self.config.coordination == "team" else len(fleet)
-            new = Deciders(self.config, number, boats, self._barriers.arrays, self._solver())
-            self._deciders = self._with_old(fleet, new, boats)
-            self._boats, self._known = boats, Known.of(fleet)
+            new = Deciders(self.config, number, boats, self._static(self.surroundings), self._solver())
+            believed, self._autopilots = self._autopilots, None
+            if self._deciders is not None and self._known is not None:
+                stayed, then = who_stayed(self._known[1], keys)
+                carry_over(self._deciders.scene, new.scene, stayed, then, fleet.state[order])
+                if believed is not None and len(stayed) > 0:
+                    self._autopilots = Autopilots.of(len(fleet))
+                    self._autopilots.carry_over(believed, stayed, then)
+            self._boats, self._deciders, self._known = boats, new, (known, keys)
         return self._boats, self._deciders
 
     def _solver(self) -> Solver | None:
         """What answers programs; None: the compiled solver. A method, so that programs can be looked at."""
         return solver_of(self.config.solver)
 
-    def _with_old(self, fleet: Fleet, new: Deciders, boats: Boats) -> Deciders:
-        """New deciders with what the old ones remember of boats that stayed."""
-        old, believed, self._autopilots = self._deciders, self._autopilots, None
-        stayed = Stayed.between(self._known, fleet)
-        if old is None or len(stayed.now) == 0:
-            return new
-        if believed is not None:
-            self._autopilots = Autopilots.of(len(fleet))
-            self._autopilots.carry_over(believed, stayed)
-        met = meets_new(fleet, stayed, boats, self._tuning)
-        new.pending[:, :, stayed.now] = old.pending[:1, :, stayed.then]  # all deciders know what all boats were told
-        for i, k in [(0, 0)] if self.config.coordination == "team" else zip(*stayed, strict=True):
-            carry_over(part_of(old.memory, k), part_of(new.memory, i), stayed, met)
-        return new
-
-    def _ask(self, seen: Fleet, within: Commands, asked: Asked) -> None:
-        """Write what is to be decided about, for the team, or for each boat.
-
-        A boat that decides for itself knows its own wanted command and takes team-mates to hold their course.
-        """
-        wanted = within.as_relative_deg(seen.state[:, L.HEADING])
-        asked.state[:], asked.ours[:] = seen.state, seen.controlled
-        if self.config.coordination == "team":
-            asked.wanted[0] = wanted
-        else:
-            own = np.arange(len(seen))
-            asked.ours[~seen.controlled] = False  # these decide nothing
-            asked.wanted[:, :, 0], asked.wanted[:, :, 1] = seen.speed_mps, 0.0
-            asked.wanted[own, own] = wanted
-        asked.age_s[:] = 0.0 if seen.age_s is None else seen.age_s
-        asked.error_m[:] = 0.0 if seen.position_error_m is None else seen.position_error_m
-        asked.visiting[:] = False if seen.visiting is None else seen.visiting
-        asked.adversary_s[:] = np.nan if seen.adversary_s is None else seen.adversary_s
-        asked.driven[:] = np.nan if seen.driven is None else seen.driven
-
-    def _decided(self, static: Static, deciders: Deciders) -> Decided:
-        """What is decided, (n,): that of the team, or of each boat its own."""
-        deciders.decide(static)
-        if self.config.coordination == "team":
-            return Decided._make(values[0].copy() for values in deciders.decided)
-        own = np.arange(len(deciders.asked.state))
-        if deciders.pending.shape[1] > 0:  # what each boat was told all others see
-            deciders.pending[:, -1] = deciders.pending[own, -1, own]
-        decided = Decided._make(values[own, own] for values in deciders.decided)
-        first = np.flatnonzero(deciders.asked.ours.any(axis=1))[:1]
-        return decided if len(first) == 0 else decided._replace(feared_s=deciders.decided.feared_s[first[0]].copy())
-
-    def _with_memory(self, fleet: Fleet) -> tuple[Fleet, BoolArray | None]:
-        """The fleet with what is believed of its autopilots, and (n,) own boats of which nobody tells it, if any."""
+    def _with_memory(self, fleet: Fleet, order: IntArray) -> tuple[Array, BoolArray | None]:
+        """States in order with what is believed of autopilots, and (n,) own boats of which nobody tells it, if any."""
         if self._autopilots is None and all_known(fleet.state):
-            return fleet, None
+            return fleet.state[order], None
         unknown: BoolArray = fleet.controlled & unknown_memory(fleet.state)
         if fleet.age_s is not None:  # what was sent since is not in what is seen
             unknown &= fleet.age_s <= 0.5 * self.config.dt_s
+        state, unknown = fleet.state[order], unknown[order]
         if not unknown.any():
             self._autopilots = None
-            return fleet, None
+            return state, None
         if self._autopilots is None:
             self._autopilots = Autopilots.of(len(fleet))
-        fleet = replace(fleet, state=fleet.state.copy())
-        self._autopilots.fill(fleet.state, unknown, self.config.dt_s, self.config.position_error_m)
-        return fleet, unknown
+        self._autopilots.fill(state, unknown, self.config.dt_s, self.config.position_error_m)
+        return state, unknown
 
-    def _follow(self, unknown: BoolArray, works: Array | None, sent: Commands, fleet: Fleet, boats: Boats) -> None:
-        """Run the autopilots nobody tells of through what works in this step: of the delay, or what is sent."""
-        if self._autopilots is None:
-            return
-        heading_deg = fleet.state[:, L.HEADING]
-        if works is None:
-            works = sent.as_relative_deg(heading_deg)
-        else:
-            with np.errstate(invalid="ignore"):  # what boats not ours were told may be anything
-                works[:, 1] = (works[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
-        self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
+    def _give(self, fleet: Fleet, state: Array, within: Commands, order: IntArray, given: Array) -> None:
+        """Write what is to be decided about, for the team, or for each boat.
+
+        A boat that decides for itself knows its own nominal command and takes team-mates to hold their course.
+        """
+        rows = np.empty((len(fleet), W.N_GIVEN))
+        rows[:, : L.N_STATE], rows[:, W.OURS] = state, fleet.controlled
+        rows[:, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = within.as_relative_deg(fleet.state[:, L.HEADING])
+        rows[:, W.AGE_S] = 0.0 if fleet.age_s is None else fleet.age_s
+        rows[:, W.ERROR_M] = 0.0 if fleet.position_error_m is None else fleet.position_error_m
+        rows[:, W.VISITING] = 0.0 if fleet.visiting is None else fleet.visiting
+        rows[:, W.HORIZON_S] = np.nan if fleet.adversary_s is None else fleet.adversary_s
+        rows[:, W.DRIVEN :] = np.nan if fleet.driven is None else fleet.driven
+        given[:] = rows[order]
+        if self.config.coordination == "per_boat":
+            own = np.arange(len(fleet))
+            nominal = given[own, own, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1]
+            given[~fleet.controlled[order], :, W.OURS] = 0.0  # these decide nothing
+            given[:, :, W.NOMINAL_SPEED], given[:, :, W.NOMINAL_TURN] = given[:, :, L.SPEED], 0.0
+            given[own, own, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = nominal
+
+    def _decided(self, deciders: Deciders) -> tuple[Array, BoolArray, IntArray, Array]:
+        """What is sent (n, 2), whether it is changed, why, and what is told: of the team, or of each boat its own."""
+        scene = deciders.scene
+        if self.config.coordination == "team":
+            return scene.sent[0], scene.changed[0], scene.reasons[0], scene.told[0]
+        own = np.arange(len(scene.given))
+        if scene.pending.shape[1] > 0:  # what each boat was told all others see
+            scene.pending[:, -1] = scene.pending[own, -1, own]
+        told = scene.told[own, own]
+        for first in np.flatnonzero((scene.given[:, :, W.OURS] != 0.0).any(axis=1))[:1]:
+            told[:, W.FEARED_S] = scene.told[first, :, W.FEARED_S]
+        return scene.sent[own, own], scene.changed[own, own], scene.reasons[own, own], told
 
     def _around(self, surroundings: Surroundings, deciders: Deciders) -> Static:
         """Static constraints now; what was kept from others is no measure for these."""
         static = self._static(surroundings)
         if static is not self._kept_from:
             self._kept_from = static
-            deciders.memory.static_m[:] = 0.0
+            deciders.scene.memories[:, :, W.STATIC_MARGIN] = 0.0
         return static
 
     def _static(self, surroundings: Surroundings) -> Static:
@@ -341,6 +318,53 @@ class Shield:
         if surroundings not in self._packed:
             if len(self._packed) > 64:
                 self._packed.clear()
-            self._packed[surroundings] = surroundings.pack(self.config)
+            self._packed[surroundings] = surroundings.pack(self.config, self._barriers.arrays)
         self._last_around = surroundings, self._packed[surroundings]
         return self._packed[surroundings]
+
+
+def _check(fleet: Fleet, wanted: Commands) -> None:
+    """Check what is to be decided about.
+
+    Raises:
+        FleetError: it is of another kind, or has values or shapes that cannot be used.
+    """
+    if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
+        raise FleetError(
+            f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
+            "them with Fleet.of(...) and Commands.absolute_rad(...) or Commands.relative_deg(...)"
+        )
+    fleet.check()
+    if wanted.values.shape != (len(fleet), 2):
+        raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+
+
+def barriers_of(config: ShieldConfig) -> KeptBarriers:
+    """The registered barriers that a shield of such settings keeps."""
+    late_s = float(steps_of_delay(config) * config.dt_s)
+    return KeptBarriers(config.barriers, float(off_m(config)) + SAG_M, late_s)
+
+
+@lru_cache(maxsize=256)
+def order_of(names: tuple[str, ...]) -> IntArray:
+    """Indices (n,) of boats by their names, numbers in them by their size."""
+    return np.array(sorted(range(len(names)), key=lambda i: (_parts(names[i]), i)), dtype=np.int64)
+
+
+def _parts(name: str) -> list[tuple[bool, int, str, str]]:
+    """A name as what it is compared by: texts and the numbers between them, of any length."""
+    digits = [part.lstrip("0") if k % 2 else "" for k, part in enumerate(_NUMBER.split(name))]
+    return [(bool(k % 2), len(digits[k]), digits[k], part) for k, part in enumerate(_NUMBER.split(name))]
+
+
+def _tight_spot() -> tuple[Fleet, Commands, Surroundings]:
+    """Two boats that run at each other between static constraints of each kind, an opponent far off: all is needed."""
+    fleet = Fleet.of(
+        position_m=[(0.0, 0.0), (0.0, 4.2), (300.0, 3.0)],
+        heading_rad=[0.0, np.pi, -np.pi / 2],
+        speed_mps=[1.5, 1.5, 1.5],
+        team=[0, 0, 1],
+        platforms="heron",
+    )
+    around = Surroundings(keep_out=((0.0, -4.0, 1.0),), stops=((-4.0, 0.0, 1.0),), circles=((-4.0, 6.0, 0.5),))
+    return fleet, Commands.relative_deg(np.array([[2.0, 0.0]] * 3)), around

@@ -19,8 +19,8 @@ from .config import ShieldConfig
 from .exceptions import ConfigError
 from .fleet import LARGEST
 from .jit import Array
-from .scene import Static
 from .shared import share
+from .workspace import Registered, Static, new_registered
 
 Point = tuple[float, float]
 
@@ -69,7 +69,7 @@ class Surroundings:
         if self.field is not None and not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
             raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 
-    def pack(self, config: ShieldConfig) -> Static:
+    def pack(self, config: ShieldConfig, registered: Registered | None = None) -> Static:
         """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
 
         That is also how far a current carries it until a command has acted, and a little longer.
@@ -94,6 +94,7 @@ class Surroundings:
                 last_circles=len(self.circles) if config.beyond_then == "stop" else 0,
                 last_segments=len(segments) if config.beyond_then == "stop" else 0,
                 last_m=LAST_SHARE * config.hull_m,
+                registered=new_registered() if registered is None else registered,
             )
         )
 

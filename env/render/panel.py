@@ -7,7 +7,7 @@ from steerclear.env.render.arena import Arena
 from steerclear.env.render.canvas import font
 from steerclear.env.render.scene import Scene, closest_pair
 from steerclear.env.render.theme import Colour, Theme
-from steerclear.shield.visible import visible
+from steerclear.shield.foreign import visible
 
 HEADER_PX = 62
 STEERING = "you: ringed   ahead ↑ W   turn ← → A D   back ↓ S   half speed Shift   stop: no key"

@@ -28,7 +28,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat

@@ -20,11 +20,10 @@ from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
+from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, TableError
-from steerclear.shield.filter.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
-from steerclear.shield.plan import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, NOT_COVERED, PASSED, QP
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, thrust_after
@@ -33,6 +32,7 @@ from steerclear.shield.platforms.usv import clamp, turn_of_rudder
 from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
 from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, table_range_m, table_value
 from steerclear.shield.tables.settings import OtherMay
+from steerclear.shield.workspace import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, LEAST_CHANGE, NOT_COVERED, PASSED
 
 from ..jit import kernel
 from .base import BatchGuard, Games, game_of
@@ -327,7 +327,7 @@ def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of ro
         for i in range(n):
             movers[i] = False
             if ours[i] and (sent[i, 0] != asked[i, 0] or sent[i, 1] != asked[i, 1]):
-                reason[i] = QP
+                reason[i] = LEAST_CHANGE
     elif moved:
         for i in range(n):
             copy_row(sent[i], asked[i])
@@ -341,7 +341,7 @@ def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of ro
             continue
         if movers[i]:
             reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
-        elif reason[i] != QP:
+        elif reason[i] != LEAST_CHANGE:
             for c in range(memory.shape[1]):
                 memory[i, c] = 0.0
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import qpsolvers
-from steerclear.shield.filter.active_set import OPTIMAL, project
+from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.filter.program import Program, solve
 from steerclear.shield.jit import Array
 

@@ -36,9 +36,9 @@ DROPPED = ("bound by", "hdg", "m/s", "age", "closest", "why", "margin")
 """What is left out of a terminal too narrow for all, in this order; wanted and sent stand in every one, whole."""
 WHY = {
     Reason.PASSED: ("passed", "green", "the wanted command leaves the boat a way out: sent as it is"),
-    Reason.QP: ("QP", "cyan", "changed as little as it takes to keep clear of team-mates"),
+    Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
     Reason.QP_RELAXED: ("QP slack", "yellow", "of logs of 0.2.0 and before"),
-    Reason.BACKUP: ("backup", "yellow", "its backup manoeuvre, or part of it: that keeps clear of all boats"),
+    Reason.BACKUP: ("backup", "yellow", "its backup manoeuvre, which keeps clear of all boats"),
     Reason.BEST_EFFORT: (
         "best eff.",
         "bold red",

@@ -18,7 +18,7 @@ from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError, LogError
 from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.tracks import fill_memory, whole_steps
+from steerclear.shield.tracks import fill_memory, whole_steps
 
 Array = NDArray[np.float64]
 GONE_S = 1.5

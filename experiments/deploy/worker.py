@@ -17,7 +17,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from steerclear.shield.words import plain_text
+from steerclear.shield.foreign import plain_text
 
 from ..entries.sandbox import OVER, READY, Limits, end_group, end_marked, is_stopped
 

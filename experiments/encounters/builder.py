@@ -12,7 +12,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import fresh_state, get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.tracks import thrust_at
+from steerclear.shield.tracks import thrust_at
 
 from ..play.conditions import draw
 from . import script as S

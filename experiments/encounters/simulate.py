@@ -16,7 +16,7 @@ from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
-from steerclear.shield.tracking.tracks import whole_steps
+from steerclear.shield.tracks import whole_steps
 
 from ..baselines.registry import Guard, GuardMaker, build_guard
 from ..jit import kernel

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from steerclear.shield.words import plain_text
+from steerclear.shield.foreign import plain_text
 
 MOST = 64
 """Numbers of an action, and characters of a text, that are looked at: no action has as many."""

@@ -17,7 +17,7 @@ from typing import Any, cast
 from steerclear import policies
 from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
-from steerclear.shield.words import describe_error
+from steerclear.shield.foreign import describe_error
 
 from .answers import to_plain
 from .sandbox import AGAIN

@@ -24,7 +24,9 @@ from ..play.kept_distance import check_shield
 SHIELD = Path(steerclear.shield.__file__).parent
 ONBOARD = Path(__file__).parent / "onboard"
 LEFT_OUT = ("bridge", "root", "wrappers", "__init__.py")
-"""Of the shield's folder: what no decision needs."""
+"""Of the shield's folder: what no decision needs,"""
+SHIPPED = ("wrappers/actions.py", "wrappers/driving.py")
+"""but these."""
 STAND_INS = {
     "jit.py": "jit.py",
     "shared.py": "shared.py",
@@ -42,10 +44,10 @@ def code() -> dict[str, str]:
     """Sources by path inside the package, with ``steerclear`` for its name."""
     files = {"__init__.py": '"""The safety shield of steerclear, as plain Python. BSD-3-Clause."""\n'}
     files |= {name: (ONBOARD / name).read_text(encoding="utf-8") for name in ONBOARD_TOP}
-    files["shield/__init__.py"] = ""
+    files["shield/__init__.py"] = files["shield/wrappers/__init__.py"] = ""
     for path in sorted(SHIELD.rglob("*.py")):
         inside = path.relative_to(SHIELD)
-        if inside.parts[0] not in LEFT_OUT:
+        if inside.parts[0] not in LEFT_OUT or inside.as_posix() in SHIPPED:
             stand_in = STAND_INS.get(inside.as_posix())
             source = ONBOARD / "stand_ins" / stand_in if stand_in else path
             files[f"shield/{inside.as_posix()}"] = source.read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ from steerclear.policies.sb3 import trained_here
 from steerclear.policies.submissions.made_for import check_game, made_for
 from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.words import plain_text
+from steerclear.shield.foreign import plain_text
 
 from ..play.spec import ANSWER_S
 from .answers import from_plain

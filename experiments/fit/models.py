@@ -263,7 +263,7 @@ def windows(run: Run, every: int, ahead: int) -> int:
 
 def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -> Array:
     """Foretold less seen, (windows, ahead, 4): x m, y m, heading deg, speed m/s."""
-    from steerclear.shield.tracking.tracks import thrust_at
+    from steerclear.shield.tracks import thrust_at
 
     count = windows(run, every, ahead)
     out = np.zeros((count, ahead, 4))

@@ -12,7 +12,7 @@ from steerclear.env.randomness import next_uniform
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, copy_row
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.tracks import whole_steps
+from steerclear.shield.tracks import whole_steps
 
 from ..jit import kernel
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import NOT_COVERED
-from steerclear.shield import Reason, Shield, ShieldConfig, game_facts
+from steerclear.shield import Reason, Shield, ShieldConfig
 from steerclear.shield.jit import Array
+from steerclear.shield.wrappers import game_facts
 from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 
 from ..metrics import RADII_M

@@ -12,9 +12,9 @@ from steerclear.shield.batch import BatchedShield
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
+from steerclear.shield.model import boats_of
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.setup import boats_of
 from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES
 from steerclear.shield.tables.files import ValueTable, stack_tables
 from steerclear.shield.tables.lookup import WHOLE_S, table_value

@@ -11,11 +11,11 @@ from gymnasium.spaces import Box
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.game_facts import facts_of_games
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.shared import share
 from steerclear.shield.wrappers import MctfVecEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers.game_facts import facts_of_games
 from steerclear.shield.wrappers.tallies import OWN_EVENTS
 from steerclear.shield.wrappers.team_batch import Stepped
 

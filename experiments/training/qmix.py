@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from steerclear.policies.entrants.learned.network import Network
-from steerclear.shield.actions import DISCRETE
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.wrappers.actions import DISCRETE
 from torch import nn
 
 from .config import QmixConfig

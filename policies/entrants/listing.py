@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steerclear.shield.entry_points import load_others
+from steerclear.shield.foreign import load_others
 
 from . import alamer, chao, lucas, meo, ohto, options, undertow  # noqa: F401 (each enters its team)
 from .catalogue import Entrant, entered

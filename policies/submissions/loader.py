@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.words import describe_error, plain_text
+from steerclear.shield.foreign import describe_error, plain_text
 
 from ..games import SeenGame, seen_game
 from ..guard import Answer, ForeignCode, GameFacts, GuardedTeam

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.foreign import plain_text
 from steerclear.shield.platforms import get_platform
-from steerclear.shield.words import plain_text
 
 from ..games import SeenGame
 

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 from ..barriers.boats import worst_clearance
 from ..barriers.clearance import FAR, MARGIN, SAMPLE
-from ..barriers.opponents import worst_pursuer
+from ..barriers.pursuit import worst_pursuer
 from ..barriers.static import clear_of_near_obstacles, clear_of_static
-from ..jit import BoolArray, lean_kernel
-from ..scene import Scene
-from ..work import Work
+from ..jit import lean_kernel
+from ..workspace import Scene
 
 NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
 """What is kept, each with all before it: clear of team-mates and of opponents that hold their course; of obstacles near
@@ -51,9 +50,9 @@ def better(rank: Rank, best: Rank) -> bool:
 
 
 @lean_kernel
-def rank_of(i: int, work: Work) -> Rank:
+def rank_of(i: int, scene: Scene) -> Rank:
     """Rank of the manoeuvre boat i has."""
-    return Rank(work.kept[i], work.worth_m[i])
+    return Rank(scene.kept[i], scene.worth_m[i])
 
 
 @lean_kernel
@@ -65,11 +64,11 @@ def level_to_beat(best: Rank) -> float:
 
 
 @lean_kernel
-def _ask_no_pursuers(slot: int, work: Work) -> None:
+def _ask_no_pursuers(slot: int, scene: Scene) -> None:
     """Margins against pursuers of a path of which they do not matter: none is better than that from the others."""
-    margin = work.clear[slot, MARGIN]
-    work.threat_m[slot], work.threats_m[slot, :], work.joint_m[slot] = margin, margin, FAR
-    work.sealed[slot], work.pursuers_known[slot] = False, False
+    margin = scene.clear[slot, MARGIN]
+    scene.threat_m[slot], scene.threats_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
+    scene.sealed[slot], scene.pursuers_known[slot] = False, False
 
 
 @lean_kernel
@@ -80,43 +79,44 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     in time second (who is stopped is caught), pursuing opponents third; then all static constraints, and last room to
     spare. The clearance told is from all boats, whatever the rank hangs on.
     """
-    tuning, work = scene.tuning, scene.work
-    work.spent[0] += work.cost[i]
-    clear = work.clear[slot]
+    tuning = scene.tuning
+    scene.spent[0] += scene.cost[i]
+    clear = scene.clear[slot]
     worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else 0.0)
-    work.static[slot, MARGIN] = FAR
+    scene.static_clear[slot, MARGIN] = FAR
     if not clear[MARGIN] >= 0.0:
-        _ask_no_pursuers(slot, work)
+        _ask_no_pursuers(slot, scene)
         return Rank(NOTHING, clear[MARGIN])
-    touched = clear_of_near_obstacles(i, slot, scene, 0.0, work.spare2)
-    if not work.spare2[MARGIN] >= 0.0:
-        rank = Rank(BOATS, work.spare2[MARGIN] + LATER_WORTH_M * work.spare2[SAMPLE])
+    touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.spare2)
+    if not scene.spare2[MARGIN] >= 0.0:
+        rank = Rank(BOATS, scene.spare2[MARGIN] + LATER_WORTH_M * scene.spare2[SAMPLE])
         if better(rank, best):
-            worst_pursuer(i, slot, scene, -FAR)
+            worst_pursuer(i, slot, -FAR, scene)
         else:
-            _ask_no_pursuers(slot, work)
-        work.sealed[slot], work.bound[slot] = False, touched
+            _ask_no_pursuers(slot, scene)
+        scene.sealed[slot], scene.bound[slot] = False, touched
         return rank
-    sure_m, short = clear[MARGIN], work.short[slot]
+    sure_m, short = clear[MARGIN], scene.short[slot]
     if short and not better(Rank(OBSTACLES, sure_m), best):
-        _ask_no_pursuers(slot, work)
+        _ask_no_pursuers(slot, scene)
         return Rank(OBSTACLES, sure_m)
-    worst_pursuer(i, slot, scene, level_to_beat(best))
-    if short or work.fails[slot]:
-        return Rank(OBSTACLES, min(sure_m, work.threat_m[slot]) if short else work.threat_m[slot])
-    nearest = clear_of_static(i, slot, scene, work.static[slot])
-    to_spare_m = work.static[slot, MARGIN] - work.static_target_m[i]
+    worst_pursuer(i, slot, level_to_beat(best), scene)
+    if short or scene.fails[slot]:
+        return Rank(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
+    nearest = clear_of_static(i, slot, scene, scene.static_clear[slot])
+    to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
     spare_m = min(clear[MARGIN], tuning.margin_cap_m)
     if to_spare_m >= 0.0:
         return Rank(ALL, spare_m)
-    work.bound[slot] = nearest
+    scene.bound[slot] = nearest
     return Rank(OPPONENTS, to_spare_m + SPARE_WORTH * spare_m)
 
 
 @lean_kernel
-def all_keep(least: int, ours: BoolArray, work: Work) -> bool:
+def all_keep(least: int, scene: Scene) -> bool:
     """Whether every boat of ours keeps at least that much."""
+    ours = scene.ours
     keep = True
     for i in range(ours.shape[0]):
-        keep = keep and (not ours[i] or work.kept[i] >= least)
+        keep = keep and (not ours[i] or scene.kept[i] >= least)
     return keep

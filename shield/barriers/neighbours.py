@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ..backup.effort import PATH_COST, PURSUER_COST
-from ..jit import lean_kernel
+import numpy as np
+
+from ..fleet import LARGEST, LARGEST_SPEED_MPS
+from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
-from ..platforms.usv import next_thrust
-from ..scene import Scene
-from .foreseen import foresee, may_pursue
+from ..platforms.step import step_boat
+from ..platforms.usv import next_thrust, wrap_degrees
+from ..workspace import DRIVEN, PATH_COST, PURSUER_COST, Scene
 from .value_function import find_outnumbered, run_opponents
 
 REGAIN_M = 0.01
@@ -26,53 +28,58 @@ def find_neighbours(scene: Scene) -> None:
     out changes no decision.
 
     The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
-    again; one inside the separation itself is in breach, see `_rank_recovery`.
+    again; one inside the separation itself is in breach.
     """
-    state, boats, tuning, work = scene.state, scene.boats, scene.tuning, scene.work
-    n = state.shape[0]
-    work.spent[0], work.cut_short[0] = 0.0, False
-    work.cost[:] = PATH_COST
+    scene.spent[0], scene.cut_short[0] = 0.0, False
+    scene.cost[:] = PATH_COST
     run_opponents(1, scene)
     foresee(scene)
-    for i in range(n):
-        work.pursued[i] = False
-        work.reach_samples[i] = _reach_samples(i, scene)
-        work.first_pursuer[i] = work.first_refuser[i] = 0
-        work.first_manner[i, :] = 0
-        heading = math.radians(state[i, L.HEADING])
-        ux, uy = math.sin(heading), math.cos(heading)
-        way = state[i, L.SPEED] * tuning.model_s
-        work.course[i, 0], work.course[i, 1] = state[i, L.X] + way * ux, state[i, L.Y] + way * uy
-        work.course[i, 2], work.course[i, 3] = ux, uy
-        top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
+    for i in range(scene.state.shape[0]):
+        _note_course(i, scene)
         for j in range(i):
-            top = top_i + max(boats.fastest_mps[j], state[j, L.SPEED])
-            samples = max(boats.samples[i], boats.samples[j])
-            if boats.team[i] != boats.team[j]:
-                reach_i = work.reach_samples[i] + boats.chase_samples[i, j]
-                samples = max(samples, max(reach_i, work.reach_samples[j] + boats.chase_samples[j, i]))
-            horizon_s = (samples + 1) * boats.sample_s + tuning.tail_s
-            radius = tuning.radius_m + work.error_m[i] + work.error_m[j]
-            dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
-            square = dx * dx + dy * dy
-            reach = radius + top * horizon_s
-            hit = square <= reach * reach
-            work.near[i, j], work.near[j, i] = hit, hit
-            if hit:
-                work.cost[i] += 1.0
-                work.cost[j] += 1.0
-                if boats.team[i] != boats.team[j]:
-                    work.pursued[i] = work.pursued[i] or may_pursue(j, boats, work)
-                    work.pursued[j] = work.pursued[j] or may_pursue(i, boats, work)
-                    work.cost[i] += PURSUER_COST
-                    work.cost[j] += PURSUER_COST
-                least = radius - tuning.buffer_m
-                now = math.sqrt(square)
-                work.breach[i, j] = now < least
-                work.breach[j, i] = now < least
-                held = max(least, min(radius, now + REGAIN_M))
-                work.radius[i, j], work.radius[j, i] = held, held
+            _note_pair(i, j, scene)
     find_outnumbered(scene)
+
+
+@lean_kernel
+def _note_course(i: int, scene: Scene) -> None:
+    """Note where boat i is one step on if it holds its course, before its neighbours are looked at."""
+    row, course = scene.state[i], scene.course[i]
+    scene.pursued[i], scene.first_pursuer[i] = False, 0
+    scene.first_manner[i, :] = 0
+    scene.reach_samples[i] = _reach_samples(i, scene)
+    heading, way = math.radians(row[L.HEADING]), row[L.SPEED] * scene.tuning.model_s
+    ux, uy = math.sin(heading), math.cos(heading)
+    course[0], course[1], course[2], course[3] = row[L.X] + way * ux, row[L.Y] + way * uy, ux, uy
+
+
+@lean_kernel
+def _note_pair(i: int, j: int, scene: Scene) -> None:
+    """Note whether two boats can matter to each other, at what radius, and what looking at them costs."""
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
+    top = max(boats.fastest_mps[i], state[i, L.SPEED]) + max(boats.fastest_mps[j], state[j, L.SPEED])
+    opponents = boats.team[i] != boats.team[j]
+    samples = max(boats.samples[i], boats.samples[j])
+    if opponents:
+        reach_i = scene.reach_samples[i] + boats.chase_samples[i, j]
+        samples = max(samples, max(reach_i, scene.reach_samples[j] + boats.chase_samples[j, i]))
+    radius = tuning.radius_m + scene.error_m[i] + scene.error_m[j]
+    dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
+    square = dx * dx + dy * dy
+    reach = radius + top * ((samples + 1) * boats.sample_s + tuning.tail_s)
+    near = square <= reach * reach
+    scene.near[i, j], scene.near[j, i] = near, near
+    if not near:
+        return
+    cost = 1.0 + (PURSUER_COST if opponents else 0.0)
+    scene.cost[i], scene.cost[j] = scene.cost[i] + cost, scene.cost[j] + cost
+    if opponents:
+        scene.pursued[i] = scene.pursued[i] or may_pursue(j, scene)
+        scene.pursued[j] = scene.pursued[j] or may_pursue(i, scene)
+    least, now = radius - tuning.buffer_m, math.sqrt(square)
+    scene.breach[i, j], scene.breach[j, i] = now < least, now < least
+    kept = max(least, min(radius, now + REGAIN_M))
+    scene.radius[i, j], scene.radius[j, i] = kept, kept
 
 
 @lean_kernel
@@ -92,3 +99,66 @@ def _reach_samples(i: int, scene: Scene) -> int:
     if boats.table_steps[i] == 0 and min(least, row[L.THRUST]) >= boats.ready_thrust[i]:
         return boats.pursuit_samples[i]
     return boats.pursuit_samples[i] + boats.thrust_samples[i]
+
+
+DRIVEN_MPS, DRIVEN_X, DRIVEN_Y, DRIVEN_S = range(4)
+"""What drives a boat: speed m/s (NaN: not driven), place it is steered at, m (NaN: none, the heading error is 0), and
+the time, s, for which that is sure to last."""
+
+
+@lean_kernel
+def error_to(row: Array, x: float, y: float) -> float:
+    """Heading error, deg, of a boat (its state row) that is to steer at (x, y), m; 0 where there is no such place."""
+    if math.isnan(x):
+        return 0.0
+    bearing = np.float64(math.degrees(math.atan2(x - row[L.X], y - row[L.Y])))
+    return wrap_degrees(bearing - row[L.HEADING])
+
+
+@lean_kernel
+def note_predicted(given: Array, scene: Scene) -> None:
+    """Note which boats' ways are predicted by what drives them, see `Fleet.driven`.
+
+    That takes a speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at
+    all, from which everything keeps clear. And it must last as long as the longest backup manoeuvre.
+    """
+    ours, boats = scene.ours, scene.boats
+    last = 0
+    for i in range(ours.shape[0]):
+        copy_row(scene.driven[i], given[i, DRIVEN:])
+        last = max(last, boats.samples[i])
+    for i in range(ours.shape[0]):
+        driven = scene.driven[i]
+        x_m, y_m = driven[DRIVEN_X], driven[DRIVEN_Y]
+        place = (math.isnan(x_m) and math.isnan(y_m)) or (abs(x_m) <= LARGEST and abs(y_m) <= LARGEST)
+        lasts = driven[DRIVEN_S] >= last * boats.sample_s
+        scene.known[i] = not ours[i] and place and lasts and 0.0 <= driven[DRIVEN_MPS] <= LARGEST_SPEED_MPS
+
+
+@lean_kernel
+def may_pursue(j: int, scene: Scene) -> bool:
+    """Whether boat j as an opponent is granted more than holding its course, or the way that is foreseen."""
+    boats = scene.boats
+    return boats.granted_turn_dps[j] > 0.0 and not scene.known[j]
+
+
+@lean_kernel
+def foresee(scene: Scene) -> None:
+    """Write the ways of boats of ``scene.known`` into ``scene.path``: sample 0 is one step of the model from now.
+
+    They are written as far as anybody looks at them: as long as the longest of backup manoeuvres.
+    """
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
+    last = 0
+    for i in range(state.shape[0]):
+        last = max(last, boats.samples[i])
+    for j in range(state.shape[0]):
+        if not scene.known[j]:
+            continue
+        drive, path, row = scene.driven[j], scene.path[j], scene.row
+        copy_row(row, state[j])
+        for k in range(last + 1):
+            for _ in range(1 if k == 0 else boats.stride):
+                error = error_to(row, drive[DRIVEN_X], drive[DRIVEN_Y])
+                step_boat(boats.params[j], row, drive[DRIVEN_MPS], error, tuning.model_s)
+            path[k, 0], path[k, 1] = row[L.X], row[L.Y]

@@ -1,116 +1,99 @@
 """Margins that somebody else wrote, called by compiled code through their address: no decision is compiled for them.
 
-One function serves each barrier, double f(x_m, y_m, ahead_s, values, size, part): its margin (part 0), m, or its slope
-along x or y (1, 2). It answers NaN where the barrier's own functions raise.
+Each is one compiled function, double f(x_m, y_m, ahead_s, values, size, part): its margin (part 0), m, or its gradient
+along x or y (1, 2); NaN where it raises.
 """
 
 from __future__ import annotations
 
-import ctypes
-import logging
 import math
 import re
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 from numba.core import cgutils, config
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import intrinsic
 
+from ..exceptions import ConfigError
+from ..foreign import plain_text
 from .registry import Barrier
 
-LOG = logging.getLogger(__name__)
-COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-INTERPRETED = bool(getattr(config, "DISABLE_JIT", False))
-MARGIN, SLOPE_X, SLOPE_Y = range(3)
 DIFFERENCE_M = 0.05
-"""Half the distance over which a slope is taken where none is given, m."""
+"""Half the distance over which a gradient is taken where none is given, m."""
 
-_DOUBLE, _WHOLE = ctypes.c_double, ctypes.c_int64
-FUNCTION = ctypes.CFUNCTYPE(_DOUBLE, _DOUBLE, _DOUBLE, _DOUBLE, ctypes.POINTER(_DOUBLE), _WHOLE, _WHOLE)
-_SIGNATURE = types.float64(
-    types.float64, types.float64, types.float64, types.CPointer(types.float64), types.int64, types.int64
-)
+PLAIN = bool(getattr(config, "DISABLE_JIT", False))
+_NUMBER, _WHOLE = types.float64, types.int64
+_SIGNATURE = _NUMBER(_NUMBER, _NUMBER, _NUMBER, types.CPointer(_NUMBER), _WHOLE, _WHOLE)
 _MADE: dict[Barrier, tuple[int, Any]] = {}
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def address_of(barrier: Barrier) -> int:
-    """Where compiled code finds a barrier's function, in this process."""
+    """Where compiled code finds a barrier's function, in this process.
+
+    Raises:
+        ConfigError: the compiler does not take it.
+    """
     if barrier not in _MADE:
-        _MADE[barrier] = _compiled(barrier) or _interpreted(barrier)
+        try:
+            _MADE[barrier] = _made(barrier)
+        except (NumbaError, UnsupportedBytecodeError, TypeError, ValueError, NotImplementedError) as error:
+            raise ConfigError(
+                f"the compiler does not take barrier {barrier.name!r} ({_why(error)}); write it with numbers, arrays "
+                "and math only, as a plain function, and decorate what it calls with numba.njit"
+            ) from None
     return _MADE[barrier][0]
 
 
-def _compiled(barrier: Barrier) -> tuple[int, Any] | None:
-    """Address and owner of the compiled function; None where the compiler does not take it."""
-    if INTERPRETED:
-        return None
-    try:
-        made = cfunc(_SIGNATURE)(_parts_of(barrier))
-    except (NumbaError, UnsupportedBytecodeError, TypeError, ValueError, NotImplementedError) as error:
-        LOG.warning(
-            "barrier %r runs as plain Python, some microseconds a call: the compiler does not take it (%s)",
-            barrier.name,
-            _why(error),
-        )
-        return None
+def _why(error: Exception) -> str:
+    """What the compiler says, without its way there and its colours."""
+    lines = [_COLOUR.sub("", line).strip() for line in str(error).splitlines()]
+    said = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
+    return plain_text(said[0] if said else type(error).__name__)
+
+
+def _made(barrier: Barrier) -> tuple[int, Any]:
+    """Address of a barrier's compiled function, and what keeps it alive."""
+    options: Any = {} if PLAIN else {"nogil": True, "error_model": "numpy", "boundscheck": True}
+    compiled = (lambda function: function) if PLAIN else njit(**options)
+    function = _parts_of(compiled(barrier.margin), barrier.slope and compiled(barrier.slope), compiled)
+    if PLAIN:
+        return len(_MADE), function
+
+    def part_of(x: float, y: float, ahead: float, pointer: Any, size: int, part: int) -> float:
+        return float(function(x, y, ahead, carray(pointer, (size,)), part))
+
+    made = cfunc(_SIGNATURE)(part_of)
     return int(made.address or 0), made
 
 
-def _why(error: Exception) -> str:
-    """Kind of error and the line of its message that says most: numba's begin with the stage that failed."""
-    lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines() if line.strip()]
-    telling = [line for line in lines if "not" in line.lower() or "unknown" in line.lower()]
-    return ": ".join([type(error).__name__, *(telling or lines)[:1]])
-
-
-def _parts_of(barrier: Barrier) -> Any:
-    """The function to compile: margin, or slope along x or y, of a barrier."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "boundscheck": True}
-    margin, h = njit(**options)(barrier.margin), DIFFERENCE_M
+def _parts_of(margin: Any, slope: Any, compiled: Callable[[Any], Any]) -> Any:
+    """The margin of a barrier, or its gradient along x or y, in one function."""
+    h = DIFFERENCE_M
 
     def differences(x: float, y: float, ahead: float, values: Any) -> tuple[float, float]:
         along_x = (margin(x + h, y, ahead, values) - margin(x - h, y, ahead, values)) / (2.0 * h)
         return along_x, (margin(x, y + h, ahead, values) - margin(x, y - h, ahead, values)) / (2.0 * h)
 
-    slope = njit(**options)(differences if barrier.slope is None else barrier.slope)
+    gradient = slope or compiled(differences)
 
-    def part_of(x: float, y: float, ahead: float, pointer: Any, size: int, part: int) -> float:
-        values, found = carray(pointer, (size,)), math.nan
+    def part_of(x: float, y: float, ahead: float, values: Any, part: int) -> float:
+        found = math.nan
         try:
             if part == 0:
                 found = float(margin(x, y, ahead, values))
             elif part == 1:
-                found = float(slope(x, y, ahead, values)[0])
+                found = float(gradient(x, y, ahead, values)[0])
             else:
-                found = float(slope(x, y, ahead, values)[1])
-        except Exception:
+                found = float(gradient(x, y, ahead, values)[1])
+        except Exception:  # foreign code may raise anything
             found = math.nan
         return found
 
-    return part_of
-
-
-def _interpreted(barrier: Barrier) -> tuple[int, Any]:
-    """The same of a function in Python; the interpreter's lock is taken for each call."""
-
-    def part_of(x: float, y: float, ahead: float, pointer: Any, size: int, part: int) -> float:
-        try:
-            values = np.ctypeslib.as_array(pointer, (size,)) if size else np.zeros(0)
-            if part == MARGIN:
-                return float(barrier.margin(x, y, ahead, values))
-            if barrier.slope is not None:
-                return float(barrier.slope(x, y, ahead, values)[part - SLOPE_X])
-            dx, dy = (DIFFERENCE_M, 0.0) if part == SLOPE_X else (0.0, DIFFERENCE_M)
-            rise = barrier.margin(x + dx, y + dy, ahead, values) - barrier.margin(x - dx, y - dy, ahead, values)
-            return float(rise) / (2.0 * DIFFERENCE_M)
-        except Exception:  # foreign code may raise anything
-            return math.nan
-
-    made = FUNCTION(part_of)
-    return int(ctypes.cast(made, ctypes.c_void_p).value or 0), made
+    return compiled(part_of)
 
 
 @intrinsic
@@ -124,14 +107,12 @@ def _call(context: Any, address: Any, x: Any, y: Any, ahead: Any, values: Any, s
         form = ir.FunctionType(number, [number, number, number, number.as_pointer(), whole, whole])
         return builder.call(builder.inttoptr(address, form.as_pointer()), [x, y, ahead, array.data, size, part])
 
-    number, whole = types.float64, types.int64
-    return number(whole, number, number, number, values, whole, whole), build
+    return _NUMBER(_WHOLE, _NUMBER, _NUMBER, _NUMBER, values, _WHOLE, _WHOLE), build
 
 
-def _call_interpreted(address: int, x: float, y: float, ahead: float, values: Any, size: int, part: int) -> float:
-    pointer = values.ctypes.data_as(ctypes.POINTER(_DOUBLE))
-    return float(FUNCTION(int(address))(x, y, ahead, pointer, int(size), part))
+def _call_plain(address: int, x: float, y: float, ahead: float, values: Any, size: int, part: int) -> float:
+    return float(list(_MADE.values())[address][1](x, y, ahead, values[:size], part))
 
 
-call: Any = _call_interpreted if INTERPRETED else _call
+call: Any = _call_plain if PLAIN else _call
 """``call(address, x_m, y_m, ahead_s, values, size, part)``: what a barrier's function says, from compiled code."""

@@ -1,79 +1,64 @@
-"""Clearance from one pursuer that steers for the boat as hard as it is granted."""
+"""The worst of what opponents may do against a boat: rolled out as pursuers, or looked up where a table answers."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from ..jit import Array, lean_kernel
-from .clearance import Leg, Search, nearest_on
+from ..backup.paths import READY_SAMPLE
+from ..jit import lean_kernel
+from ..platforms import layout as L
+from ..tables.lookup import WHOLE_S
+from ..workspace import Scene
+from .clearance import FAR, MARGIN, nearest_on
+from .neighbours import may_pursue
+from .value_function import adversarial_for, margin_when_ready, table_answers, tabled, worst_at_once
 
+RUDDERS = (1.0, 0.6, 0.3, 0.0)
+"""Hardest turns pursuers are followed with, shares of the granted one.
+
+A hard turn costs speed, a gentle one time. Each of these turns as hard as its own entry and loses the speed of the next
+gentler one, and so does better than any that turn steadily in between; the last entry is only that, none is followed.
+"""
+FORGOTTEN_LOSS = 0.1
+"""Pursuers that lose less of their speed for good in their hardest turn are followed with that turn only."""
+LEAD_SHARE = 0.15
+"""Share of the time that the pursuit lasts by which a pursuer leads the boat at most."""
+CHASE_LEAD_SHARE = 0.3
+"""The same of one that is no faster than the boat and follows it for longer."""
 LONGEST_STRIDE = 6
 """Samples a pursuer far away is moved on at once."""
-
 CHASE_STRIDE = 4
 """Samples a pursuer that is near is moved on at once when it follows a boat that has long run straight."""
 
 
-class Pursuer(NamedTuple):
-    """A neighbour that steers for the boat, and what is granted to it.
-
-    Attributes:
-        x: its position now, east, m.
-        y: north, m.
-        ux: its heading as a unit vector, east.
-        uy: north.
-        speed_mps: its speed, m/s.
-        top_speed_mps: its top speed, m/s.
-        acc_mps2: its acceleration, m/s^2.
-        dec_mps2: rate at which it loses speed in a turn, m/s^2.
-        loss: share of its top speed it loses in a turn of ``turn_rad`` per sample.
-        turn_rad: its turn per sample, rad.
-        lead: steer for the meeting point instead of the boat itself.
-    """
-
-    x: float
-    y: float
-    ux: float
-    uy: float
-    speed_mps: float
-    top_speed_mps: float
-    acc_mps2: float
-    dec_mps2: float
-    loss: float
-    turn_rad: float
-    lead: bool
-
-
 class Pursuit(NamedTuple):
-    """For how long a pursuer is followed, and what that comes to.
+    """For how long a pursuer is followed, and what that comes to."""
 
-    Attributes:
-        sample_s: time between samples, s.
-        samples: last sample.
-        adverse: sample from which on it holds its course and speed.
-        closely: sample from which on the boat runs straight: it is followed in longer strides.
-        ahead: most samples by which it leads the boat.
-        fade: factor of negative margins per sample, 0 to 1.
-        to_end: follow it to the last sample also when it comes near no more.
-    """
-
-    sample_s: float
-    samples: int
-    adverse: int
-    closely: int
-    ahead: float
-    fade: float
-    to_end: bool
+    samples: int  # the last
+    adverse: int  # sample from which on it holds its course and speed
+    closely: int  # sample from which on the boat runs straight: it is followed in longer strides
+    ahead: float  # most samples by which it leads the boat
+    fade: float  # factor of negative margins per sample, 0 to 1
+    to_table: bool  # follow it to the end also when it comes near no more: a table is looked up there
 
 
 @lean_kernel
-def _faded(worst: float, weight: float, radius_m: float, leg: Leg) -> float:
+def closing(i: int, j: int, scene: Scene) -> float:
+    """Most the distance of a pair can shrink from sample to sample, m."""
+    state, boats = scene.state, scene.boats
+    top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
+    top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
+    return (top_i + top_j) * boats.sample_s
+
+
+@lean_kernel
+def _faded(worst: float, weight: float, radius_m: float, x0: float, y0: float, x1: float, y1: float) -> float:
     """Least margin over a leg, weighted when negative, where that is below ``worst``; else that."""
     limit = radius_m + (worst if worst >= 0.0 else worst / weight)
     if limit <= 0.0:
         return worst
-    _, x, y = nearest_on(leg)
+    _, x, y = nearest_on(x0, y0, x1, y1)
     square = x * x + y * y
     if square >= limit * limit:
         return worst
@@ -89,24 +74,17 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -
     and on its quarter comes nearest by closing in slowly on an all but parallel course.
     (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
     """
-    a = vx * vx + vy * vy - way * way
-    b = rx * vx + ry * vy
-    c = rx * rx + ry * ry
-    root = b * b - a * c
-    if root <= 0.0:
-        return rx + ahead * vx, ry + ahead * vy
-    root = math.sqrt(root)
-    time = -1.0
-    if abs(a) < 1e-9:
-        time = -0.5 * c / b if b < 0.0 else -1.0
-    else:
-        early, late = (-b - root) / a, (-b + root) / a
-        if early > late:
-            early, late = late, early
-        time = early if early > 0.0 else late
-    if time <= 0.0:
-        return rx + ahead * vx, ry + ahead * vy
-    time = min(time, ahead)
+    a, b, c = vx * vx + vy * vy - way * way, rx * vx + ry * vy, rx * rx + ry * ry
+    root, time = b * b - a * c, -1.0
+    if root > 0.0:
+        root = math.sqrt(root)
+        if abs(a) < 1e-9:
+            time = -0.5 * c / b if b < 0.0 else -1.0
+        else:
+            one, other = (-b - root) / a, (-b + root) / a
+            early, late = min(one, other), max(one, other)
+            time = early if early > 0.0 else late
+    time = min(time, ahead) if time > 0.0 else ahead
     return rx + time * vx, ry + time * vy
 
 
@@ -125,97 +103,222 @@ def _turn_towards(ux: float, uy: float, ax: float, ay: float, c: float, s: float
 
 
 @lean_kernel
-def _speed_after(speed_mps: float, steady_mps: float, acc_mps2: float, dec_mps2: float, time_s: float) -> float:
-    """Speed some time on of a pursuer whose speed in the present turn would settle at the steady one."""
+def _speed_after(j: int, speed_mps: float, steady_mps: float, time_s: float, scene: Scene) -> float:
+    """Speed some time on of pursuer j whose speed in the present turn would settle at the steady one."""
     if speed_mps > steady_mps:
-        return max(steady_mps, speed_mps - dec_mps2 * time_s)
-    return min(steady_mps, speed_mps + acc_mps2 * time_s)
+        return max(steady_mps, speed_mps - scene.boats.granted_dec_mps2[j] * time_s)
+    return min(steady_mps, speed_mps + scene.boats.granted_acc_mps2[j] * time_s)
 
 
 @lean_kernel
-def stays_away(
-    own: Array, x: float, y: float, way: float, samples: int, closing_m: float, radius_m: float, cap_m: float
-) -> bool:
-    """Whether nobody who starts at (x, y) and goes at most ``way`` per sample, m, lowers the margin from its cap.
+def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene) -> bool:
+    """Whether no run of opponent j, however it steers, ends with less than the cap: then none needs to be made.
 
-    That is wherever it steers: the boat stays clear of all points it may have reached by then, and by so much more that
-    the longest strides of `roll_out_pursuer` make no difference. False when in doubt; for the rest see there.
+    The boat stays clear of all points it may have reached by then, and by so much more that the longest strides of
+    `_run_pursuer` make no difference. No decision changes by it; without it those of herons in games, mostly far from
+    everybody, take a third longer. False when in doubt.
     """
-    spare = 0.5 * CHASE_STRIDE
-    root, per_m = radius_m + cap_m, 1.0 / closing_m
+    path, course, spare = scene.path[slot], scene.course[j], 0.5 * CHASE_STRIDE
+    way = max(scene.boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED]) * scene.boats.sample_s
+    root, per_m = scene.radius[i, j] + scene.tuning.margin_cap_m, 1.0 / closing(i, j, scene)
     k = 0
-    while k <= samples:
-        dx, dy = own[k, 0] - x, own[k, 1] - y
+    while k <= lasts:
+        dx, dy = path[k, 0] - course[0], path[k, 1] - course[1]
         free = (math.sqrt(dx * dx + dy * dy) - way * k - root) * per_m - spare
         if not free >= 1.0:
             return False
-        k += int(min(free, samples + 1))
+        k += int(min(free, lasts + 1))
     return True
 
 
 @lean_kernel
-def roll_out_pursuer(own: Array, pursuer: Pursuer, pursuit: Pursuit, search: Search, end: Array) -> tuple[float, float]:
-    """Clearance from a neighbour on a collision course: it steers for the boat with lead, as hard as it is granted.
+def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: bool, scene: Scene) -> Pursuit:
+    """A pursuit of boat i by opponent j that lasts so many samples, or until thrust on the path in ``slot`` is full.
+
+    How far the pursuer leads the boat goes by how long it lasts, and negative margins fade as much by the end of any.
+    """
+    boats = scene.boats
+    samples = min(lasts, int(scene.ready[slot, READY_SAMPLE])) if to_table else lasts
+    fear_s = adversarial_for(i, j, scene.state[i, L.SPEED], scene)
+    adverse = samples if fear_s >= WHOLE_S else min(samples, math.ceil(fear_s / boats.sample_s))
+    ahead = (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts
+    return Pursuit(samples, adverse, closely, ahead, boats.fade[i] ** (boats.pursuit_samples[i] / lasts), to_table)
+
+
+@lean_kernel
+def _stride(k: int, free: int, pursuit: Pursuit) -> int:
+    """Samples a pursuer is moved on at once from sample k, before which it cannot come near for so many."""
+    left, stride = pursuit.samples - k, 1 if k < pursuit.closely else CHASE_STRIDE
+    if free > 0:
+        stride = max(stride, min(free, LONGEST_STRIDE))
+    return min(stride, left, pursuit.adverse - k if k < pursuit.adverse else left)
+
+
+@lean_kernel
+def _hardest_turn(j: int, manner: int, scene: Scene) -> tuple[float, float]:
+    """Turn, rad per sample, of opponent j in a manner, also from rest: it comes soon; share of speed lost in it."""
+    turn = RUDDERS[manner // 2] * (math.radians(scene.boats.granted_turn_dps[j]) * scene.boats.sample_s)
+    return turn, scene.boats.granted_loss[j] * RUDDERS[manner // 2 + 1]
+
+
+@lean_kernel
+def _run_pursuer(i: int, j: int, slot: int, manner: int, pursuit: Pursuit, floor_m: float, scene: Scene) -> float:
+    """Margin, m, from opponent j that steers for boat i, turning as hard as its manner says, with lead or without.
 
     Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
-    for pursuers rarely play as well as they are granted to.
-
-    Args:
-        own: the boat's path, m.
-        pursuer: the neighbour.
-        pursuit: how long it is followed.
-        search: how closely it is looked at.
-        end: where it is then, shape (5,): x, y, m, heading as a unit vector, speed m/s; written where the search comes
-            to the end.
-
-    Returns:
-        The margin, m, and the factor that negative margins have faded by at the end.
+    for pursuers rarely play as well as they are granted to. The search stops once the margin is below the floor; its
+    cap is one for all, since a pursuer's strides depend on it and must not depend on who is looked at before.
     """
-    x, y, ux, uy, speed_mps = pursuer.x, pursuer.y, pursuer.ux, pursuer.uy, pursuer.speed_mps
-    closing_m, samples, adverse, turn_rad = search.closing_m, pursuit.samples, pursuit.adverse, pursuer.turn_rad
-    root = search.radius_m + search.cap_m
-    fastest_mps = max(pursuer.top_speed_mps, speed_mps)
-    worst = search.cap_m
+    boats, own, course = scene.boats, scene.path[slot], scene.course[j]
+    x, y, ux, uy, speed_mps = course[0], course[1], course[2], course[3], scene.state[j, L.SPEED]
+    sample_s, radius_m, closing_m = boats.sample_s, scene.radius[i, j], closing(i, j, scene)
+    turn, loss = _hardest_turn(j, manner, scene)
+    fastest_mps, worst, weight = max(boats.params[j, L.MAX_SPEED], speed_mps), scene.tuning.margin_cap_m, 1.0
+    root, c1, s1 = radius_m + worst, math.cos(turn), math.sin(turn)
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
-    weight = 1.0
-    c1, s1 = math.cos(turn_rad), math.sin(turn_rad)
-    x0, y0 = own[0, 0] - x, own[0, 1] - y
-    k = 0
-    while k < samples:
-        stride = 1 if k < pursuit.closely else CHASE_STRIDE
-        square = x0 * x0 + y0 * y0
+    x0, y0, k = own[0, 0] - x, own[0, 1] - y, 0
+    while k < pursuit.samples:
+        free, square = 0, x0 * x0 + y0 * y0
         if square > worth:
             free = int((math.sqrt(square) - root) / closing_m)
-            if free >= samples - k and not pursuit.to_end:
+            if free >= pursuit.samples - k and not pursuit.to_table:
                 break
-            stride = max(stride, min(free, LONGEST_STRIDE))
-        stride = min(stride, samples - k)
-        if k < adverse:
-            stride = min(stride, adverse - k)
-        c, s = c1, s1
+        stride, c, s = _stride(k, free, pursuit), c1, s1
         for _ in range(stride - 1):
             c, s = c * c1 - s * s1, s * c1 + c * s1
         k += stride
         ax, ay = own[k, 0] - x, own[k, 1] - y
-        if pursuer.lead:
-            before = k - stride
-            vx, vy = (own[k, 0] - own[before, 0]) / stride, (own[k, 1] - own[before, 1]) / stride
-            ax, ay = _aim(x0, y0, vx, vy, speed_mps * pursuit.sample_s, pursuit.ahead)
-        time_s, new_speed = stride * pursuit.sample_s, speed_mps
-        if k <= adverse:
+        if manner % 2 == 1:  # with lead
+            vx, vy = (own[k, 0] - own[k - stride, 0]) / stride, (own[k, 1] - own[k - stride, 1]) / stride
+            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, pursuit.ahead)
+        time_s, new_speed = stride * sample_s, speed_mps
+        if k <= pursuit.adverse:
             ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
-            steady_mps = fastest_mps * (1.0 - pursuer.loss * rudder)
-            new_speed = _speed_after(speed_mps, steady_mps, pursuer.acc_mps2, pursuer.dec_mps2, time_s)
+            new_speed = _speed_after(j, speed_mps, fastest_mps * (1.0 - loss * rudder), time_s, scene)
         way = 0.5 * (speed_mps + new_speed) * time_s
-        speed_mps = new_speed
-        x += way * ux
-        y += way * uy
+        speed_mps, x, y = new_speed, x + way * ux, y + way * uy
         x1, y1 = own[k, 0] - x, own[k, 1] - y
         for _ in range(stride):
             weight *= pursuit.fade
-        worst = _faded(worst, weight, search.radius_m, Leg(x0, y0, x1, y1))
-        if worst < search.floor_m:
-            return worst, weight
+        worst = _faded(worst, weight, radius_m, x0, y0, x1, y1)
+        if worst < floor_m:
+            return worst
         x0, y0 = x1, y1
+    if not pursuit.to_table:
+        return worst
+    end = scene.pursuer
     end[0], end[1], end[2], end[3], end[4] = x, y, ux, uy, speed_mps
-    return worst, weight
+    value_m = margin_when_ready(i, j, slot, scene)
+    return min(worst, value_m * weight if value_m < 0.0 else value_m)
+
+
+@lean_kernel
+def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> float:
+    """Margin, m, of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
+
+    The worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. The one that
+    came below its floor last is looked at first. They are followed until the boat's thrust is full and as long beyond
+    as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust is full,
+    of an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
+    """
+    boats, ready = scene.boats, int(scene.ready[slot, READY_SAMPLE])
+    to_table = ready >= 0 and tabled(i, j, scene)
+    closely = boats.pursuit_samples[i] + boats.thrust_samples[i]
+    if ready >= 0:
+        closely = min(closely, ready + boats.pursuit_samples[i])
+    lasts = closely + (0 if to_table else boats.chase_samples[i, j])
+    if not to_table and _never_near(i, j, slot, lasts, scene):
+        return scene.tuning.margin_cap_m
+    pursuit, worst_m = _pursuit_of(i, j, slot, lasts, closely, to_table, scene), FAR
+    manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
+    first = min(scene.first_manner[i, j], manners - 1)
+    for number in range(manners):
+        manner = _first_then_rest(first, number)
+        worst_m = min(worst_m, _run_pursuer(i, j, slot, manner, pursuit, floor_m, scene))
+        if worst_m < floor_m:
+            scene.first_manner[i, j] = manner
+            break
+    return worst_m
+
+
+@lean_kernel
+def _first_then_rest(first: int, number: int) -> int:
+    """Entry ``number`` of the list 0, 1, 2, ... with ``first`` moved to its front."""
+    if number == 0:
+        return first
+    return number if number > first else number - 1
+
+
+@lean_kernel
+def _note(margin_m: float, j: int, slot: int, scene: Scene) -> None:
+    """Note a margin from boat j if it is the least."""
+    if margin_m < scene.threat_m[slot]:
+        scene.threat_m[slot], scene.threat_by[slot] = margin_m, j
+
+
+@lean_kernel
+def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) -> bool:
+    """Note the worst that opponent j may do; False when it is short of its target and below the level.
+
+    An outnumbered boat is also rolled out for a while, and looked up from there; on a manoeuvre on which thrust never
+    is full it is lost.
+    """
+    target_m = scene.threat_target_m[i, j]
+    floor_m, by_table = min(target_m, level_m), table_answers(i, j, slot, scene)
+    if by_table:
+        margin_m = worst_at_once(i, j, slot, scene)
+        scene.table_m[slot] = min(scene.table_m[slot], margin_m)
+        scene.sealed[slot] = scene.sealed[slot] or margin_m < target_m
+    else:
+        margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
+    scene.threats_m[slot, j] = margin_m
+    _note(margin_m, j, slot, scene)
+    if not margin_m >= floor_m or not by_table or not scene.outnumbered[i]:
+        return margin_m >= floor_m
+    floor_m, margin_m = min(scene.joint_target_m[i], level_m), -scene.radius[i, j]
+    if scene.ready[slot, READY_SAMPLE] >= 0.0:
+        margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
+    scene.joint_m[slot] = min(scene.joint_m[slot], margin_m)
+    _note(margin_m, j, slot, scene)
+    return margin_m >= floor_m
+
+
+@lean_kernel
+def _falls_short(i: int, slot: int, scene: Scene) -> bool:
+    """Whether a margin against pursuers on the path in ``slot`` is short of what boat i must keep."""
+    short = scene.outnumbered[i] and not scene.joint_m[slot] >= scene.joint_target_m[i]
+    for j in range(scene.ours.shape[0]):
+        short = short or not scene.threats_m[slot, j] >= scene.threat_target_m[i, j]
+    return short
+
+
+@lean_kernel
+def worst_pursuer(i: int, slot: int, level_m: float, scene: Scene) -> None:
+    """Clearance from each pursuer, in ``scene.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
+
+    What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre, nor on the targets.
+
+    Of one that is short of its target (``scene.fails``) and below the level nothing more is to be known: the search
+    stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
+
+    ``scene.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
+    first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
+    """
+    team = scene.boats.team
+    if not scene.pursuers_known[slot]:
+        scene.pursuers_known[slot], scene.sealed[slot], scene.threat_by[slot] = True, False, -1
+        scene.threats_m[slot, :], scene.joint_m[slot] = FAR, FAR
+        scene.table_m[slot], scene.threat_m[slot] = FAR, FAR
+        first = scene.first_pursuer[i]
+        for number in range(team.shape[0]):
+            j = _first_then_rest(first, number)
+            near = j != i and scene.near[i, j] and not scene.breach[i, j]
+            if not near or scene.ours[j] or team[i] == team[j] or not may_pursue(j, scene):
+                continue
+            if not _clear_of_threat(i, j, slot, level_m, scene):
+                scene.first_pursuer[i], scene.pursuers_known[slot] = j, False
+                break
+        scene.sealed[slot] = scene.sealed[slot] and scene.threat_m[slot] >= scene.table_m[slot]
+    scene.fails[slot] = _falls_short(i, slot, scene)
+    if scene.threat_m[slot] < scene.clear[slot, MARGIN]:
+        scene.clear[slot, MARGIN], scene.bound[slot] = scene.threat_m[slot], scene.threat_by[slot]

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from ..arrays import NoNumbersError, numbers
-from ..entry_points import load_others
 from ..exceptions import ConfigError
+from ..foreign import load_others
 from ..jit import Array
+from ..workspace import MOST_VALUES
 
 GROUP = "steerclear.barriers"
 """Entry points of this group name barriers of other packages: a `Barrier`, a function that builds one, or a module that
 registers some."""
-MOST_VALUES = 64
-"""Numbers that one barrier may be given."""
 
 Margin = Callable[[float, float, float, Array], float]
 Slope = Callable[[float, float, float, Array], tuple[float, float]]

@@ -18,7 +18,7 @@ from ..commands import Commands
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
-from ..tracking.tracks import whole_steps
+from ..tracks import whole_steps
 from .fleet_file import FleetFile
 from .messages import Answer, BoatReading, Snapshot, Tick
 from .model_error import AHEAD_S as PREDICTED_S

@@ -16,7 +16,7 @@ import numpy as np
 from ..jit import Array
 from ..platforms import Platform, fresh_state, step_boat
 from ..platforms import layout as L
-from ..tracking.tracks import thrust_at, whole_steps
+from ..tracks import thrust_at, whole_steps
 from .messages import BoatReading
 
 GAIN = 0.5

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..jit import Array, BoolArray
 from ..platforms import layout as L
-from ..tracking.tracks import run_on_commands, steps_of_delay
+from ..tracks import run_on_commands, steps_of_delay
 from .fleet_file import FleetFile
 from .messages import Action, BoatReading, Sent
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..backup.rank import ALL
 from ..jit import lean_kernel
-from ..scene import Scene
+from ..workspace import Scene
 
 NOT_OURS, NONE, NOT_YET = -1, -2, -3
 """Boats of no group: not ours; of those whose wanted commands keep everything; not looked at yet."""
@@ -18,15 +18,15 @@ NOT_OURS, NONE, NOT_YET = -1, -2, -3
 @lean_kernel
 def _gather(first: int, group: int, scene: Scene) -> bool:
     """Give a number to boat ``first`` and to all who are of its group; whether any of them is short of something."""
-    ours, work, groups, queue = scene.ours, scene.work, scene.plan.group, scene.plan.movers
+    ours, groups, queue = scene.ours, scene.group, scene.movers
     groups[first], queue[0] = group, first
     done, found, short = 0, 1, False
     while done < found:
         i = queue[done]
         done += 1
-        short = short or work.kept[i] < ALL
+        short = short or scene.kept[i] < ALL
         for j in range(ours.shape[0]):
-            if groups[j] == NOT_YET and work.near[i, j]:
+            if groups[j] == NOT_YET and scene.near[i, j]:
                 groups[j], queue[found] = group, j
                 found += 1
     if not short:
@@ -37,8 +37,8 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
 
 @lean_kernel
 def make_groups(scene: Scene) -> int:
-    """Number, in ``plan.group``, the groups in which a wanted command is short of something; returns how many."""
-    ours, groups = scene.ours, scene.plan.group
+    """Number, in ``scene.group``, the groups in which a wanted command is short of something; returns how many."""
+    ours, groups = scene.ours, scene.group
     for i in range(ours.shape[0]):
         groups[i] = NOT_YET if ours[i] else NOT_OURS
     count = 0
@@ -51,14 +51,14 @@ def make_groups(scene: Scene) -> int:
 @lean_kernel
 def open_group(group: int, scene: Scene) -> None:
     """Make the boats of one group those that are decided for."""
-    ours, groups = scene.ours, scene.plan.group
+    ours, groups = scene.ours, scene.group
     for i in range(ours.shape[0]):
         ours[i] = groups[i] == group
-        scene.plan.moving[i] = False
+        scene.moving[i] = False
 
 
 @lean_kernel
 def close_groups(scene: Scene) -> None:
     """Make all boats of ours those that are decided for again."""
     for i in range(scene.ours.shape[0]):
-        scene.ours[i] = scene.plan.group[i] != NOT_OURS
+        scene.ours[i] = scene.group[i] != NOT_OURS

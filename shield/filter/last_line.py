@@ -9,20 +9,18 @@ rest. Where a command has neither, the stop of now or the manoeuvre of the last 
 from __future__ import annotations
 
 from ..backup.assign import refresh
-from ..backup.candidates import IN_MEMORY, candidate, remembered
-from ..backup.laying import lay_path
+from ..backup.family import IN_MEMORY, candidate, remembered
 from ..backup.paths import sail
-from ..barriers.circles import to_circle
+from ..backup.rollout import lay_path
 from ..barriers.clearance import FAR
+from ..barriers.shapes import goes_through, to_circle, to_wall
 from ..barriers.static import STATIC, beyond_line
-from ..barriers.walls import goes_through, to_wall
 from ..jit import Array, copy_row, lean_kernel
-from ..plan import BEST_EFFORT, STOPPED
 from ..platforms import layout as L
 from ..platforms.step import step_boat
-from ..scene import Scene, Static
-from .exact_check import predict
-from .switching import set_off
+from ..workspace import BEST_EFFORT, STOPPED, Scene, Static
+from .backup_switch import set_off
+from .nominal import predict
 
 AT_REST_MPS = 0.05
 """Speed below which a boat is taken to lie still, m/s."""
@@ -60,7 +58,7 @@ def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: 
 
     At no speed it is told to stop from the first step on. A boat that is too near already must come no nearer.
     """
-    boats, static, row, dt_s = scene.boats, scene.static, scene.work.row, scene.tuning.model_s
+    boats, static, row, dt_s = scene.boats, scene.static, scene.row, scene.tuning.model_s
     params, x, y = boats.params[i], scene.state[i, L.X], scene.state[i, L.Y]
     least = min(0.0, _room(x, y, static)) - ROUNDING_M
     copy_row(row, start)
@@ -88,47 +86,46 @@ def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: 
 @lean_kernel
 def _stop(i: int, scene: Scene) -> None:
     """Tell boat i to stop on its course, and rate that."""
-    plan, work = scene.plan, scene.work
-    plan.commands[i, 0], plan.commands[i, 1] = 0.0, 0.0
-    predict(i, plan.commands, scene)
+    scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
+    predict(i, scene.command, scene)
     lay_path(i, i, 1.0, 0.0, 0.0, 1, scene)
     refresh(i, scene)
-    plan.reason[i], work.bound[i] = STOPPED, STATIC
+    scene.reason[i], scene.bound[i] = STOPPED, STATIC
 
 
 @lean_kernel
 def _go_on_as_before(i: int, scene: Scene) -> bool:
     """Make boat i's command that of the manoeuvre in memory, if it has one and it stays clear."""
-    state, memory, plan, work = scene.state, scene.memory, scene.plan, scene.work
-    if not remembered(i, 0, state[i, L.HEADING], memory):
+    state = scene.state
+    if not remembered(i, 0, state[i, L.HEADING], scene):
         return False
     side, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
     if not _stays_clear(i, state[i], side, togo, speed, scene):
         return False
     lay_path(i, i, side, togo, speed, 0, scene)
     set_off(i, scene)
-    predict(i, plan.commands, scene)
-    side, togo, speed = candidate(i, IN_MEMORY, 0.0, work.next_state[i, L.HEADING], scene)
+    predict(i, scene.command, scene)
+    side, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.next_state[i, L.HEADING], scene)
     lay_path(i, i, side, togo, speed, 1, scene)
     refresh(i, scene)
-    plan.reason[i], work.bound[i] = BEST_EFFORT, STATIC
+    scene.reason[i], scene.bound[i] = BEST_EFFORT, STATIC
     return True
 
 
 @lean_kernel
 def keep_last_line(scene: Scene) -> None:
     """Stop the boats that are beyond the hard line, or that would else touch what nobody may."""
-    state, static, work = scene.state, scene.static, scene.work
+    state, static = scene.state, scene.static
     for i in range(scene.ours.shape[0]):
         if not scene.ours[i]:
             continue
         if beyond_line(i, scene):
             _stop(i, scene)
         elif static.last_circles + static.last_segments > 0 and not _stays_clear(
-            i, work.next_state[i], 1.0, 0.0, 0.0, scene
+            i, scene.next_state[i], 1.0, 0.0, 0.0, scene
         ):
-            ahead = work.plan[i]
-            if _stays_clear(i, work.next_state[i], ahead[0], ahead[1], ahead[2], scene):
+            ahead = scene.manoeuvre[i]
+            if _stays_clear(i, scene.next_state[i], ahead[0], ahead[1], ahead[2], scene):
                 continue
             if _stays_clear(i, state[i], 1.0, 0.0, 0.0, scene) or not _go_on_as_before(i, scene):
                 _stop(i, scene)

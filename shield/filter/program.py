@@ -2,7 +2,7 @@
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
-with scaled inputs z (see `rows`). An answer counts only when it satisfies every row by our own residuals.
+with scaled inputs z (see `qp`). An answer counts only when it satisfies every row by our own residuals.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import logging
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 import qpsolvers
-from scipy.sparse import csc_matrix, identity
+from scipy.sparse import csc_matrix
 
 from ..exceptions import SolverError
 from ..jit import Array
@@ -24,7 +24,7 @@ from ..jit import Array
 logger = logging.getLogger(__name__)
 
 COMPILED = "active_set"
-"""The solver of our own, see `active_set`; the others are names of qpsolvers."""
+"""The solver of our own, `qp.project`; the others are names of qpsolvers."""
 
 ROW_TOLERANCE = 1e-4
 """Largest accepted violation of a unit-length row; the exact check of the command follows anyway."""
@@ -74,32 +74,21 @@ def check_solver(name: str) -> None:
         )
 
 
-@lru_cache(maxsize=64)
-def _identity(n: int) -> Array:
-    return np.eye(n)
-
-
 def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
     """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
     with np.errstate(all="ignore"):
         return bool((C @ z >= d - tolerance).all())
 
 
-@lru_cache(maxsize=64)
-def _sparse_identity(n: int) -> Any:
-    return identity(n, format="csc")
-
-
 def _ask(program: Program, solver: str) -> Any:
     """What the backend answers, whatever that is."""
-    options = OPTIONS.get(solver, {})
-    if solver in qpsolvers.dense_solvers:
-        identity_n = _identity(program.z0.shape[0])
-        return qpsolvers.solve_qp(identity_n, -program.z0, -program.C, -program.d, solver=solver, **options)
-    with warnings.catch_warnings():  # these also warn of programs without an answer: that is read from the answer
+    dense = solver in qpsolvers.dense_solvers
+    with warnings.catch_warnings():  # some also warn of programs without an answer: that is read from the answer
         warnings.simplefilter("ignore")
-        identity_n, rows = _sparse_identity(program.z0.shape[0]), csc_matrix(-program.C)
-        return qpsolvers.solve_qp(identity_n, -program.z0, rows, -program.d, solver=solver, **options)
+        weight, rows = np.eye(len(program.z0)), -program.C
+        matrices = (weight, rows) if dense else (csc_matrix(weight), csc_matrix(rows))
+        options = OPTIONS.get(solver, {})
+        return qpsolvers.solve_qp(matrices[0], -program.z0, matrices[1], -program.d, solver=solver, **options)
 
 
 def solve(program: Program, solver: str) -> Array | None:

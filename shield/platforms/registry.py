@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from ..entry_points import load_others
 from ..exceptions import PlatformError
+from ..foreign import load_others
 from .files import is_path, load_platform
 from .platform import Platform
 from .proving import reference_models

@@ -88,14 +88,6 @@ def table_range_m(tables: Tables, table: int) -> float:
 
 
 @lean_kernel
-def own_speed_cell(tables: Tables, table: int, own_mps: float) -> int:
-    """Cell of own speed a value is looked up in."""
-    axes = tables.axes[table]
-    cells = int(axes[N_OWN]) - 1
-    return even_place(own_mps / axes[OWN_TOP] * cells, cells)[0]
-
-
-@lean_kernel
 def _speed_places(axes: Array, own_mps: float, other_mps: float) -> tuple[tuple[int, float], tuple[int, float]]:
     n_own, n_other = int(axes[N_OWN]) - 1, int(axes[N_OTHER]) - 1
     return even_place(own_mps / axes[OWN_TOP] * n_own, n_own), even_place(

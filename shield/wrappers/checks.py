@@ -10,7 +10,8 @@ import numpy as np
 
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
-from ..game_facts import (
+from ..shield import Shield
+from .game_facts import (
     GameFacts,
     check_step,
     facts_of_games,
@@ -18,7 +19,6 @@ from ..game_facts import (
     warn_of_distances,
     with_distances,
 )
-from ..shield import Shield
 from .readers import reader_of
 from .reading import GameReader
 

@@ -7,8 +7,17 @@ from typing import Any
 from ..batch import BatchedShield
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
-from ..game_facts import check_step, facts_of_games, warn_of_distances, with_distances
-from ..same_games import platforms_of
+from ..jit import Array, BoolArray
+from .driving import driven_boats
+from .game_facts import (
+    check_same_games,
+    check_step,
+    facts_of_games,
+    platforms_of,
+    warn_of_distances,
+    with_distances,
+)
+from .masks import BatchedMasks
 from .mctf import surroundings_of
 from .reading import team_number
 
@@ -38,3 +47,56 @@ def games_shield(
     warn_of_distances(settings, facts, number)
     around = surroundings_of(core, number, keep_out)
     return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number)
+
+
+def check_games(shield: BatchedShield, core: Any, team: int | None = None) -> None:
+    """Check that games are those a shield was built for: boats, teams, number and step.
+
+    The log says, once, if it keeps boats less far apart than the games count collisions.
+
+    Args:
+        shield: the shield.
+        core: the `BatchedMctf`.
+        team: the team it decides for; None: any.
+
+    Raises:
+        ConfigError: they are not.
+    """
+    check_same_games(core, len(shield.reason), shield.platforms, shield.team, shield.config.dt_s)
+    warn_of_distances(shield.config, facts_of_games(core), team)
+
+
+class GamesFilter:
+    """The command filter of a shield for games, see `BatchedShield.filter_for`; copies of it decide by copies of it."""
+
+    def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
+        self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
+        self._checked: Any = None
+        self._masks: BatchedMasks | None = None
+
+    def __call__(self, core: Any, commands: Array) -> Array:
+        """Safe commands (B, n, 2) for games that the shield was built for.
+
+        Raises:
+            ConfigError: they are others, or it has begun to serve the other team.
+        """
+        if self._checked is not core:
+            check_games(self.shield, core, self.team)
+            self._checked = core
+        if self.shield.serves not in (None, self.team):
+            raise ConfigError("this shield has begun to serve the other team; build one for each, or reset() it")
+        self.shield.serves = self.team
+        return self.shield.decide(core.state, commands, *self._about(core))
+
+    def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array | None]:
+        """Boats to decide for, boats on the other side, and what drives those that the games drive."""
+        ours = (core.team == self.team) & ~core.is_disabled
+        ours = ours if self.shield_autopilot else ours & ~core.driven
+        return ours, ~core.on_side, driven_boats(core)
+
+    def safe_actions(self, core: Any, actions: Array) -> BoolArray:
+        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `wrappers.masks`."""
+        if self._masks is None or self._masks.candidates != actions.shape[2]:
+            self._masks = BatchedMasks(self.shield, actions.shape[2])
+        ours, visiting, driven = self._about(core)
+        return self._masks.safe(core.state, actions, ours, visiting, driven)

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..exceptions import FleetError
 from ..fleet import Fleet
-from ..game_facts import GameFacts, facts_of_games
 from ..jit import Array
 from ..surroundings import Surroundings
-from ..tracking.driving import driven_boats
+from .driving import driven_boats
+from .game_facts import GameFacts, facts_of_games
 from .reading import KEEP_OUT_MARGIN_M, obstacles_of
 
 

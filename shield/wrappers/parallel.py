@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 
-from ..actions import DISCRETE
 from ..commands import Commands
 from ..decision import Decisions
-from ..game_facts import GameFacts
 from ..jit import Array
 from ..platforms import get_platform
 from ..shield import Shield
+from .actions import DISCRETE
 from .checks import check_unchanged, facts_now, refuse_second, shield_for, words_of
+from .game_facts import GameFacts
 from .readers import reader_of
 from .reading import GameReader, one_game_shield, parallel_game, team_number
 from .serving import begin_serving, check_serving

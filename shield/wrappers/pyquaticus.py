@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..actions import DISCRETE, Command, Seat, check_agents, plain_action, read_action
 from ..fleet import Fleet
-from ..game_facts import GameFacts
 from ..jit import Array, IntArray
 from ..platforms import layout as L
 from ..surroundings import Surroundings
+from .actions import DISCRETE, Command, Seat, check_agents, plain_action, read_action
+from .game_facts import GameFacts
 from .pyquaticus_checks import check_env, check_pairs, moves_of, platforms_of_players, step_of
 from .pyquaticus_driving import driven_players
 from .reading import KEEP_OUT_MARGIN_M

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..jit import Array
-from ..tracking.driving import LEAST_MPS, inwards, nearest, time_until
+from .driving import LEAST_MPS, inwards, nearest, time_until
 
 UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
 Row = tuple[float, float, float, float]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ..entry_points import load_others
 from ..exceptions import ConfigError
+from ..foreign import load_others
 from .mctf import MctfReader
 from .pyquaticus import PyquaticusReader
 from .reading import GameReader

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 from ..exceptions import ConfigError
 from ..fleet import Fleet
-from ..game_facts import GameFacts
 from ..jit import Array
 from ..surroundings import Surroundings
+from .game_facts import GameFacts
 
 KEEP_OUT_MARGIN_M = 0.1
 """Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""

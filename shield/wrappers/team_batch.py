@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actions import DISCRETE, Seat, read_flat
 from ..arrays import NoNumbersError, numbers
 from ..batch import BatchedShield
 from ..exceptions import ConfigError, GameError, PolicyError
 from ..jit import Array, BoolArray
 from ..platforms import layout as L
+from .actions import DISCRETE, Seat, read_flat
+from .games_shield import check_games
 from .reading import team_number
 from .tallies import Tallies, changed_by
 
@@ -294,5 +295,5 @@ def _filter_of(shield: Any, core: Any, team: int) -> Any:
     """
     if not isinstance(shield, BatchedShield):
         raise ConfigError(f"{type(shield).__name__} is no shield of a batch of games; give games_shield(core)")
-    shield.check_games(core)
+    check_games(shield, core)
     return shield.filter_for(team)

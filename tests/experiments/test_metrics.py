@@ -81,3 +81,4 @@ def test_every_metric_says_what_it_is_and_keys_are_no_two_alike():
 def test_every_reason_for_which_a_command_is_changed_has_a_meaning():
     assert {name.lower() for name in Reason.__members__} - {"passed", "not_covered"} <= set(metrics.REASONS)
     assert Reason["ESCAPE"] is Reason.BACKUP, "the name in results of 0.2.0 and before"
+    assert Reason["QP"] is Reason.LEAST_CHANGE, "the name in logs of 0.8.0 and before"

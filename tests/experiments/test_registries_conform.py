@@ -9,7 +9,7 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.conformance import NotConforming, check_platform, check_policy, check_reader
 from steerclear.policies.entrants import catalogue
-from steerclear.shield import Shield, entry_points
+from steerclear.shield import Shield, foreign
 from steerclear.shield.barriers import registry as barriers
 from steerclear.shield.barriers.registry import Barrier, get_barrier
 from steerclear.shield.exceptions import ConfigError, PlatformError
@@ -122,29 +122,29 @@ def broken():
 
 def test_entry_points_bring_platforms_and_broken_ones_are_told(apart, monkeypatch, caplog):
     gig = replace(get_platform("heron"), name="gig")
-    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken), Point(lambda: gig)])
-    entry_points.load_others.cache_clear()
+    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken), Point(lambda: gig)])
+    foreign.load_others.cache_clear()
     assert get_platform("gig") == gig
     assert "platforms of package.boats cannot be loaded: ImportError" in caplog.text
-    entry_points.load_others.cache_clear()
+    foreign.load_others.cache_clear()
 
 
 def test_entry_points_bring_barriers_and_broken_ones_are_told(monkeypatch, caplog):
     monkeypatch.setattr(barriers, "BARRIERS", {})
     buoy = Barrier("buoy", lambda x, y, ahead, values: math.hypot(x, y) - 3.0)
-    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken), Point(lambda: buoy)])
-    entry_points.load_others.cache_clear()
+    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken), Point(lambda: buoy)])
+    foreign.load_others.cache_clear()
     assert get_barrier("buoy") is buoy
     assert "barriers of package.boats cannot be loaded: ImportError" in caplog.text
-    entry_points.load_others.cache_clear()
+    foreign.load_others.cache_clear()
 
 
 def test_entry_points_bring_readers_and_broken_ones_are_told(apart, monkeypatch, caplog):
-    monkeypatch.setattr(entry_points, "entry_points", lambda group: [Point(broken)])
-    entry_points.load_others.cache_clear()
+    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken)])
+    foreign.load_others.cache_clear()
     assert isinstance(reader_of(MctfEnv("aamas2024")), MctfReader)
     assert "readers of package.boats cannot be loaded: ImportError" in caplog.text
-    entry_points.load_others.cache_clear()
+    foreign.load_others.cache_clear()
 
 
 class Shifted(MctfReader):

@@ -16,7 +16,7 @@ from steerclear.experiments.commands.console import ExitCode, err, out
 from steerclear.experiments.faults import fault_words, machine_words
 from steerclear.experiments.tables import titled
 from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
-from steerclear.shield.visible import is_drawn, visible
+from steerclear.shield.foreign import is_drawn, visible
 from typer.testing import CliRunner
 
 HOSTILE = [

@@ -19,8 +19,8 @@ from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.posts import row
 from steerclear.policies.entrants.sight import Boat, look
-from steerclear.shield.entry_points import load_others
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.foreign import load_others
 
 SIDES = {"blue": slice(0, 3), "red": slice(3, 6)}
 FLAG = frozenset({(13, 3), (13, 4), (12, 3), (12, 4)})

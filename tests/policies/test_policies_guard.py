@@ -7,7 +7,7 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.words import describe_error
+from steerclear.shield.foreign import describe_error
 
 
 def run(team, game, steps=1, own=("agent_0", "agent_1", "agent_2")):

@@ -20,6 +20,7 @@ class Run(NamedTuple):
     certificate_m: np.ndarray
     intervened: np.ndarray | None = None
     cut_short: np.ndarray | None = None
+    solver: np.ndarray | None = None
 
     def closest(self, own):
         """Least distance between a boat of ``own`` (n,) bool and any boat, per game."""
@@ -44,7 +45,7 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
     """Run a single shield on; ``wanted(step, state)`` gives (n, 2) speed m/s and relative heading deg."""
     params, state = packed(fleet.platforms), fleet.state.copy()
     fill(state, params)
-    position, reason, sent, certificate, intervened, cut = [state[:, :2].copy()], [], [], [], [], []
+    position, reason, sent, certificate, intervened, cut, solver = [state[:, :2].copy()], [], [], [], [], [], []
     for step in range(steps):
         now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
         decisions = shield.decide(now, Commands.relative_deg(wanted(step, state)), surroundings)
@@ -55,7 +56,8 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
         certificate.append(decisions.certificate_m.copy())
         intervened.append(decisions.intervened.copy())
         cut.append(decisions.cut_short.copy())
-    return Run(*(np.array(kept) for kept in (position, reason, sent, certificate, intervened, cut)))
+        solver.append(decisions.solver.copy())
+    return Run(*(np.array(kept) for kept in (position, reason, sent, certificate, intervened, cut, solver)))
 
 
 def sail_games(config, state, platforms, team, wanted, steps, ours=None, surroundings=None):

@@ -8,8 +8,8 @@ from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import FleetError
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.driving import driven_boats
 from steerclear.shield.wrappers import games_shield
+from steerclear.shield.wrappers.driving import driven_boats
 from steerclear.shield.wrappers.mctf import surroundings_of
 
 GAMES = 3

@@ -12,6 +12,7 @@ from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.commands import Commands
 from steerclear.shield.decision import Decisions
+from steerclear.shield.workspace import OURS
 
 TEAM = (0, 0, 0, 1, 1)
 
@@ -62,7 +63,7 @@ def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
     assert (team.feared_s[3:] > 0.0).all()
     shield = Shield(coordination="per_boat")
     shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5))
-    assert shield._deciders.asked.ours.any(axis=1).tolist() == [True, True, True, False, False]
+    assert (shield._deciders.scene.given[:, :, OURS] != 0.0).any(axis=1).tolist() == [True, True, True, False, False]
     assert (each.reason[3:] == Reason.NOT_COVERED).all()
 
 
@@ -89,7 +90,7 @@ def test_a_newcomers_decider_knows_what_the_others_were_told():
         shield.decide(fleet, relative((2.0, 5.0), (2.0, -5.0)))
     more = fleet_of([(-30.0, 0, 0, 2.0), (0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0, 0], names=("a", "b", "c"))
     shield.decide(more, relative((2.0, 0.0), (2.0, 5.0), (2.0, -5.0)))
-    assert np.isfinite(shield._deciders.pending[:, :, 1:]).all()
+    assert np.isfinite(shield._deciders.scene.pending[:, :, 1:]).all()
 
 
 @pytest.mark.parametrize("solver", ["active_set", "daqp"])

@@ -75,9 +75,10 @@ def test_mirrored_water_gives_the_mirrored_command():
 
 def test_a_decision_says_everything():
     decision = Shield().decide(head_on(5.5), relative((2, 0), (2, 0)))[0]
-    assert decision.reason in (Reason.QP, Reason.BACKUP)
+    assert decision.reason in (Reason.LEAST_CHANGE, Reason.BACKUP)
     assert decision.binding == ("boat_1",)
     assert decision.certificate_m >= 0
+    assert decision.solver == (None if decision.reason is Reason.BACKUP else "line_search")
     assert decision.sent_heading_rad != decision.wanted_heading_rad
 
 
@@ -91,7 +92,7 @@ def test_in_breach_the_boats_part():
     ("change", "text"),
     [
         ({"state": np.zeros((2, 3))}, "state has shape"),
-        ({"team": np.zeros(3, np.int64)}, "team has 3 entries for 2 boats"),
+        ({"team": np.zeros(3, np.int64)}, "team has shape"),
         ({"age_s": np.array([0.0, 9.0])}, "9.00 s old"),
         ({"age_s": np.array([0.0, np.nan])}, "age_s"),
     ],

@@ -7,7 +7,7 @@ from shield_scenes import head_on
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.tracks import steps_of_delay
+from steerclear.shield.tracks import steps_of_delay
 
 STEPS = 3
 

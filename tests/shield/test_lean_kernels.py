@@ -9,10 +9,7 @@ import pytest
 import steerclear.shield
 from numba.core.dispatcher import Dispatcher
 from steerclear.env.arrays import Games, Rules
-from steerclear.shield.memory import Memory
-from steerclear.shield.plan import Plan
-from steerclear.shield.scene import Boats, Scene, Static, Tuning
-from steerclear.shield.work import Work
+from steerclear.shield.workspace import Boats, Registered, Scene, Static, Tuning
 
 ROOT = Path(steerclear.shield.__file__).parent.parent
 FOLDERS = ("shield", "env", "policies")
@@ -52,7 +49,7 @@ def test_there_are_both_kinds():
     assert any(map(gives_array, KERNELS.values())), "some counted ones return arrays: the test can tell"
 
 
-SHARED = (Boats, Static, Tuning, Memory, Work, Plan, Scene, Rules, Games)
+SHARED = (Boats, Static, Registered, Tuning, Scene, Rules, Games)
 TAKE_SHARED = [name for name, function in KERNELS.items() if {*get_type_hints(function.py_func).values()} & {*SHARED}]
 
 

@@ -9,9 +9,9 @@ from steerclear.env import mctf_v0
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.shield import Commands, Fleet, Shield
-from steerclear.shield.actions import DISCRETE
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.wrappers import MctfVectorEnv, ShieldedParallelEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers.actions import DISCRETE
 
 ACTIONS = [Commands.game_deg(np.tile(pair * (2.0, 1.0), (3, 1))) for pair in DISCRETE]
 

@@ -67,7 +67,7 @@ def test_a_boat_that_passed_takes_part_where_the_best_of_another_would_hit_it():
     )
     decisions = Shield().decide(fleet, Commands.relative_deg(np.zeros((4, 2))))
     assert decisions[3].reason is Reason.BEST_EFFORT
-    assert decisions[2].reason is Reason.BACKUP
+    assert decisions[2].reason in (Reason.BACKUP, Reason.LEAST_CHANGE)
     assert decisions[2].certificate_m >= 0.0
 
 

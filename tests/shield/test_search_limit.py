@@ -5,11 +5,11 @@ import pytest
 from shield_loops import Wander, sail, sail_games, scattered
 from shield_scenes import distances
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.backup.effort import PATH_COST, PURSUER_COST
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import fresh_state
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.workspace import PATH_COST, PURSUER_COST
 
 LEAST = 1000.0
 """The lowest limit there is."""
@@ -57,7 +57,7 @@ def test_no_decision_costs_much_more_than_its_limit():
     for limit in (LEAST, np.inf):
         shield = Shield(search_limit=limit)
         shield.decide(*crowd(1))
-        spent[limit] = shield._deciders._desk.scene.work.spent[0]
+        spent[limit] = shield._deciders.scene.spent[0]
     once = 12 * (PATH_COST + 19.0 + 8 * PURSUER_COST)
     assert spent[LEAST] < LEAST + 8 * once
     assert spent[np.inf] > 3.0 * spent[LEAST]

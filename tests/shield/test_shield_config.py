@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.backup.families import CERTIFICATES
+from steerclear.shield.backup.family import CERTIFICATES
 from steerclear.shield.config import COORDINATION, PROFILES, RANGES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 

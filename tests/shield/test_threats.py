@@ -8,8 +8,9 @@ from shield_loops import packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
-from steerclear.shield.filter.screening import set_targets
+from steerclear.shield.filter.nominal import set_targets
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.workspace import N_MEMORY
 
 CAP_M = ShieldConfig().margin_cap_m
 
@@ -20,42 +21,42 @@ def remembered(rows, team, platform):
     fleet.state[:, L.THRUST] = 100.0
     shield = Shield(profile="rammers")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
-    scene = shield._deciders._desk.scene
+    scene = shield._deciders.scene
     set_targets(scene)
-    return decisions, scene.memory, scene.work
+    return decisions, scene.memory[:, N_MEMORY:], scene
 
 
 @pytest.mark.parametrize(("platform", "top", "ahead_m"), [("surveyor", 3.0, 33.0), ("heron", 2.0, 11.0)])
 def test_a_team_mate_close_by_does_not_hide_the_fear(platform, top, ahead_m):
     rows = [(0, 0, 0, top), (2.7, 0, 0, top), (0, ahead_m, 180, top)]
-    decisions, memory, work = remembered(rows, [0, 0, 1], platform)
+    decisions, memory, scene = remembered(rows, [0, 0, 1], platform)
     assert decisions.certificate_m[0] < 0.2  # of the team-mate
-    assert memory.threat_m[0, 2] > decisions.certificate_m[0] + 0.1
+    assert memory[0, 2] > decisions.certificate_m[0] + 0.1
     decay = math.exp(-0.1 * (0.3 if platform == "surveyor" else 1.0))
-    assert work.threat_target_m[0, 2] == pytest.approx(decay * min(memory.threat_m[0, 2], CAP_M))
-    assert work.target[0] == pytest.approx(decay * decisions.certificate_m[0])
+    assert scene.threat_target_m[0, 2] == pytest.approx(decay * min(memory[0, 2], CAP_M))
+    assert scene.target[0] == pytest.approx(decay * decisions.certificate_m[0])
 
 
 def test_each_opponent_that_is_looked_up_has_its_own():
     rows = [(0, 0, 0, 3.0), (3.0, 34.0, 180, 3.0), (-20.0, -26.0, 0.0, 3.0)]
-    _, memory, work = remembered(rows, [0, 1, 1], "surveyor")
-    least, other = sorted(memory.threat_m[0, 1:])
+    _, memory, scene = remembered(rows, [0, 1, 1], "surveyor")
+    least, other = sorted(memory[0, 1:])
     assert 0.0 < least < other
-    assert work.threat_target_m[0, 1] != work.threat_target_m[0, 2]
+    assert scene.threat_target_m[0, 1] != scene.threat_target_m[0, 2]
 
 
 def test_of_boats_that_run_pursuers_through_the_least_counts_for_all():
     rows = [(0, 0, 0, 2.0), (1.0, 10.0, 180, 2.0), (-9.0, -9.0, 45.0, 2.0)]
     _, memory, _ = remembered(rows, [0, 1, 1], "heron")
-    assert memory.threat_m[0, 1] == memory.threat_m[0, 2] > 0.0
+    assert memory[0, 1] == memory[0, 2] > 0.0
 
 
 @pytest.mark.parametrize("platform", ["surveyor", "heron"])
 def test_after_a_breach_nothing_is_asked_that_was_not_there(platform):
     rows = [(0, 0, 0, 1.0), (0, 2.3, 180, 1.0), (12.0, 12.0, 225.0, 1.0)]
-    _, memory, work = remembered(rows, [0, 1, 1], platform)
-    assert (memory.threat_m[0] <= 0.0).all()
-    np.testing.assert_array_equal(work.threat_target_m[0], 0.0)
+    _, memory, scene = remembered(rows, [0, 1, 1], platform)
+    assert (memory[0] <= 0.0).all()
+    np.testing.assert_array_equal(scene.threat_target_m[0], 0.0)
 
 
 def test_two_side_by_side_do_not_let_a_line_of_opponents_come_up():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shield_scenes import signatures
-from steerclear.shield import Commands, Fleet, Shield, deciders, shield, warming
+from steerclear.shield import Commands, Fleet, Shield, decide, shield
 from steerclear.shield.exceptions import PlatformError
 
 
@@ -29,13 +29,13 @@ def stages_run(monkeypatch):
     """Names of the stages that are run where a backend of qpsolvers stands between them."""
     seen = set()
     for name in STAGES:
-        stage = getattr(deciders, name)
-        monkeypatch.setattr(deciders, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+        stage = getattr(decide, name)
+        monkeypatch.setattr(decide, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
     return seen
 
 
 def test_what_is_run_needs_every_stage(stages_run):
-    fleet, wanted, around = warming.tight_spot()
+    fleet, wanted, around = shield._tight_spot()
     decisions = Shield(solver="daqp").decide(fleet, wanted, around)
     assert stages_run == set(STAGES)
     np.testing.assert_array_equal(Shield().decide(fleet, wanted, around).reason, decisions.reason)
@@ -81,7 +81,7 @@ def test_every_stage_is_compiled_whatever_the_settings(stages_run, settings):
 def test_nothing_is_compiled_after_it():
     Shield().warm_up()
     before = signatures()
-    fleet, wanted, around = warming.tight_spot()
+    fleet, wanted, around = shield._tight_spot()
     guard = Shield()
     for _ in range(3):
         guard.decide(fleet, wanted, around)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.driving import LEAST_MPS, inwards, nearest, time_until
+from steerclear.shield.wrappers.driving import LEAST_MPS, inwards, nearest, time_until
 
 UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
 NORMALISED_M = 1.5

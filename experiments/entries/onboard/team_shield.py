@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 from steerclear.experiments.entries.onboard.state import GameSpec, Observation, fleet_of, see
-from steerclear.shield.actions import Command, Seat, read_action
 from steerclear.shield.commands import Commands
 from steerclear.shield.config import ShieldConfig
+from steerclear.shield.foreign import describe_error
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.shield import Shield
 from steerclear.shield.surroundings import Surroundings
-from steerclear.shield.words import describe_error
+from steerclear.shield.wrappers.actions import Command, Seat, read_action
 
 logger = logging.getLogger("steerclear")
 

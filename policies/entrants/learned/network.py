@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.shield.actions import DISCRETE
+from steerclear.shield.wrappers.actions import DISCRETE
 
 from ..undertow.shape import NAMES
 

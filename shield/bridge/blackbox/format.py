@@ -182,7 +182,7 @@ def _boats(
     if decisions is not None:
         columns["sent"] = decisions.sent.values.tolist()
         columns["why"] = [Reason(int(reason)).name for reason in decisions.reason]
-        for name in ("intervened", "reason", "certificate_m", "slack_m", "bound", "cut_short"):
+        for name in ("intervened", "reason", "certificate_m", "slack_m", "bound", "cut_short", "solver"):
             if getattr(decisions, name) is not None:
                 columns[name] = getattr(decisions, name).tolist()
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -275,6 +275,7 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
             slack_m=slack_m,
             bound=bound,
             cut_short=_column(rows, "cut_short", np.bool_),
+            solver=_column(rows, "solver", np.int64),
             solve_time_s=record.solve_time_s,
             area=None if around is None else around.field,
         )

@@ -70,6 +70,7 @@ class BoatRecord(Record):
     slack_m: Number = UNSET
     bound: int | UnsetType = UNSET
     cut_short: bool | UnsetType = UNSET
+    solver: int | UnsetType = UNSET
 
 
 class FaultRecord(Record):

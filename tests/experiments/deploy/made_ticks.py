@@ -28,7 +28,7 @@ def made_tick(fleet, now_s=5.0, names=None, **changes):
         wanted=Commands.absolute_rad(_rad(wanted)),
         sent=Commands.absolute_rad(_rad(sent)),
         intervened=np.array([False, True, True, False, False, False]),
-        reason=np.array([Reason.PASSED, Reason.QP, Reason.BEST_EFFORT, *[Reason.NOT_COVERED] * 3]),
+        reason=np.array([Reason.PASSED, Reason.LEAST_CHANGE, Reason.BEST_EFFORT, *[Reason.NOT_COVERED] * 3]),
         certificate_m=np.array([math.inf, 0.25, -1.5, *[math.nan] * 3]),
         slack_m=np.zeros(6),
         bound=np.array([-1, 5, -2, -1, -1, -1]),

@@ -23,7 +23,7 @@ from steerclear.experiments.deploy.quiet import (
     undisturbed,
     warm_up,
 )
-from steerclear.shield import Commands, Shield, ShieldConfig, deciders
+from steerclear.shield import Commands, Shield, ShieldConfig, decide
 from steerclear.shield.bridge.messages import Action
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.fleet import Fleet
@@ -110,8 +110,8 @@ def test_nothing_is_said_before_the_first_tick():
 def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
     seen, stages = set(), {"begin", "begin_group", "linearise", "accept", "end_group", "end"}
     for name in stages:
-        stage = getattr(deciders, name)
-        monkeypatch.setattr(deciders, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+        stage = getattr(decide, name)
+        monkeypatch.setattr(decide, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
     warm_up(fleet_of(2).with_shield(position_error_m=0.3, delay_s=0.1, solver="daqp"))
     assert seen == stages
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from steerclear.shield import ShieldConfig
-from steerclear.shield.setup import boats_of
+from steerclear.shield.model import boats_of
 
 
 def looked_at(kinds, team, **settings):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from stages import screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings
-from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.backup.rank import (
     ALL,
     BOATS,
@@ -19,6 +18,7 @@ from steerclear.shield.backup.rank import (
     better,
     rank_path,
 )
+from steerclear.shield.backup.rollout import lay_path
 from steerclear.shield.platforms.usv import fresh_state
 
 MANOEUVRES = [(side, turn, 1.5) for side in (1.0, -1.0) for turn in (0.0, 45.0, 90.0, 180.0)] + [(1.0, 0.0, 0.0)]
@@ -37,7 +37,7 @@ def ranked(at, manoeuvre, best=WORST):
     """Rank of a manoeuvre of boat 0 one step on, and its path, (samples, 2), until a half turn could be over."""
     lay_path(0, 0, *manoeuvre, 1, at.scene)
     rank = Rank(*rank_path(0, 0, best, at.scene))
-    return rank, at.work.path[0, : at.boats.static_samples[0] + 1].copy()
+    return rank, at.path[0, : at.boats.static_samples[0] + 1].copy()
 
 
 def depth_of(at, path):

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.laying import lay_path
 from steerclear.shield.backup.paths import Manoeuvre, Span, sail, trace_path
+from steerclear.shield.backup.rollout import lay_path
 from steerclear.shield.barriers.neighbours import find_neighbours
-from steerclear.shield.barriers.opponents import clear_of_pursuer
+from steerclear.shield.barriers.pursuit import clear_of_pursuer
+from steerclear.shield.model import CHASE_S, boats_of
 from steerclear.shield.platforms import PLATFORMS, get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
-from steerclear.shield.setup import CHASE_S, boats_of
 
 TOP_MPS = 2.0
 STEP_S = 0.02
@@ -112,10 +112,15 @@ def table_m(bearing_deg, far_m, **settings):
     other = fresh_state(far_m * math.sin(bearing), far_m * math.cos(bearing), 0.0, TOP_MPS)
     own[L.THRUST] = other[L.THRUST] = 100.0
     rows = np.array([own, other])
-    at = stages_of(ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, **settings}), rows, ["heron"] * 2, [0, 1])
+    at = stages_of(
+        ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, "margin_cap_m": 50.0, **settings}),
+        rows,
+        ["heron"] * 2,
+        [0, 1],
+    )
     find_neighbours(at.scene)
     lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
-    return clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+    return clear_of_pursuer(0, 1, 0, -1e6, at.scene)
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.laying import lay_path
+from steerclear.shield.backup.rollout import lay_path
 from steerclear.shield.barriers.neighbours import find_neighbours
-from steerclear.shield.barriers.opponents import clear_of_pursuer
+from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, largest_turn
@@ -52,7 +52,7 @@ def chase(platform, own, pursuer, side, turn_deg, most, steps):
 def modelled(name, own, pursuer, side, turn_deg):
     """Least margin, m, the certificate expects of the same backup, and the steps over which it looks."""
     at = stages_of(
-        ShieldConfig(profile="rammers", buffer_m=0.0, certificate="turning_circle"),
+        ShieldConfig(profile="rammers", buffer_m=0.0, certificate="turning_circle", margin_cap_m=50.0),
         np.array([own, pursuer]),
         (name, name),
         (0, 1),
@@ -60,7 +60,7 @@ def modelled(name, own, pursuer, side, turn_deg):
     find_neighbours(at.scene)
     top = get_platform(name).max_speed_mps
     lay_path(0, 0, side, turn_deg, top, 0, at.scene)
-    margin_m = clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0)
+    margin_m = clear_of_pursuer(0, 1, 0, -1e6, at.scene)
     return margin_m, int(at.boats.pursuit_samples[0]) * at.boats.stride
 
 

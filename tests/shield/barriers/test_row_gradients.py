@@ -5,11 +5,11 @@ import pytest
 from shield_loops import fill, packed
 from stages import built, screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings
-from steerclear.shield.backup.laying import lay_path
+from steerclear.shield.backup.rollout import lay_path
 from steerclear.shield.barriers.boats import clear_of_boat
 from steerclear.shield.barriers.clearance import FAR, MARGIN
 from steerclear.shield.barriers.static import clear_of_near_obstacles, clear_of_static
-from steerclear.shield.filter import exact_check, rows
+from steerclear.shield.filter import nominal, qp
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn
@@ -36,42 +36,42 @@ class Linearised:
 
     def __init__(self, at, count, rows_built):
         self.at, self.count = at, count
-        self.row = next(r for r in range(rows_built) if at.plan.label[r, 1] != rows.LIMITS)
-        self.manoeuvres = at.work.plan[: len(at.state)].copy()
-        self.z = at.plan.z_now[: 2 * count].copy()
+        self.row = next(r for r in range(rows_built) if at.label[r, 1] != qp.LIMITS)
+        self.manoeuvres = at.manoeuvre[: len(at.state)].copy()
+        self.z = at.z_now[: 2 * count].copy()
 
     def move(self, z):
         """Lay the paths of the movers under inputs z, their manoeuvres as they are."""
         at = self.at
-        commands = at.plan.commands.copy()
+        commands = at.command.copy()
         for m in range(self.count):
-            i = at.plan.movers[m]
+            i = at.movers[m]
             params = at.boats.params[i]
             speed = z[2 * m + 1] / np.sqrt(at.tuning.speed_weight) * params[L.MAX_SPEED]
-            turn = z[2 * m] * at.plan.gain[i, 2]
+            turn = z[2 * m] * at.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
-            exact_check.predict(i, commands, at.scene)
+            nominal.predict(i, commands, at.scene)
             lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
 
     def margin(self, z):
         """Exact margin of the row's boat from what the row is about."""
         at = self.at
         self.move(z)
-        i, j = at.plan.label[self.row]
+        i, j = at.label[self.row]
         if j >= 0:
-            clear_of_boat(i, j, at.work.path[i], at.scene, -FAR, FAR)
-        elif j == rows.NEAR_OBSTACLES:
-            clear_of_near_obstacles(i, i, at.scene, FAR, at.work.out)
+            clear_of_boat(i, j, at.path[i], at.scene, -FAR, FAR)
+        elif j == qp.NEAR_OBSTACLES:
+            clear_of_near_obstacles(i, i, at.scene, FAR, at.out)
         else:
-            clear_of_static(i, i, at.scene, at.work.out)
-        return at.work.out[MARGIN]
+            clear_of_static(i, i, at.scene, at.out)
+        return at.out[MARGIN]
 
     def gradients(self):
         """(coefficients of the row before it was scaled, finite differences), each (2 movers,)."""
         at, r, n = self.at, self.row, 2 * self.count
-        C, d = at.plan.C[r, :n].copy(), at.plan.d[r]
-        target = at.work.target[at.plan.label[r, 0]] if at.plan.label[r, 1] != rows.ALL_STATIC else 0.0
-        aim_m = 0.0 if at.plan.label[r, 1] >= 0 else rows.STATIC_AIM_M
+        C, d = at.C[r, :n].copy(), at.d[r]
+        target = at.target[at.label[r, 0]] if at.label[r, 1] != qp.ALL_STATIC else 0.0
+        aim_m = 0.0 if at.label[r, 1] >= 0 else qp.STATIC_AIM_M
         lack = target + aim_m - self.margin(self.z)
         scale = lack / (d - C @ self.z)
         steps = STEP * np.eye(n)
@@ -86,7 +86,7 @@ def linearised(random, name, team, gap_m, tries, surroundings=None):
         at = stages_of(config, meeting(random, name, gap_m * random.uniform(0.6, 1.2)), [name] * 2, team, surroundings)
         top = get_platform(name).max_speed_mps
         wanted = np.column_stack([random.uniform(0.3, 0.95, 2) * top, random.uniform(-2.0, 2.0, 2)])
-        if screened(at, wanted) or at.work.breach.any():
+        if screened(at, wanted) or at.breach.any():
             continue
         count, found = built(at)
         if found > 4 * count:
@@ -133,10 +133,10 @@ def flag(y):
 @pytest.mark.parametrize(
     ("around", "about"),
     [
-        (edge, rows.ALL_STATIC),
-        (rule, rows.ALL_STATIC),
-        (wall, rows.NEAR_OBSTACLES),
-        (flag, rows.NEAR_OBSTACLES),
+        (edge, qp.ALL_STATIC),
+        (rule, qp.ALL_STATIC),
+        (wall, qp.NEAR_OBSTACLES),
+        (flag, qp.NEAR_OBSTACLES),
     ],
 )
 def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around, about):
@@ -148,7 +148,7 @@ def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around,
         if screened(at, np.array([[2.9, 1.0]])):
             continue
         task = Linearised(at, *built(at))
-        if at.plan.label[task.row, 1] == about:
+        if at.label[task.row, 1] == about:
             a, b = task.gradients()
             told.append(a[0])
             measured.append(b[0])
@@ -159,11 +159,11 @@ def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around,
 
 def test_rows_are_of_unit_length_and_limits_are_exact():
     task = next(linearised(np.random.default_rng(4), "heron", [0, 0], 5.0, 50))
-    plan, n = task.at.plan, 2 * task.count
+    plan, n = task.at, 2 * task.count
     count, found = built(task.at)
     norms = np.linalg.norm(plan.C[:found, :n], axis=1)
     np.testing.assert_allclose(norms, 1.0, atol=1e-12)
-    boxes = plan.label[:found, 1] == rows.LIMITS
+    boxes = plan.label[:found, 1] == qp.LIMITS
     assert boxes.sum() == 4 * count
     root = np.sqrt(task.at.tuning.speed_weight)
     for z, inside in (([0.5, 0.5 * root] * 2, True), ([1.01, 0.0] * 2, False), ([0.0, 1.01 * root] * 2, False)):

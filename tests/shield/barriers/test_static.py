@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.barriers.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
 from steerclear.shield.barriers.static import Sampling, clear_of_constraints
-from steerclear.shield.scene import Registered, Static
 from steerclear.shield.shared import share
+from steerclear.shield.workspace import Static, new_registered
 
 NO_EDGE = np.array([-np.inf, -np.inf, np.inf, np.inf])
 NONE = np.zeros((0, 3))
@@ -17,12 +17,7 @@ NO_WALL = np.zeros((0, 4))
 def things(circles=NONE, walls=NO_WALL, hull_m=0.0, side_m=0.0, field=NO_EDGE, keep_out=NONE):
     """Static constraints, as compiled code takes them."""
     line = np.array([-np.inf, -np.inf, np.inf, np.inf])
-    return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0, line, 0, 0, 0.0))
-
-
-NONE_REGISTERED = Registered(
-    np.zeros(0, np.int64), np.zeros((0, 64)), np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0, 0.0
-)
+    return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0, line, 0, 0, 0.0, new_registered()))
 
 
 def clear_of(near_only, path, static, here=None, near=None, side=None, drift_m=0.0, grace=1.0):
@@ -31,7 +26,7 @@ def clear_of(near_only, path, static, here=None, near=None, side=None, drift_m=0
     here, near = path[0] if here is None else np.asarray(here), last if near is None else near
     side = last if side is None else side
     sampling = Sampling(near, side, last, 0.1, 0.5, 1.0, drift_m, grace)
-    clear_of_constraints(near_only, here, path, sampling, static, NONE_REGISTERED, out)
+    clear_of_constraints(near_only, here, path, sampling, static, out)
     return out
 
 

@@ -8,18 +8,16 @@ import pytest
 from shield_loops import step_all
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.laying import NO_PURSUERS, PURSUERS, PURSUERS_TILL_READY, lay_path, pursuers_run
 from steerclear.shield.backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
+from steerclear.shield.backup.rollout import NO_PURSUERS, PURSUERS, PURSUERS_TILL_READY, lay_path, pursuers_run
 from steerclear.shield.barriers.neighbours import find_neighbours
-from steerclear.shield.barriers.opponents import _run_pursuer, clear_of_pursuer, pursuit_of
+from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.batch import BatchedShield
+from steerclear.shield.model import boats_of
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.limits import limits_of
 from steerclear.shield.platforms.usv import fresh_state
-from steerclear.shield.setup import boats_of
-from steerclear.shield.tables.files import load_table, stack_tables
-from steerclear.shield.tables.lookup import WHOLE_S, table_value
 
 SURVEYOR = get_platform("surveyor")
 
@@ -38,7 +36,7 @@ def opponent(x, y, heading_deg):
 
 def stages(*rows, other="surveyor", **settings):
     at = stages_of(
-        ShieldConfig(**{"profile": "rammers", **settings}),
+        ShieldConfig(**{"profile": "rammers", "margin_cap_m": 50.0, **settings}),
         np.array(rows),
         ["surveyor"] + [other] * (len(rows) - 1),
         [0] + [1] * (len(rows) - 1),
@@ -60,44 +58,11 @@ def test_it_is_noted_where_thrust_is_full_by_the_full_model(side, turn_deg):
         togo = sail(params, row, side, togo, 3.0, 0.1)
         step += 1
     k = (step - 1) // at.boats.stride
-    assert at.work.ready[0, READY_SAMPLE] == k > 0
-    np.testing.assert_allclose(at.work.path[0, k], row[:2], atol=1e-9)
-    assert at.work.ready[0, READY_SPEED] == pytest.approx(row[L.SPEED], abs=1e-9)
-    turned = math.degrees(at.work.ready[0, READY_HEADING]) - row[L.HEADING]
+    assert at.ready[0, READY_SAMPLE] == k > 0
+    np.testing.assert_allclose(at.path[0, k], row[:2], atol=1e-9)
+    assert at.ready[0, READY_SPEED] == pytest.approx(row[L.SPEED], abs=1e-9)
+    turned = math.degrees(at.ready[0, READY_HEADING]) - row[L.HEADING]
     assert (turned + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-7)
-
-
-def value_margin(at, tables):
-    """Margin by the table where the boat's thrust is full and the pursuer's run ended, None beyond the table."""
-    ready, pursuer = at.work.ready[0], at.work.pursuer
-    there = pursuer[:2] - at.work.path[0, int(ready[READY_SAMPLE])]
-    headings = ready[READY_HEADING], math.atan2(pursuer[2], pursuer[3])
-    value = table_value(tables, 0, WHOLE_S, *there, *headings, ready[READY_SPEED], pursuer[4])
-    return value - at.work.radius[0, 1] - at.boats.table_margin_m if value < 6.0 - 1e-9 else None
-
-
-def test_what_is_told_is_the_least_of_the_runs_and_of_the_values_at_their_ends():
-    tables, from_value, from_run = stack_tables([load_table("surveyor", "surveyor")]), 0, 0
-    random = np.random.default_rng(2)
-    for _ in range(300):
-        angle, far = random.uniform(-math.pi, math.pi), random.uniform(15.0, 60.0)
-        at = stages(
-            slow_boat(),
-            opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + random.uniform(90.0, 270.0)),
-        )
-        laid(at, 1.0, 90.0)
-        lasts = int(at.boats.pursuit_samples[0] + min(at.work.ready[0, READY_SAMPLE], at.boats.thrust_samples[0]))
-        runs, values, pursuit = [], [], pursuit_of(0, 1, 0, lasts, lasts, True, at.scene)
-        for manner in range(6):
-            margin_m, faded = _run_pursuer(0, 1, 0, manner, pursuit, at.scene, -1e6, 1e6)
-            runs.append(margin_m)
-            margin = value_margin(at, tables)
-            if margin is not None:
-                values.append(margin if margin >= 0.0 else margin * faded)
-        assert clear_of_pursuer(0, 1, 0, at.scene, -1e6, 1e6) == pytest.approx(min(runs + values), abs=1e-9)
-        from_value += bool(values) and min(values) < min(runs)
-        from_run += not values or min(runs) < min(values)
-    assert from_value > 2 < from_run
 
 
 def test_pursuers_are_run_through_only_as_far_as_needed():
@@ -109,7 +74,7 @@ def test_pursuers_are_run_through_only_as_far_as_needed():
     ]:
         at = stages(*rows, other=other)
         laid(at)
-        assert pursuers_run(0, 0, at.boats, at.work) == how
+        assert pursuers_run(0, 0, at.scene) == how
 
 
 def nimble(thrust, speed_mps, *others):
@@ -117,7 +82,9 @@ def nimble(thrust, speed_mps, *others):
     row = fresh_state(0.0, 0.0, 0.0, speed_mps)
     row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
     rows = np.array([row, *others])
-    at = stages_of(ShieldConfig(profile="rammers"), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1))
+    at = stages_of(
+        ShieldConfig(profile="rammers", margin_cap_m=50.0), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1)
+    )
     find_neighbours(at.scene)
     return at
 
@@ -131,7 +98,7 @@ def herons_samples(at):
 def test_nimble_boats_are_followed_until_their_thrust_is_back_and_as_long_again_as_with_all_of_it(thrust, speed_mps):
     at = nimble(thrust, speed_mps, fresh_state(0.0, 12.0, 180.0, 2.0))
     pursuit, build = herons_samples(at)
-    at.work.path[0] = np.nan
+    at.path[0] = np.nan
     laid(at, 1.0, 30.0, 2.0)
     row, togo, step, params = at.state[0].copy(), 30.0, 0, get_platform("heron").pack()
     while step == 0 or row[L.THRUST] < 85.0 or (step - 1) % at.boats.stride:
@@ -139,8 +106,8 @@ def test_nimble_boats_are_followed_until_their_thrust_is_back_and_as_long_again_
         step += 1
     ready = (step - 1) // at.boats.stride
     last = min(ready + pursuit, pursuit + build)
-    assert np.isfinite(at.work.path[0, : last + 1]).all()
-    assert np.isnan(at.work.path[0, last + 1 :]).all()
+    assert np.isfinite(at.path[0, : last + 1]).all()
+    assert np.isnan(at.path[0, last + 1 :]).all()
 
 
 def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
@@ -148,7 +115,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
     for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
         at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
         laid(at, 1.0, 0.0, 2.0)
-        assert (clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0) < 0.0) == fails
+        assert (clear_of_pursuer(0, 1, 0, -1e6, at.scene) < 0.0) == fails
 
 
 @pytest.mark.parametrize("wanted_mps", [2.0, 0.0])
@@ -187,23 +154,11 @@ def test_a_boat_that_is_always_slow_is_at_full_thrust_with_what_it_has():
     assert boats.ready_thrust[0] == pytest.approx(0.85 * steady)
 
 
-def test_margins_of_long_pursuits_fade_as_much_by_their_end():
-    faded = []
-    for thrust, speed_mps in [(0.0, 0.0), (40.0, 1.0), (100.0, 2.0)]:
-        at = nimble(thrust, speed_mps, fresh_state(0.0, 30.0, 180.0, 2.0))
-        laid(at, 1.0, 0.0, 2.0)
-        pursuit, build = herons_samples(at)
-        lasts = min(int(at.work.ready[0, READY_SAMPLE]) + pursuit, pursuit + build)
-        pursuit = pursuit_of(0, 1, 0, lasts, lasts, False, at.scene)
-        faded.append(_run_pursuer(0, 1, 0, 0, pursuit, at.scene, -1e6, 1e6)[1])
-    np.testing.assert_allclose(faded, math.exp(-4.0), rtol=0.1)
-
-
 def test_a_boat_that_never_gets_its_thrust_back_is_run_through_to_the_end():
     at = stages(slow_boat(), opponent(0.0, 30.0, 180.0))
     laid(at, 1.0, 0.0, 0.0)
-    assert at.work.ready[0, READY_SAMPLE] == -1.0
-    assert clear_of_pursuer(0, 1, 0, at.scene, -1e6, 50.0) < 0.0
+    assert at.ready[0, READY_SAMPLE] == -1.0
+    assert clear_of_pursuer(0, 1, 0, -1e6, at.scene) < 0.0
 
 
 def chased(certificate, count=40, steps=500):

@@ -16,7 +16,7 @@ from steerclear.shield.exceptions import BridgeError, LinkError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.surroundings import OPEN_WATER
-from steerclear.shield.tracking.tracks import thrust_at
+from steerclear.shield.tracks import thrust_at
 
 DT_S = 0.1
 

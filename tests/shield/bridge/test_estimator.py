@@ -11,7 +11,7 @@ from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.tracks import steps_of_delay
+from steerclear.shield.tracks import steps_of_delay
 
 DT_S = 0.1
 

@@ -8,10 +8,9 @@ import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Commands, Fleet, Shield
+from steerclear.shield.autopilots import SURPRISE, Autopilots
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.autopilots import SURPRISE, Autopilots
-from steerclear.shield.tracking.remembering import Stayed
 
 STEPS = 150
 CROWD = [(0, 0, 0, 1.0), (4.0, 14.0, 180.0, 1.0), (-9.0, 5.0, 90.0, 1.2), (9.0, 6.0, -90.0, 1.4)]
@@ -206,7 +205,7 @@ def test_nothing_is_believed_of_boats_without_a_command():
     assert np.isnan(autopilots.after[:, 0]).all()
     assert np.isfinite(autopilots.after[:, 1]).all()
     later = Autopilots.of(1)
-    later.carry_over(autopilots, Stayed(np.array([0]), np.array([1])))
+    later.carry_over(autopilots, np.array([0]), np.array([1]))
     np.testing.assert_array_equal(later.after[:, 0], autopilots.after[:, 1])
 
 

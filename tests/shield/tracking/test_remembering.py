@@ -8,9 +8,9 @@ import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import bits, fleet_of, head_on, relative
 from steerclear.shield import Fleet, Shield
-from steerclear.shield.memory import Memory, new_memory, put_memory, take_memory
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracking.remembering import Known, Stayed, carry_over, meets_new
+from steerclear.shield.shield import order_of
+from steerclear.shield.workspace import BACKUP_MARGIN, HAS_BACKUP, N_MEMORY
 
 FAR_AWAY = (1300.0, 0.0, 0.0, 0.0)
 STEPS = 120
@@ -69,69 +69,41 @@ def test_reset_forgets():
     assert bits(used.decide(scene, wanted).sent.values) == bits(fresh.decide(scene, wanted).sent.values)
 
 
-def known(fleet):
-    return Stayed.between(Known.of(fleet), fleet)
+def memory_of(shield):
+    return shield._deciders.scene.memories[0].copy()
 
 
-def test_boats_are_told_by_name_platform_and_team():
-    fleet = meeting()
-    assert known(fleet).now.tolist() == [0, 1, 2]
-    swapped = Stayed.between(Known.of(fleet), part(fleet, (2, 0)))
-    assert (swapped.now.tolist(), swapped.then.tolist()) == ([0, 1], [2, 0])
-    for other in (
-        replace(fleet, team=np.array([1, 1, 1])),
-        replace(fleet, platforms=("surveyor", "heron", "heron")),
-        replace(fleet, names=("new", "boat_1", "boat_2")),
-    ):
-        assert Stayed.between(Known.of(fleet), other).now.tolist() == [1, 2]
-    twins = replace(fleet, names=("a", "a", "b"))
-    assert len(known(twins).now) == len(Stayed.between(None, fleet).now) == 0
-
-
-def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin():
-    old, new = new_memory(2), new_memory(3)
-    old.has_backup[:], old.side[:], old.target_deg[:] = True, (-1.0, 1.0), (30.0, 60.0)
-    old.margin_m[:], old.threat_m[:] = (1.5, -0.5), [[0.0, 1.0], [0.5, 0.0]]
-    carry_over(old, new, Stayed(np.array([2, 0]), np.array([0, 1])), np.array([True, True, False]))
-    assert new.has_backup.tolist() == [True, False, True]
-    assert new.side[[2, 0]].tolist() == [-1.0, 1.0]
-    assert new.target_deg[[2, 0]].tolist() == [30.0, 60.0]
-    assert new.margin_m.tolist() == [-0.5, 0.0, 1.5]
-    assert new.threat_m.tolist() == [[0.0, 0.0, 0.5], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+@pytest.mark.parametrize(
+    ("change", "forgotten"),
+    [
+        ({"team": np.array([1, 1, 0])}, [0, 2]),
+        ({"platforms": ("surveyor", "heron", "heron")}, [0]),
+        ({"names": ("new", "boat_1", "boat_2")}, [2]),
+        ({"names": ("boat_1", "boat_1", "boat_2")}, [0, 1, 2]),
+    ],
+)
+def test_boats_are_told_by_name_platform_and_team(change, forgotten):
+    fleet = replace(meeting(), controlled=np.array([True, True, True]))
+    shield, kept = Shield(), []
+    shield.decide(fleet, relative((2.0, 30.0), (2.0, 30.0), (0.0, 0.0)))
+    shield._deciders_of(other := replace(fleet, **change), order_of(other.names))
+    kept = memory_of(shield)[:, HAS_BACKUP]
+    assert np.flatnonzero(kept == 0.0).tolist() == forgotten
 
 
 @pytest.mark.parametrize(("gap_m", "met"), [(20.0, True), (1300.0, False)])
-def test_only_new_boats_that_can_come_near_count(gap_m, met):
-    fleet = fleet_of([(0, 0, 0, 2.0), (0, gap_m, 180.0, 2.0)], [0, 1])
+def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin(gap_m, met):
+    fleet = fleet_of([(0, 0, 0, 2.0), (0, -12.0, 0, 2.0), (0, gap_m, 180.0, 2.0)], [0, 1, 1])
     shield = Shield()
-    shield.decide(fleet, relative((0.0, 0.0), (0.0, 0.0)))
-    stayed = Stayed.between(Known.of(part(fleet, (0,))), fleet)
-    assert meets_new(fleet, stayed, shield._boats, shield._tuning).tolist() == [met, False]
-
-
-def numbered(memory, first):
-    """Fill every field of a memory with numbers of its own: the flags with every other one."""
-    assert memory._asdict().keys() == set(Memory._fields)
-    for k, array in enumerate(memory):
-        numbers = first + 100 * k + np.arange(array.size).reshape(array.shape)
-        array[...] = numbers % 2 if array.dtype == np.bool_ else numbers
-
-
-def test_games_of_a_batch_keep_their_memory_apart():
-    """All of it is taken and put back: a field left out would pass from one game to the next."""
-    games, own = new_memory(3, 4), new_memory(4)
-    numbered(games, 1)
-    numbered(own, 7)
-    before = {name: array.copy() for name, array in games._asdict().items()}
-    take_memory(games, 1, own)
-    for name, array in own._asdict().items():
-        np.testing.assert_array_equal(array, before[name][1], err_msg=name)
-    numbered(own, 50_000)  # flags the other way round, too
-    put_memory(own, 2, games)
-    for name, array in games._asdict().items():
-        np.testing.assert_array_equal(array[:2], before[name][:2], err_msg=name)
-        np.testing.assert_array_equal(array[2], getattr(own, name), err_msg=name)
-        assert (array[2] != before[name][2]).any(), name
+    shield.decide(part(fleet, (0, 1)), relative((2.0, 0.0), (2.0, 0.0)))
+    before = memory_of(shield)
+    assert before[0, BACKUP_MARGIN] > 0.0
+    shield._deciders_of(fleet, order_of(fleet.names))
+    after = memory_of(shield)
+    assert after[0, BACKUP_MARGIN] == (0.0 if met else before[0, BACKUP_MARGIN])
+    alike = [k for k in range(N_MEMORY) if k != BACKUP_MARGIN]
+    np.testing.assert_array_equal(after[0, alike], before[0, alike])
+    assert after[0, N_MEMORY + 1] == before[0, N_MEMORY + 1] != 0.0
 
 
 def test_a_copy_decides_on_its_own():

@@ -8,9 +8,9 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.shield import Reason, Shield, wrappers
-from steerclear.shield.actions import DISCRETE
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers.actions import DISCRETE
 
 GAMES = 4
 

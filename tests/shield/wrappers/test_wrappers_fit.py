@@ -9,10 +9,10 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.shield import Reason, Shield, ShieldConfig, game_facts
+from steerclear.shield import Reason, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.wrappers import ShieldedParallelEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers import ShieldedParallelEnv, TeamBatch, game_facts, games_shield
 
 BLUE = ["agent_0", "agent_1", "agent_2"]
 ISLAND = {"circle": [(2.0, (40.0, 10.0))]}

@@ -1,0 +1,185 @@
+"""The certificates by name: which backup manoeuvres they look at, and whether opponents are run through or looked up.
+
+A certificate of this kind is a family of manoeuvres; h is as in `barriers.boats`. Each row of a family is
+(side, turn deg, speed): side clockwise when > 0, its size the share of full rudder; speed a fraction of top speed or
+`COMMANDED`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..jit import Array, lean_kernel
+from ..platforms import Platform
+from ..platforms import layout as L
+from ..platforms.limits import Limits, limits_of
+from ..workspace import BACKUP_HEADING, BACKUP_SIDE, BACKUP_SPEED, HAS_BACKUP, Scene
+from .paths import angle_to_go
+
+IN_MEMORY, FOUND, FAMILY = range(3)
+"""Numbers of the manoeuvres: that under way, that in ``scene.held``, and from `FAMILY` on those of `Boats.plans`."""
+
+COMMANDED = -1.0
+"""Speed entry of a manoeuvre that keeps the commanded speed."""
+
+DONE_DEG = 270.0
+"""A turn to go beyond this is one that has been overshot: it is done."""
+
+FURTHEST_DEG = 200.0
+"""Largest turn to go with which a manoeuvre is committed to again."""
+
+TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
+"""Hard turns of boats whose opponents are run through. The finer, the sooner one is found that is small enough."""
+
+LOOKED_UP_TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0)
+"""The same of boats with a value table, which tells what play after the next step is worth, wherever a turn ends."""
+
+GENTLE_SHARES = (0.5, 0.25)
+"""Rudders of half turns that boats with a value table look at besides: a hard turn costs speed, and with it room."""
+
+SLOWING_TURNS_DEG = (45.0, 90.0, 180.0)
+SLOWING_SPEEDS = (0.5, 0.0)
+"""Turns made at less than full speed, which boats that steer without thrust look at besides: `Certificate.slowing`."""
+
+SLOW_TO_REGAIN_S = 5.0
+"""Boats that take longer than this to be up to speed again are looked up under the certificate "auto".
+
+What a boat can do against pursuers after it has lost its speed hangs on play too long to be run through well; nimble
+boats are better run through, one manoeuvre against all pursuers at once.
+"""
+
+REACTION_S = 4.0
+"""Time beyond a half turn over which a turning backup is followed, s."""
+
+LONGEST_PURSUIT_S = 60.0
+"""Longest time over which a pursuing opponent is followed, s."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Families of backup manoeuvres, rows of side, turn deg, speed, with their horizon.
+
+    Attributes:
+        name: its name in settings.
+        summary: what h means, one line.
+        plans: (m, 3) manoeuvres of boats whose opponents are run through.
+        looked_up: (m, 3) manoeuvres of boats whose opponents are looked up in value tables.
+        slowing: (m, 3) what boats look at besides that steer without thrust; others lose their rudder with it.
+        tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
+    """
+
+    name: str
+    summary: str
+    plans: Array
+    looked_up: Array
+    slowing: Array
+    tables: str = "none"
+
+    def horizon_s(self, platform: Platform, dt_s: float) -> float:
+        """Time over which the manoeuvres are followed, s."""
+        return limits_of(platform, dt_s).half_turn_s + REACTION_S
+
+    def manoeuvres(self, platform: Platform, with_table: bool) -> Array:
+        """(m, 3) manoeuvres that a boat looks at, in the order in which they are tried."""
+        plans = self.looked_up if with_table else self.plans
+        return np.vstack([plans, self.slowing]) if platform.kind == "rate" else plans
+
+    def uses_table(self, limits: Limits) -> bool:
+        """Whether a boat looks opponents up where there is a table."""
+        slow = limits.top_speed_mps > SLOW_TO_REGAIN_S * limits.acceleration_mps2
+        return self.tables == "all" or (self.tables == "slow" and slow)
+
+    def pursuit_s(self, limits: Limits) -> float:
+        """Time over which pursuing opponents are followed, s: a boat outruns them only once it is up to speed again."""
+        return min(LONGEST_PURSUIT_S, limits.half_turn_s + REACTION_S + limits.regain_s)
+
+
+def _turning(turns_deg: Sequence[float], gentle_shares: Sequence[float] = ()) -> Array:
+    rows = [(1.0, 0.0, COMMANDED)]
+    for turn in turns_deg:
+        rows += [(1.0, turn, 1.0), (-1.0, turn, 1.0)]
+    rows += [(1.0, 0.0, 1.0), (1.0, 0.0, 0.0)]
+    for share in gentle_shares:
+        rows += [(share, 180.0, 1.0), (-share, 180.0, 1.0)]
+    return np.array(rows)
+
+
+def _slowing() -> Array:
+    rows = [(1.0, 0.0, 0.5)]
+    rows += [(side, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for side in (1.0, -1.0)]
+    return np.array(rows)
+
+
+TURNING_CIRCLE = Certificate(
+    "turning_circle",
+    "distance kept on the best turning circle, either side, any exit; opponents may pursue with their granted share",
+    plans=_turning(TURNS_DEG),
+    looked_up=_turning(LOOKED_UP_TURNS_DEG, GENTLE_SHARES),
+    slowing=_slowing(),
+)
+
+VALUE_TABLE = replace(
+    TURNING_CIRCLE,
+    name="value_table",
+    summary="distance that can be kept from the worst opponent, by value table; without a table as turning_circle",
+    tables="all",
+)
+
+AUTO = replace(
+    VALUE_TABLE,
+    name="auto",
+    summary="value_table for boats that are long in gaining speed, turning_circle for nimble ones",
+    tables="slow",
+)
+
+CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_CIRCLE, VALUE_TABLE)}
+
+
+@lean_kernel
+def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
+    """Turn still to make of a manoeuvre to one side that ends on a heading (NaN: none), deg; past that it is done."""
+    if math.isnan(target_deg):
+        return 0.0
+    togo = angle_to_go(heading_deg, target_deg, side)
+    return 0.0 if togo > DONE_DEG else togo
+
+
+@lean_kernel
+def kept_turn(i: int, heading_deg: float, scene: Scene) -> float:
+    """Turn still to make of the manoeuvre in memory, deg."""
+    memory = scene.memory
+    return turn_left(heading_deg, memory[i, BACKUP_HEADING], memory[i, BACKUP_SIDE])
+
+
+@lean_kernel
+def remembered(i: int, done: int, heading_deg: float, scene: Scene) -> bool:
+    """Whether the manoeuvre in memory can be offered.
+
+    A boat told to turn away from it for long is offered another in good time: once committed to, a manoeuvre must not
+    run over the angle at which it would be taken for done, not even by the way a boat still spins.
+    """
+    memory = scene.memory
+    return memory[i, HAS_BACKUP] > 0.0 and (done == 0 or kept_turn(i, heading_deg, scene) <= FURTHEST_DEG)
+
+
+@lean_kernel
+def found_turn(i: int, heading_deg: float, held: Array) -> float:
+    """Turn still to make of the manoeuvre noted in ``held``, see `assign.hold`, deg."""
+    return turn_left(heading_deg, held[i, 1], held[i, 0])
+
+
+@lean_kernel
+def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
+    """Manoeuvre number p of boat i: `IN_MEMORY`, `FOUND`, or one of the family; (side, turn deg, speed m/s)."""
+    boats, memory, held = scene.boats, scene.memory, scene.held
+    if p == IN_MEMORY:
+        return memory[i, BACKUP_SIDE], kept_turn(i, heading_deg, scene), memory[i, BACKUP_SPEED]
+    if p == FOUND:
+        return held[i, 0], found_turn(i, heading_deg, held), held[i, 2]
+    row = boats.plans[i, p - FAMILY]
+    speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
+    return row[0], row[1], speed

@@ -1,0 +1,78 @@
+"""Laying a manoeuvre of a boat into a slot of the working memory: where it is looked up, and its path."""
+
+from __future__ import annotations
+
+from ..barriers.neighbours import may_pursue
+from ..barriers.value_function import set_place, table_answers, tabled
+from ..jit import copy_row, lean_kernel
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..workspace import Scene
+from .paths import Manoeuvre, Span, trace_path
+
+NO_PURSUERS, PURSUERS_TILL_READY, PURSUERS = range(3)
+"""How far pursuers are run through: not at all, until tables answer (thrust is back, and of several for a while), or to
+the end of the pursuit."""
+
+
+@lean_kernel
+def pursuers_run(i: int, slot: int, scene: Scene) -> int:
+    """How far opponents near boat i are to be run through as pursuers, which takes a longer path."""
+    boats = scene.boats
+    if not scene.pursued[i] or boats.table_steps[i] == 0:
+        return PURSUERS if scene.pursued[i] else NO_PURSUERS
+    how = PURSUERS_TILL_READY if scene.outnumbered[i] else NO_PURSUERS
+    for j in range(scene.near.shape[0]):
+        if j == i or not scene.near[i, j] or boats.team[i] == boats.team[j] or not may_pursue(j, scene):
+            continue
+        if not tabled(i, j, scene):
+            return PURSUERS
+        if not table_answers(i, j, slot, scene):
+            how = PURSUERS_TILL_READY
+    return how
+
+
+@lean_kernel
+def _lay_command(i: int, slot: int, scene: Scene) -> None:
+    """Write where boat i is during the step it is predicted for, as far as that is of several moves."""
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
+    if tuning.moves == 1:
+        return
+    copy_row(scene.row, state[i])
+    for move in range(tuning.moves):
+        step_boat(boats.params[i], scene.row, scene.stepped[i, 0], scene.stepped[i, 1], tuning.model_s)
+        if move % boats.stride == 0:
+            path = scene.path[slot, move // boats.stride]
+            path[0], path[1] = scene.row[L.X], scene.row[L.Y]
+
+
+@lean_kernel
+def lay_path(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
+    """Roll a manoeuvre of boat i out into ``slot``, from its predicted state (done = 1) or its present one (0)."""
+    boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
+    manoeuvre[0], manoeuvre[1], manoeuvre[2] = side, togo_deg, speed_mps
+    scene.pursuers_known[slot] = False
+    set_place(i, slot, side, togo_deg, speed_mps, done, scene)
+    how = pursuers_run(i, slot, scene)
+    samples, chased = boats.samples[i], boats.pursuit_samples[i] + boats.chased_samples[i]
+    if how != NO_PURSUERS:
+        samples = chased + boats.thrust_samples[i]
+    earliest = 0 if done == 1 else (boats.table_steps[i] + boats.stride - 1) // boats.stride
+    if scene.outnumbered[i]:
+        earliest = max(earliest, boats.joint_samples)
+    if done == 1:
+        _lay_command(i, slot, scene)
+    copy_row(scene.row, scene.next_state[i] if done == 1 else scene.state[i])
+    span = Span(
+        tuning.model_s,
+        tuning.moves if done == 1 else 0,
+        boats.stride,
+        samples,
+        boats.samples[i],
+        chased if how == PURSUERS else 0,
+        min(earliest, samples),
+        boats.ready_thrust[i],
+    )
+    trace_path(
+        boats.params[i], scene.row, Manoeuvre(side, togo_deg, speed_mps), span, scene.path[slot], scene.ready[slot]
+    )

@@ -1,0 +1,344 @@
+"""One decision after another, compiled: of one team, of boats that decide each for itself, or of thousands of games.
+
+A decision takes up what is given, checks the nominal commands, then group by group finds backups, solves for the least
+change, and blends what is left of the backups with the nominal commands; it commits what is remembered, and hands over.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from . import workspace as W
+from .backup.assign import hold
+from .backup.rank import ALL, OBSTACLES, OPPONENTS
+from .barriers.boats import reported_margin
+from .barriers.clearance import MARGIN
+from .barriers.neighbours import note_predicted
+from .barriers.registered import unknown_at
+from .barriers.static import STATIC, about
+from .config import ShieldConfig
+from .filter.backup_switch import back_up
+from .filter.blend import any_may_be_blended, blend, verify
+from .filter.groups import close_groups, make_groups, open_group
+from .filter.last_line import keep_last_line
+from .filter.nominal import screen
+from .filter.program import Program, Solver
+from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
+from .filter.right_of_way import forget_pressing, note_pressing
+from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
+from .model import tuning_of
+from .platforms import layout as L
+from .platforms.usv import wrap_degrees
+from .shared import share, type_of
+from .tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
+from .workspace import Boats, Scene, Static, all_spent, new_scene, unchanged
+
+ROUNDING_S = 1e-9
+"""Times this short are none: what is left of a sum of steps."""
+
+LEAST_TURN_DEG = 1e-3
+"""Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
+
+
+@lean_kernel
+def _note_fears(given: Array, scene: Scene) -> None:
+    """Note how long each boat counts as adversarial: what is given, or where that is NaN the settings."""
+    tuning = scene.tuning
+    for i in range(given.shape[0]):
+        time_s = tuning.visitor_s if given[i, W.VISITING] != 0.0 else tuning.feared_s
+        if not math.isnan(given[i, W.HORIZON_S]):
+            time_s = given[i, W.HORIZON_S]
+        scene.fear_s[i] = time_s if tuning.feared_s > 0.0 else 0.0
+
+
+@lean_kernel
+def _one_of_one_team(scene: Scene) -> int:
+    """A boat that is decided for, where all such are of one team; -1: they are of several, or there is none."""
+    team, found = scene.boats.team, -1
+    for i in range(team.shape[0]):
+        if scene.ours[i]:
+            if found >= 0 and team[i] != team[found]:
+                return -1
+            found = i
+    return found
+
+
+@lean_kernel
+def _told_fear(i: int, mate: int, scene: Scene) -> float:
+    """How long boat i counts as adversarial, s: 0 where its way is predicted, NaN of who is nobody's opponent."""
+    team = scene.boats.team
+    if scene.ours[i] or (mate >= 0 and team[i] == team[mate]):
+        return np.nan
+    return 0.0 if scene.known[i] else scene.fear_s[i]
+
+
+@kernel
+def take_up(b: int, scene: Scene) -> None:
+    """Make decision b the scene's: boats at the moment its commands take effect, and what is remembered of them.
+
+    Tracks are run on straight by their age and by the delay, own boats through the delay by the model under the
+    commands on their way; what others may do meanwhile widens the errors of their positions.
+    """
+    given, state, ours, tuning = scene.given[b], scene.state, scene.ours, scene.tuning
+    for i in range(ours.shape[0]):
+        ours[i] = given[i, W.OURS] != 0.0
+        copy_row(state[i], given[i, : L.N_STATE])
+    note_predicted(given, scene)
+    _note_fears(given, scene)
+    turn_round(state, ours)
+    fill_memory(state, scene.boats.params)
+    run_on(state, given[:, W.AGE_S])
+    run_on_commands(state, ours, scene.boats.params, scene.pending[b], tuning.dt_s)
+    for i in range(ours.shape[0]):
+        copy_row(scene.nominal[i], given[i, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1])
+        turned = state[i, L.HEADING] - given[i, L.HEADING]  # until the command takes effect
+        if turned != 0.0:
+            scene.nominal[i, 1] -= turned
+        late_s = given[i, W.AGE_S] + (0.0 if ours[i] else tuning.delay_s)
+        error_m = max(given[i, W.ERROR_M], tuning.position_error_m)
+        scene.error_m[i] = error_m + tuning.track_error_mps * late_s
+        copy_row(scene.memory[i], scene.memories[b, i])
+
+
+@kernel
+def hand_over(b: int, scene: Scene) -> None:
+    """Write what decision number b has come to, and keep what is remembered of it."""
+    given, state, command, told = scene.given[b], scene.state, scene.command, scene.told[b]
+    mate = _one_of_one_team(scene)
+    for i in range(state.shape[0]):
+        copy_row(scene.memories[b, i], scene.memory[i])
+        sent = scene.sent[b, i]
+        sent[0], sent[1] = given[i, W.NOMINAL_SPEED], given[i, W.NOMINAL_TURN]
+        reason = scene.reason[i]
+        bound = -1 if reason == W.NOT_COVERED else scene.bound[i]
+        passed = reason in (W.PASSED, W.NOT_COVERED)
+        same = command[i, 0] == scene.nominal[i, 0] and command[i, 1] == scene.nominal[i, 1]
+        changed = not (passed or same)
+        if changed:
+            copy_row(sent, command[i])
+            turned = state[i, L.HEADING] - given[i, L.HEADING]
+            if turned != 0.0:
+                sent[1] += turned
+            if bound == -1 and reason != W.HELD:  # nothing else changes commands
+                bound = STATIC
+        if reason == W.BACKUP and scene.solver[i] == W.BY_LINE_SEARCH:
+            reason = W.LEAST_CHANGE
+        scene.changed[b, i], scene.reasons[b, i] = changed, reason
+        told[i, W.SLACK_M], told[i, W.ACTIVE] = scene.slack_m[i], bound
+        told[i, W.CUT_SHORT] = 1.0 if scene.ours[i] and scene.cut_short[0] else 0.0
+        told[i, W.FEARED_S] = _told_fear(i, mate, scene)
+        told[i, W.SOLVER] = scene.solver[i] if reason == W.LEAST_CHANGE else 0
+        told[i, W.MARGIN_M] = np.inf if reason == W.NOT_COVERED else reported_margin(i, scene)
+    if scene.pending.shape[1] > 0:
+        queue_commands(scene.pending[b], state, command)
+
+
+@lean_kernel
+def _note_backing_up(i: int, scene: Scene) -> None:
+    """Note whether boat i is on its backup, and for how long it stays so at least.
+
+    On the bound of what it must keep a boat would else take up the nominal command and its backup in turn, from step to
+    step, and one that turns at once would do so from side to side.
+    """
+    memory, reason = scene.memory[i], scene.reason[i]
+    backing_up = reason in (W.BACKUP, W.BEST_EFFORT)
+    left_s = 0.0
+    if backing_up:
+        left_s = (memory[W.HOLD_S] if memory[W.BACKING_UP] > 0.0 else scene.boats.dwell_s[i]) - scene.tuning.dt_s
+    memory[W.HOLD_S] = left_s if left_s > ROUNDING_S else 0.0
+    memory[W.BACKING_UP] = 1.0 if backing_up else 0.0
+
+
+@lean_kernel
+def commit(scene: Scene) -> None:
+    """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
+
+    Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
+    of a manoeuvre are not: another may trade one for the other, so for other boats the least counts for all.
+    """
+    for i in range(scene.ours.shape[0]):
+        memory, manoeuvre = scene.memory[i], scene.manoeuvre[i]
+        if not scene.ours[i]:
+            memory[W.HAS_BACKUP], memory[W.BACKING_UP] = 0.0, 0.0
+            forget_pressing(i, scene)
+            continue
+        memory[W.HAS_BACKUP], memory[W.BACKUP_SIDE], memory[W.BACKUP_SPEED] = 1.0, manoeuvre[0], manoeuvre[2]
+        memory[W.BACKUP_HEADING] = np.nan
+        if manoeuvre[1] > LEAST_TURN_DEG:
+            end_deg = scene.next_state[i, L.HEADING] + math.copysign(manoeuvre[1], manoeuvre[0])
+            memory[W.BACKUP_HEADING] = wrap_degrees(end_deg)
+        memory[W.BACKUP_MARGIN] = scene.clear[i, MARGIN]
+        memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.kept[i] >= OPPONENTS else 0.0
+        memory[W.JOINT_MARGIN] = scene.joint_m[i] if scene.outnumbered[i] else 0.0
+        for j in range(scene.ours.shape[0]):
+            apart = scene.boats.table_steps[i] > 0
+            memory[W.N_MEMORY + j] = scene.threats_m[i, j] if apart else scene.threat_m[i]
+        _note_backing_up(i, scene)
+        note_pressing(i, scene)
+
+
+@lean_kernel
+def _note_causes(scene: Scene) -> None:
+    """Note what each boat's nominal command is short of: of an opponent also where a team-mate is nearer."""
+    for i in range(scene.ours.shape[0]):
+        short = scene.ours[i] and scene.kept[i] < ALL
+        scene.cause[i] = scene.bound[i] if short else -1
+        threatened = scene.kept[i] == OBSTACLES and scene.fails[i] and scene.threat_by[i] >= 0
+        if short and threatened:
+            scene.cause[i] = scene.threat_by[i]
+
+
+@lean_kernel
+def _name_reasons(scene: Scene) -> None:
+    """Say of nominal commands that come out as they were that they passed, and where static constraints are active.
+
+    They are of a command that was changed for them, and keeps them now; and a barrier is of a boat that is to stop
+    since it tells nothing where that is.
+    """
+    for i in range(scene.ours.shape[0]):
+        if not scene.ours[i]:
+            continue
+        reason, same = scene.reason[i], unchanged(i, scene)
+        if same and (reason == W.LEAST_CHANGE or (reason == W.BACKUP and scene.slack_m[i] == 0.0)):
+            scene.reason[i] = scene.checked_reason[i]
+        if scene.reason[i] == W.HELD and unknown_at(i, scene) >= 0:
+            scene.bound[i] = about(unknown_at(i, scene))
+        if scene.cause[i] <= STATIC and scene.kept[i] == ALL and not same:
+            scene.bound[i] = scene.cause[i]
+
+
+@lean_kernel
+def begin(scene: Scene) -> int:
+    """Check the nominal commands; returns how many groups of boats they are not sent to as they are."""
+    screen(scene)
+    return groups_left(scene)
+
+
+@lean_kernel
+def groups_left(scene: Scene) -> int:
+    """Note what nominal commands are short of and the manoeuvres found for them; returns how many groups are left."""
+    _note_causes(scene)
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i]:
+            hold(i, scene.held, scene)
+    return make_groups(scene)
+
+
+@lean_kernel
+def begin_group(group: int, scene: Scene) -> int:
+    """Make backups the commands of a group, and set up its program; returns how many boats take part in that."""
+    open_group(group, scene)
+    back_up(scene)
+    if all_spent(scene) or not any_may_be_blended(scene):
+        return 0
+    verify(among_mates(scene), scene)
+    return begin_program(scene)
+
+
+@lean_kernel
+def end_group(scene: Scene, safe: bool, count: int) -> None:
+    """End the program of so many boats, and blend the other backups."""
+    end_program(scene, safe, count)
+    blend(scene)
+
+
+@lean_kernel
+def end(scene: Scene) -> None:
+    """Say what binds and why, and remember what was decided."""
+    close_groups(scene)
+    keep_last_line(scene)
+    commit(scene)
+    _name_reasons(scene)
+
+
+@lean_kernel
+def decide_scene(scene: Scene) -> None:
+    """The whole decision; sent commands are in ``scene.command``, reasons in ``scene.reason``."""
+    for group in range(begin(scene)):
+        count, safe = begin_group(group, scene), False
+        for _ in range(ROUNDS if count > 0 else 0):
+            rows = linearise(count, scene)
+            if rows < 0 or not solve(count, rows, scene):
+                break
+            safe = accept(scene, scene.z, count)
+            if safe:
+                break
+        end_group(scene, safe, count)
+    end(scene)
+
+
+@kernel
+def decide_all(scene: Scene) -> None:
+    """All decisions, one after another."""
+    for b in range(scene.given.shape[0]):
+        take_up(b, scene)
+        decide_scene(scene)
+        hand_over(b, scene)
+
+
+def _decide_with(solver: Solver, scene: Scene) -> None:
+    """`decide_scene` with another solver of its programs."""
+    for group in range(begin(scene)):
+        count, safe = begin_group(group, scene), False
+        for _ in range(ROUNDS if count > 0 else 0):
+            rows, n = linearise(count, scene), 2 * count
+            z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n])) if rows >= 0 else None
+            if z is None:
+                break
+            safe = accept(scene, z, count)
+            if safe:
+                break
+        end_group(scene, safe, count)
+    end(scene)
+
+
+class Deciders:
+    """B deciders of the same fleet; what is given, decided and remembered are arrays of ``scene``.
+
+    Args:
+        config: settings.
+        number: B.
+        boats: constants of the n boats.
+        static: static constraints and registered barriers, the same for all.
+        solver: what answers programs; None: the compiled one.
+    """
+
+    def __init__(
+        self,
+        config: ShieldConfig,
+        number: int,
+        boats: Boats,
+        static: Static,
+        solver: Solver | None = None,
+    ) -> None:
+        self.scene = new_scene(number, boats, static, tuning_of(config), steps_of_delay(config))
+        self._solver = solver
+        self._decide_all: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_decide_all": None}  # compiled code is of one process
+
+    def forget(self, which: slice | BoolArray) -> None:
+        """Forget the backups of some deciders, and the commands on their way."""
+        memories, pending = self.scene.memories, self.scene.pending
+        memories[which, :, W.HAS_BACKUP], memories[which, :, W.BACKING_UP] = 0.0, 0.0
+        pending[which] = np.nan
+
+    def decide(self, static: Static) -> None:
+        """Write into the scene what is decided about what is given, beside these static constraints."""
+        if self.scene.static is not static:
+            self.scene = share(self.scene._replace(static=static))
+            self._decide_all = None
+        if self._solver is None:
+            if self._decide_all is None:
+                made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
+                self._decide_all = decide_all if made is None else made((type_of(self.scene),))  # saves 3 us a call
+            self._decide_all(self.scene)
+            return
+        for b in range(len(self.scene.given)):
+            take_up(b, self.scene)
+            _decide_with(self._solver, self.scene)
+            hand_over(b, self.scene)

@@ -1,0 +1,200 @@
+"""Where the wanted commands do not keep everything: the backups, a joint plan for all boats of ours.
+
+A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
+everything from the state one step after it. When the wanted commands have none, the plan of the last decision is gone
+on with, or a better one. So a verified plan, once there, is there at every step, unless an opponent does what none was
+asked to keep clear of.
+
+Before opponents backups are carried out in full: of those who do not decide with us too little is known. One that is
+only just kept off is so again in the next step, and a boat that gives way as little as it may in each gives way for
+longer. Of other backups as little is carried out as will do, see `qp` and `blend`.
+
+That is the switching of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..backup.assign import assign_plans
+from ..backup.family import IN_MEMORY, candidate, remembered
+from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, rank_of, rank_path
+from ..backup.rollout import lay_path
+from ..barriers.boats import reported_margin
+from ..barriers.clearance import MARGIN
+from ..barriers.static import clear_of_near_obstacles
+from ..barriers.value_function import run_opponents
+from ..jit import lean_kernel
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn, full_turn
+from ..workspace import BACKUP, BEST_EFFORT, STOPPED, Scene
+from .nominal import check
+
+
+@lean_kernel
+def pick_movers(scene: Scene) -> int:
+    """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
+    ours = scene.ours
+    n = ours.shape[0]
+    for i in range(n):
+        if ours[i] and scene.kept[i] < ALL:
+            scene.moving[i] = True
+            j = scene.bound[i]
+            if j >= 0 and ours[j]:
+                scene.moving[j] = True
+    return list_movers(scene)
+
+
+@lean_kernel
+def list_movers(scene: Scene) -> int:
+    """List the boats marked as movers, and number them; returns how many they are."""
+    count = 0
+    for i in range(scene.moving.shape[0]):
+        scene.mover_of[i] = -1
+        if scene.moving[i]:
+            scene.movers[count], scene.mover_of[i] = i, count
+            count += 1
+    return count
+
+
+@lean_kernel
+def _given_up(i: int, scene: Scene) -> float:
+    """What boat i is short of its distance from boats and static constraints, m."""
+    least = min(reported_margin(i, scene), scene.static_clear[i, MARGIN])
+    if scene.kept[i] == BOATS:  # of an obstacle near in time nothing else is noted
+        clear_of_near_obstacles(i, i, scene, 0.0, scene.spare2)
+        least = min(least, scene.spare2[MARGIN])
+    return max(0.0, -least)
+
+
+@lean_kernel
+def set_off(i: int, scene: Scene) -> None:
+    """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
+    side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
+    scene.held[i, 0], scene.held[i, 1], scene.held[i, 2] = side, np.nan, speed
+    if togo > 0.0:
+        scene.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side)
+        togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
+    scene.command[i, 0] = speed
+    scene.command[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
+
+
+@lean_kernel
+def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
+    """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
+    ours = scene.ours
+    for j in range(ours.shape[0]):
+        if ours[j] and not scene.moving[j]:
+            scene.near[i, j] = False
+    rank = rank_path(i, slot, WORST, scene)
+    for j in range(ours.shape[0]):
+        if ours[j] and not scene.moving[j]:
+            scene.near[i, j] = scene.near[j, i]
+    return rank
+
+
+@lean_kernel
+def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
+    """Whether some mover would keep more if team-mates whose wanted commands passed were not there.
+
+    A boat that opponents or static constraints leave no way out is helped by nobody who gives up what was wanted.
+    """
+    state = scene.state
+    trial = state.shape[0]
+    for m in range(count):
+        i = scene.movers[m]
+        if scene.kept[i] == ALL:
+            continue
+        if better(_could_keep(i, i, scene), rank_of(i, scene)):
+            return True
+        heading = state[i, L.HEADING]
+        if not remembered(i, 0, heading, scene):
+            continue
+        side, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
+        lay_path(i, trial, side, togo, speed, 0, scene)
+        if better(_could_keep(i, trial, scene), rank_of(i, scene)):
+            return True
+    return False
+
+
+@lean_kernel
+def _join(scene: Scene) -> int:
+    """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
+    ours = scene.ours
+    for i in range(ours.shape[0]):
+        for m in range(ours.shape[0]):
+            if ours[i] and scene.mover_of[m] >= 0 and scene.near[i, m]:
+                scene.moving[i] = True
+    return list_movers(scene)
+
+
+@lean_kernel
+def _join_short(scene: Scene) -> int:
+    """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
+    ours = scene.ours
+    for i in range(ours.shape[0]):
+        if ours[i] and scene.kept[i] < OBSTACLES:
+            scene.moving[i] = True
+    return list_movers(scene)
+
+
+@lean_kernel
+def _assign_backups(count: int, scene: Scene) -> bool:
+    """Backups of the movers from the present state; whether all boats of ours then keep clear.
+
+    Opponents are left where boats with tables look them up on such manoeuvres.
+    """
+    ours, boats = scene.ours, scene.boats
+    table_steps = 1
+    for i in range(ours.shape[0]):
+        scene.target[i] = 0.0
+        scene.mate_target_m[i] = 0.0
+    for m in range(count):
+        i = scene.movers[m]
+        scene.threat_target_m[i, :] = 0.0
+        scene.joint_target_m[i] = 0.0
+        scene.static_target_m[i] = 0.0
+        table_steps = max(table_steps, boats.table_steps[i])
+    run_opponents(table_steps, scene)
+    return assign_plans(scene, 0, scene.moving)
+
+
+@lean_kernel
+def _find_backups(count: int, scene: Scene) -> None:
+    """Make the candidate of all movers' backups and check it.
+
+    All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
+    fit what boats have whose wanted commands passed: where these are in the way, or are themselves too near them, they
+    take part, too.
+    """
+    ours = scene.ours
+    for _ in range(ours.shape[0]):
+        if _assign_backups(count, scene):
+            break
+        movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
+        if movers == count:
+            break
+        count = movers
+    run_opponents(1, scene)
+    for m in range(count):
+        set_off(scene.movers[m], scene)
+    check(scene)
+
+
+@lean_kernel
+def back_up(scene: Scene) -> None:
+    """Make backups the commands of the boats that are short of something, and of those in whose way these are.
+
+    The reason is BACKUP, of boats that are short of something all the same BEST_EFFORT: avoidance does not switch
+    itself off.
+    """
+    ours = scene.ours
+    _find_backups(pick_movers(scene), scene)
+    for i in range(ours.shape[0]):
+        keeps = scene.kept[i] >= OPPONENTS
+        if ours[i] and scene.reason[i] != STOPPED and (scene.moving[i] or not keeps):
+            scene.reason[i] = BACKUP if keeps else BEST_EFFORT
+            scene.slack_m[i] = _given_up(i, scene)

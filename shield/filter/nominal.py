@@ -1,0 +1,118 @@
+"""The nominal check: whether the nominal commands can be sent as they are; and the exact check of any candidate.
+
+Both predict one step by the full model, and rate what each boat then satisfies on its backup from there.
+"""
+
+from __future__ import annotations
+
+from .. import workspace as W
+from ..backup.assign import assign_plans, recheck
+from ..barriers.clearance import FAR
+from ..barriers.neighbours import find_neighbours
+from ..barriers.registered import unknown_at
+from ..barriers.static import beyond_line
+from ..filter.right_of_way import apply_right_of_way
+from ..jit import Array, copy_row, lean_kernel
+from ..platforms import layout as L
+from ..platforms.step import step_boat
+from ..platforms.usv import wrap_degrees
+from ..tables.grid import CAP
+from ..workspace import Scene
+
+
+@lean_kernel
+def predict(i: int, commands: Array, scene: Scene) -> None:
+    """State of boat i one step after its command, by the full boat and autopilot model."""
+    state, boats, tuning = scene.state, scene.boats, scene.tuning
+    copy_row(scene.next_state[i], state[i])
+    copy_row(scene.stepped[i], commands[i])
+    step_boat(boats.params[i], scene.next_state[i], commands[i, 0], commands[i, 1], tuning.dt_s)
+
+
+@lean_kernel
+def check(scene: Scene) -> None:
+    """Predict the movers, and rate what each boat then keeps on the manoeuvre in ``scene.held``."""
+    for i in range(scene.ours.shape[0]):
+        if scene.moving[i]:
+            predict(i, scene.command, scene)
+    recheck(scene)
+
+
+@lean_kernel
+def _most_known(i: int, j: int, scene: Scene) -> float:
+    """Largest margin, m, a table can tell of a pair: beyond it the margin is said to be infinite."""
+    boats = scene.boats
+    table = boats.table[i, j]
+    if table < 0:
+        return FAR
+    return boats.tables.axes[table, CAP] - scene.radius[i, j] - boats.table_margin_m
+
+
+@lean_kernel
+def _asked(decay: float, was_m: float, cap_m: float) -> float:
+    """Margin, m, that is asked for of one that was ``was_m``, capped: the class-K rate of a step, but never below 0."""
+    return decay * max(0.0, min(was_m, cap_m))
+
+
+@lean_kernel
+def set_targets(scene: Scene) -> None:
+    """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
+
+    What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
+    be let go at once. That from team-mates of ours shrinks freely until it is small: what they will do is known.
+
+    A boat that dwells on its backup gives nothing of it away: all there may be is asked for.
+    """
+    ours, boats, tuning, memory = scene.ours, scene.boats, scene.tuning, scene.memory
+    for i in range(ours.shape[0]):
+        scene.target[i] = 0.0
+        scene.mate_target_m[i] = 0.0
+        scene.threat_target_m[i, :] = 0.0
+        scene.joint_target_m[i] = 0.0
+        scene.static_target_m[i] = 0.0
+        if ours[i] and memory[i, W.HAS_BACKUP] > 0.0:
+            decay, cap_m = boats.decay[i], boats.cap_m[i]
+            scene.target[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], cap_m)
+            scene.mate_target_m[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], min(tuning.mate_cap_m, cap_m))
+            scene.joint_target_m[i] = _asked(boats.joint_decay, memory[i, W.JOINT_MARGIN], cap_m)
+            scene.static_target_m[i] = _asked(tuning.static_decay, memory[i, W.STATIC_MARGIN], tuning.margin_cap_m)
+            for j in range(ours.shape[0]):
+                most_m = min(cap_m, _most_known(i, j, scene))
+                kept_m = _asked(decay, memory[i, W.N_MEMORY + j], most_m)
+                scene.threat_target_m[i, j] = most_m if memory[i, W.HOLD_S] > 0.0 else kept_m
+
+
+@lean_kernel
+def screen(scene: Scene) -> bool:
+    """Check the wanted commands as they are; True when every boat still has its backup after them.
+
+    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`), or one of a boat of whose place a registered
+    barrier tells nothing, is replaced by holding course at zero speed before the check.
+    """
+    state, ours = scene.state, scene.ours
+    n, wanted = state.shape[0], scene.nominal
+    find_neighbours(scene)
+    set_targets(scene)
+    for i in range(n):
+        copy_row(scene.command[i], wanted[i])
+        scene.slack_m[i] = 0.0
+        scene.moving[i] = False
+        scene.solver[i] = 0
+        scene.reason[i] = W.PASSED if ours[i] else W.NOT_COVERED
+        if not ours[i]:
+            continue
+        usable = abs(wanted[i, 0]) <= W.LARGEST_COMMAND and abs(wanted[i, 1]) <= W.LARGEST_COMMAND
+        if not usable or unknown_at(i, scene) >= 0:
+            scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
+            scene.reason[i] = W.HELD
+        if beyond_line(i, scene):
+            scene.command[i, 0], scene.command[i, 1], scene.reason[i] = 0.0, 0.0, W.STOPPED
+            predict(i, scene.command, scene)
+            continue
+        apply_right_of_way(i, scene)
+        predict(i, scene.command, scene)
+        scene.checked_turn[i] = wrap_degrees(scene.next_state[i, L.HEADING] - state[i, L.HEADING])
+    for i in range(n):
+        copy_row(scene.checked[i], scene.command[i])
+        scene.checked_reason[i] = scene.reason[i]
+    return assign_plans(scene, 1, ours)

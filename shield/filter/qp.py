@@ -1,0 +1,325 @@
+"""The quadratic program between team-mates: the least change that leaves every boat what its backup satisfies.
+
+    minimise 1/2 |z - z0|^2   subject to   C z >= d
+
+Scaled inputs of boat i: z_t = turn / full turn of this step (deg), z_s = sqrt(speed_weight) * speed / top speed. With
+manoeuvre and closest point fixed (envelope theorem), turning a boat by d(psi) in this step rotates its whole path about
+its next position, and d(v) stretches it, so with n the unit vector from neighbour to boat at the closest point and r
+the boat's path from its next position to there,
+
+    dh/dpsi = n . (r_y, -r_x)   (psi clockwise),     dh/dv = n . r / v,
+
+and a row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command, where the target
+is what the class-K rate asks for, or what the backups keep if that is more:
+
+    h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') >= target,
+
+less the same terms of a team-mate j, for whom n points the other way. Least changes are for those who decide with us,
+and whom no opponent is in the way of; see `backup_switch`. The answer counts if the exact check says so.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..barriers.boats import clear_of_boat, must_keep
+from ..barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
+from ..barriers.registered import write_slope
+from ..barriers.static import about, clear_of_near_obstacles, clear_of_static
+from ..jit import Array, copy_row, lean_kernel
+from ..platforms import layout as L
+from ..platforms.actuator import command_for_turn, full_turn
+from ..platforms.step import step_boat
+from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, Scene, all_spent
+from .backup_switch import list_movers
+from .blend import LITTLE_M, WORTH, before_opponent, costs_at_most, go_back, keeps_all, note_verified
+from .nominal import check
+
+STATIC_AIM_M = 1e-3
+"""Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
+SLOW_MPS = 0.3
+"""Below this speed dh/dv is taken as at this speed."""
+NEAR_OBSTACLES, ALL_STATIC, LIMITS = -1, -2, -3
+"""What a row is about, where that is no boat: obstacles near in time, all static constraints, or the inputs' own
+limits."""
+ROUNDS = 2
+"""Times the program is linearised and solved anew before the backups stand."""
+SAME = 1e-6
+"""Scaled input change below which a command counts as unchanged and the nominal one is sent."""
+SWEEPS = 200
+"""Passes over the rows after which a program counts as having no answer."""
+STILL, HOLDS = 1e-9, 1e-6
+"""A pass that changes no multiplier by more is the last; and by how much a row may be violated then."""
+
+
+@lean_kernel
+def _dot(a: Array, b: Array) -> float:
+    """Inner product; rows may be slices of a wider array, for which numpy's is slow."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * b[k]
+    return total
+
+
+@lean_kernel
+def project(C: Array, d: Array, z0: Array, z: Array, dual: Array) -> bool:
+    """Nearest point to ``z0`` with ``C z >= d``, by Hildreth's method (1957): row by row, until none moves it.
+
+    Args:
+        C: (rows, n), rows of unit length.
+        d: (rows,).
+        z0: (n,).
+        z: (n,), the answer.
+        dual: (rows,), its multipliers.
+
+    Returns:
+        Whether there is an answer; False also where a row is not made of numbers.
+    """
+    copy_row(z, z0)
+    dual[:] = 0.0
+    for _ in range(SWEEPS):
+        most = 0.0
+        for r in range(d.shape[0]):
+            step = max(-dual[r], d[r] - _dot(C[r], z))
+            dual[r] += step
+            most = max(most, abs(step))
+            for c in range(z.shape[0]):
+                z[c] += step * C[r, c]
+        if most < STILL:
+            break
+    holds = True
+    for r in range(d.shape[0]):
+        holds = holds and d[r] - _dot(C[r], z) < HOLDS
+    return holds
+
+
+@lean_kernel
+def _speed_effect(i: int, scene: Scene) -> float:
+    """Change of the next speed, m/s, per m/s of speed command, by a step of the model."""
+    params, command = scene.boats.params[i], scene.command[i]
+    step = 0.1 * params[L.MAX_SPEED]
+    if command[0] > 0.5 * params[L.MAX_SPEED]:
+        step = -step
+    copy_row(scene.row, scene.state[i])
+    step_boat(params, scene.row, command[0] + step, command[1], scene.tuning.dt_s)
+    return (scene.row[L.SPEED] - scene.next_state[i, L.SPEED]) / step
+
+
+@lean_kernel
+def _inputs_of(count: int, scene: Scene) -> None:
+    """Scaled inputs of the candidate (``scene.z_now``) and the nominal commands (``scene.z0``), and the movers' gains.
+
+    ``scene.gain[i]`` holds d(psi)/d(z_t) in rad, d(v)/d(z_s) in m/s, and the full turn, deg.
+    """
+    state, root, gain = scene.state, math.sqrt(scene.tuning.speed_weight), scene.gain
+    for m in range(count):
+        i = scene.movers[m]
+        params, speed_mps = scene.boats.params[i], scene.command[i, 0]
+        top, full = params[L.MAX_SPEED], max(full_turn(params, state[i], speed_mps, scene.tuning.dt_s), 1e-6)
+        gain[i, 0], gain[i, 1], gain[i, 2] = math.radians(full), _speed_effect(i, scene) * top / root, full
+        turn = (scene.next_state[i, L.HEADING] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
+        scene.z_now[2 * m] = max(-1.0, min(1.0, turn / full))
+        scene.z_now[2 * m + 1] = root * max(0.0, min(1.0, speed_mps / top))
+        scene.z0[2 * m] = max(-1.0, min(1.0, scene.checked_turn[i] / full))
+        scene.z0[2 * m + 1] = root * max(0.0, min(1.0, scene.checked[i, 0] / top))
+
+
+@lean_kernel
+def _add_effect(r: int, i: int, m: int, sign: float, scene: Scene) -> None:
+    """Add to row r the share of boat i (mover m) in the clearance in ``scene.out``."""
+    path, at, nx, ny = scene.path[i], scene.out[SAMPLE], scene.out[NORMAL_X], scene.out[NORMAL_Y]
+    k = min(int(at), path.shape[0] - 2)
+    part = min(1.0, at - k)
+    x, y = path[k, 0], path[k, 1]
+    if part > 0.0:  # at the end of a path nothing of it lies beyond
+        x += part * (path[k + 1, 0] - x)
+        y += part * (path[k + 1, 1] - y)
+    rx, ry = x - scene.next_state[i, L.X], y - scene.next_state[i, L.Y]
+    scene.C[r, 2 * m] += sign * (nx * ry - ny * rx) * scene.gain[i, 0]
+    speed = max(scene.next_state[i, L.SPEED], SLOW_MPS)
+    scene.C[r, 2 * m + 1] += sign * (nx * rx + ny * ry) / speed * scene.gain[i, 1]
+
+
+@lean_kernel
+def _close_row(r: int, i: int, about_what: int, lack: float, count: int, scene: Scene) -> int:
+    """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length, and label it.
+
+    Returns the number of the next row: the same when no inputs can violate it, or none have any effect on it.
+    """
+    row, root, most = scene.C[r, : 2 * count], math.sqrt(scene.tuning.speed_weight), 0.0
+    for c in range(0, 2 * count, 2):
+        most += 2.0 * abs(row[c]) + root * abs(row[c + 1])
+    norm = math.sqrt(_dot(row, row))
+    if lack + most < 0.0 or norm < 1e-9:
+        return r
+    scene.d[r] = lack
+    for c in range(2 * count):
+        scene.d[r] += row[c] * scene.z_now[c]
+    scene.d[r] /= norm
+    for c in range(2 * count):
+        row[c] /= norm
+    scene.label[r, 0], scene.label[r, 1] = i, about_what
+    return r + 1
+
+
+@lean_kernel
+def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
+    """Rows of mover m about other boats; returns the row after the last, or -1 when there are too many.
+
+    A boat's target is what it, and boat j if that keeps everything and is ours, keeps from all boats on their backups.
+    """
+    i = scene.movers[m]
+    for j in range(scene.ours.shape[0]):
+        other = scene.mover_of[j]
+        if j == i or not scene.near[i, j] or (other >= 0 and j < i):
+            continue
+        if r + 1 + 6 * count > scene.C.shape[0]:
+            return -1
+        clear_of_boat(i, j, scene.path[i], scene, -FAR, FAR)
+        scene.C[r, :] = 0.0
+        _add_effect(r, i, m, 1.0, scene)
+        if other >= 0:
+            _add_effect(r, j, other, -1.0, scene)
+        kept_m = max(must_keep(i, j, scene), scene.verified[i, WORTH])
+        if scene.ours[j] and keeps_all(j, scene):
+            kept_m = max(kept_m, scene.verified[j, WORTH])
+        r = _close_row(r, i, j, kept_m - scene.out[MARGIN], count, scene)
+    return r
+
+
+@lean_kernel
+def _row_of_static(r: int, m: int, about_what: int, count: int, scene: Scene) -> int:
+    """Row of mover m about obstacles near in time, or all static constraints; returns the number of the next."""
+    i, target_m = scene.movers[m], 0.0
+    if about_what == NEAR_OBSTACLES:
+        nearest = clear_of_near_obstacles(i, i, scene, FAR, scene.out)
+    else:
+        nearest, target_m = clear_of_static(i, i, scene, scene.out), scene.static_target_m[i]
+    if about(nearest) >= 0:
+        write_slope(about(nearest), i, i, scene, scene.out)
+    if scene.out[MARGIN] >= FAR:
+        return r
+    scene.C[r, :] = 0.0
+    _add_effect(r, i, m, 1.0, scene)
+    return _close_row(r, i, about_what, target_m + STATIC_AIM_M - scene.out[MARGIN], count, scene)
+
+
+@lean_kernel
+def _rows_of_limits(r: int, m: int, scene: Scene) -> int:
+    """Actuator limits of mover m: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight); returns the number of the next."""
+    lowest = (-1.0, -1.0, 0.0, -math.sqrt(scene.tuning.speed_weight))
+    for side in range(4):
+        scene.C[r, :] = 0.0
+        scene.C[r, 2 * m + side // 2] = 1.0 - 2.0 * (side % 2)
+        scene.d[r] = lowest[side]
+        scene.label[r, 0], scene.label[r, 1] = scene.movers[m], LIMITS
+        r += 1
+    return r
+
+
+@lean_kernel
+def linearise(count: int, scene: Scene) -> int:
+    """Rows about the candidate; how many, or -1 when there are too many or the decision has cost its limit.
+
+    ``scene.label[r]`` says whose row it is, and about which other boat, or about what else, see `LIMITS`.
+    """
+    if all_spent(scene) or 6 * count > scene.C.shape[0]:  # two rows of static constraints and four of limits for each
+        return -1
+    for m in range(count):
+        scene.spent[0] += scene.cost[scene.movers[m]]
+    _inputs_of(count, scene)
+    r = 0
+    for m in range(count):
+        r = _rows_of_boats(r, m, count, scene)
+        if r < 0:
+            break
+        r = _row_of_static(r, m, NEAR_OBSTACLES, count, scene)
+        r = _row_of_static(r, m, ALL_STATIC, count, scene)
+    for m in range(count if r >= 0 else 0):
+        r = _rows_of_limits(r, m, scene)
+    scene.spent[0] += ROW_COST * r * count
+    return r
+
+
+@lean_kernel
+def solve(count: int, rows: int, scene: Scene) -> bool:
+    """Solve the program by projection; False when it has no solution."""
+    n = 2 * count
+    return project(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n], scene.z[:n], scene.dual[:rows])
+
+
+@lean_kernel
+def among_mates(scene: Scene) -> bool:
+    """Whether team-mates are in the way of any nominal command."""
+    found = False
+    for i in range(scene.ours.shape[0]):
+        found = found or (scene.ours[i] and scene.cause[i] >= 0 and scene.ours[scene.cause[i]])
+    return found
+
+
+@lean_kernel
+def begin_program(scene: Scene) -> int:
+    """Make nominal commands the candidate of boats that team-mates are in the way of, and of these; returns how many.
+
+    None that an opponent is in the way of, or whose backup is short of something: what these do is settled.
+    """
+    ours, moving = scene.ours, scene.moving
+    moving[:] = False
+    for i in range(ours.shape[0]):
+        j = scene.cause[i]
+        if ours[i] and j >= 0 and ours[j] and keeps_all(i, scene):
+            moving[i] = True
+            moving[j] = moving[j] or (keeps_all(j, scene) and not before_opponent(j, scene))
+    count = list_movers(scene)
+    for m in range(count):
+        copy_row(scene.command[scene.movers[m]], scene.checked[scene.movers[m]])
+    if count > 0:
+        check(scene)
+    return count
+
+
+@lean_kernel
+def _take_answer(z: Array, count: int, scene: Scene) -> bool:
+    """Turn scaled inputs into the commands whose autopilot yields them; False when any of them is not finite.
+
+    A boat whose inputs are unchanged keeps its nominal command, bit for bit.
+    """
+    root, dt_s = math.sqrt(scene.tuning.speed_weight), scene.tuning.dt_s
+    for m in range(2 * count):
+        if not math.isfinite(z[m]):
+            return False
+    for m in range(count):
+        i = scene.movers[m]
+        params, top = scene.boats.params[i], scene.boats.params[i, L.MAX_SPEED]
+        same_speed = abs(z[2 * m + 1] - scene.z0[2 * m + 1]) <= SAME
+        if same_speed and abs(z[2 * m] - scene.z0[2 * m]) <= SAME:
+            copy_row(scene.command[i], scene.checked[i])
+            continue
+        speed = scene.checked[i, 0] if same_speed else max(0.0, min(top, z[2 * m + 1] / root * top))
+        turn = z[2 * m] * scene.gain[i, 2]
+        scene.command[i, 0], scene.command[i, 1] = speed, command_for_turn(params, scene.state[i], speed, turn, dt_s)
+    return True
+
+
+@lean_kernel
+def accept(scene: Scene, z: Array, count: int) -> bool:
+    """Take an answer of the program; whether it costs no boat more than a little by the exact check."""
+    if not _take_answer(z, count, scene):
+        return False
+    check(scene)
+    return costs_at_most(LITTLE_M, scene)
+
+
+@lean_kernel
+def end_program(scene: Scene, safe: bool, count: int) -> None:
+    """Name the reasons of an answer that was accepted, or take the backups back up."""
+    for m in range(count):
+        i = scene.movers[m]
+        if safe:
+            scene.slack_m[i], scene.reason[i], scene.solver[i] = 0.0, LEAST_CHANGE, BY_QP
+        else:
+            go_back(i, scene)
+    if safe:
+        note_verified(scene)
+    elif count > 0:
+        check(scene)

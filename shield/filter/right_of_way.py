@@ -1,0 +1,172 @@
+"""Right of way: of two boats that keep each other from turning, one turns away and one stands on.
+
+Two boats on all but the same course, each wanting to go where the other is, keep each other from turning for as long as
+both press: every decision is safe, and neither ever gets anywhere. Symmetry is broken as the rules of the road do, by
+what each can see of the other: who is behind, or has the other on its starboard side, gives way and turns away; the
+other stands on, holding its course. The shield checks these commands as any others.
+
+An opponent knows nothing of this, and is answered by backups in full, which clear it.
+
+That robots behind barriers block each other, and that consistent sides resolve it: Wang, Ames, Egerstedt, "Safety
+barrier certificates for collisions-free multirobot systems", IEEE T-RO 33(3), 2017.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .. import workspace as W
+from ..jit import Array, lean_kernel
+from ..platforms import layout as L
+from ..platforms.usv import wrap_degrees
+from ..workspace import Scene, unchanged
+
+NEAR_M = 2.0
+"""Distance beyond what is to be kept within which a boat is alongside, m."""
+ALIKE_DEG = 45.0
+"""Courses that differ by no more are all but the same."""
+PRESSING_DEG = 15.0
+"""A smaller turn wanted is steady steering."""
+TURNED_DEG = 20.0
+"""A boat that has turned so far to the side it wants is not kept from turning."""
+FREED_S = 1.0
+"""A boat whose wanted command has passed for longer is not kept from turning, s."""
+AWAY_DEG = 120.0
+"""Turn commanded to the boat that gives way."""
+ABREAST_M = 1.0
+"""Who is behind by no more is abreast, m."""
+CLEAR_M = 3.0
+"""Distance beyond what is to be kept from which who gave way is clear of the other, m."""
+LONGEST_S = 20.0
+"""Longest time a boat gives way, s."""
+STILL_MPS = 0.2
+"""A boat that wants no more than this does not want to go anywhere."""
+PATIENCE = 3.0
+"""Times as long as others a boat that has the right of way presses before it gives way nevertheless."""
+
+
+@lean_kernel
+def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
+    """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
+    state, ours = scene.state, scene.ours
+    found, least = -1, math.inf
+    if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
+        return found
+    east, north = math.sin(math.radians(state[i, L.HEADING])), math.cos(math.radians(state[i, L.HEADING]))
+    for j in range(state.shape[0]):
+        if (
+            j == i
+            or not ours[j]
+            or not scene.near[i, j]
+            or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG
+        ):
+            continue
+        dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
+        gap, starboard = math.sqrt(dx * dx + dy * dy), dx * north - dy * east
+        if starboard * turn_deg > 0.0 and gap < scene.radius[i, j] + NEAR_M and gap < least:
+            found, least = j, gap
+    return found
+
+
+@lean_kernel
+def _stands_on(i: int, j: int, state: Array) -> bool:
+    """Whether boat i is ahead of j, or abreast to starboard of it, by their mean course: j says the opposite."""
+    own, other = math.radians(state[i, L.HEADING]), math.radians(state[j, L.HEADING])
+    east, north = math.sin(own) + math.sin(other), math.cos(own) + math.cos(other)
+    length = math.sqrt(east * east + north * north)
+    if length > 0.0:
+        east, north = east / length, north / length
+    dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
+    ahead = dx * east + dy * north
+    if abs(ahead) > ABREAST_M:
+        return ahead < 0.0
+    return dx * north - dy * east < 0.0
+
+
+@lean_kernel
+def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
+    """Boat that still keeps boat i from turning as it wants; -1 for none."""
+    state, memory = scene.state, scene.memory
+    if memory[i, W.HAS_BACKUP] == 0.0 or memory[i, W.PRESSED_S] <= 0.0 or memory[i, W.FREE_S] > FREED_S:
+        return -1
+    turned_deg = wrap_degrees(state[i, L.HEADING] - memory[i, W.PRESSED_DEG])
+    if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
+        return -1
+    return _alongside(i, turn_deg, speed_mps, scene)
+
+
+@lean_kernel
+def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
+    """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
+    state, ours, memory = scene.state, scene.ours, scene.memory
+    j = int(memory[i, W.BLOCKED_BY])
+    if j < 0 or not ours[j] or not scene.near[i, j] or memory[i, W.HAS_BACKUP] == 0.0:
+        return False
+    if speed_mps <= STILL_MPS or memory[i, W.PRESSED_S] >= LONGEST_S:
+        return False
+    gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+    return turn_deg * memory[i, W.GIVES_WAY] < 0.0 and gap < scene.radius[i, j] + CLEAR_M
+
+
+@lean_kernel
+def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
+    """Go on counting how long boat i has been kept from turning, and decide whether it gives way."""
+    state, tuning, memory = scene.state, scene.tuning, scene.memory
+    j = _who_blocks(i, turn_deg, speed_mps, scene)
+    if j < 0:
+        memory[i, W.PRESSED_S] = 0.0
+    elif j != int(memory[i, W.BLOCKED_BY]):
+        memory[i, W.PRESSED_S] = tuning.dt_s
+    memory[i, W.BLOCKED_BY] = j
+    if j < 0:
+        return
+    if memory[j, W.GIVES_WAY] != 0.0 and int(memory[j, W.BLOCKED_BY]) == i:
+        return
+    memory[i, W.PRESSED_S] += tuning.dt_s
+    patience = PATIENCE if _stands_on(i, j, state) else 1.0
+    if memory[i, W.PRESSED_S] >= patience * tuning.give_way_after_s:
+        memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S] = -math.copysign(1.0, turn_deg), tuning.dt_s
+
+
+@lean_kernel
+def apply_right_of_way(i: int, scene: Scene) -> None:
+    """Replace the wanted command of boat i where it has been kept from turning for long enough."""
+    tuning, memory = scene.tuning, scene.memory
+    speed_mps, turn_deg = scene.command[i, 0], wrap_degrees(scene.command[i, 1])
+    if memory[i, W.GIVES_WAY] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
+        memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S] = 0.0, 0.0
+    if memory[i, W.GIVES_WAY] != 0.0:
+        memory[i, W.PRESSED_S] += tuning.dt_s
+    else:
+        _press(i, turn_deg, speed_mps, scene)
+        if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.PRESSED_S] < tuning.give_way_after_s:
+            return
+    scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]
+    scene.reason[i] = W.RIGHT_OF_WAY
+
+
+@lean_kernel
+def forget_pressing(i: int, scene: Scene) -> None:
+    """Boat i is kept from turning by nobody, and gives way to nobody."""
+    memory = scene.memory
+    memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S], memory[i, W.BLOCKED_BY] = 0.0, 0.0, -1
+
+
+@lean_kernel
+def note_pressing(i: int, scene: Scene) -> None:
+    """Note since when, on what heading, boat i is kept from turning: its turn towards another was changed."""
+    state, tuning, memory = scene.state, scene.tuning, scene.memory
+    if scene.reason[i] == W.RIGHT_OF_WAY:
+        scene.bound[i], memory[i, W.FREE_S] = int(memory[i, W.BLOCKED_BY]), 0.0
+        return
+    memory[i, W.FREE_S] += tuning.dt_s
+    j = scene.bound[i]
+    if scene.reason[i] < W.LEAST_CHANGE or scene.reason[i] > W.BEST_EFFORT or j < 0 or unchanged(i, scene):
+        return
+    turn_deg, speed_mps = wrap_degrees(scene.checked[i, 1]), scene.checked[i, 0]
+    if _alongside(i, turn_deg, speed_mps, scene) != j:
+        return
+    memory[i, W.FREE_S] = 0.0
+    if memory[i, W.PRESSED_S] == 0.0:
+        memory[i, W.PRESSED_S] = tuning.dt_s
+        memory[i, W.PRESSED_DEG] = state[i, L.HEADING]

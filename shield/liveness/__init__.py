@@ -1,1 +1,0 @@
-"""What keeps safe boats from standing still for ever."""

@@ -1,0 +1,174 @@
+"""Tracks made ready for a decision: memory filled in, age and delay run on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .config import ShieldConfig
+from .exceptions import FleetError
+from .fleet import Fleet
+from .jit import Array, BoolArray, IntArray, copy_row, kernel
+from .platforms import layout as L
+from .platforms.step import step_boat
+from .workspace import BACKUP_MARGIN, BLOCKED_BY, LARGEST_COMMAND, N_MEMORY, Scene
+
+
+@kernel
+def fill_memory(state: Array, params: Array) -> None:
+    """Replace unknown (NaN) thrust by the one that holds the speed, unknown rudder and integrals by 0; in place."""
+    for i in range(state.shape[0]):
+        if math.isnan(state[i, L.THRUST]):
+            state[i, L.THRUST] = thrust_at(params[i], state[i, L.SPEED])
+        for column in (L.RUDDER, L.SPEED_INTEGRAL, L.HEADING_INTEGRAL, L.TURN_RATE):
+            if math.isnan(state[i, column]):
+                state[i, column] = 0.0
+
+
+@kernel
+def thrust_at(params: Array, speed_mps: float) -> float:
+    """Thrust, percent, that holds a straight-line speed, m/s; the thrust map's end beyond it."""
+    size = int(params[L.MAP_SIZE])
+    for k in range(1, size):
+        low, high = params[L.MAP_SPEED + k - 1], params[L.MAP_SPEED + k]
+        if speed_mps <= high and high > low:
+            part = max(0.0, (speed_mps - low) / (high - low))
+            start = params[L.MAP_THRUST + k - 1]
+            return start + part * (params[L.MAP_THRUST + k] - start)
+    return min(params[L.MAP_THRUST + size - 1], params[L.MAX_THRUST])
+
+
+@kernel
+def run_on(state: Array, seconds: Array) -> None:
+    """Move boats straight on for their number of seconds, in place."""
+    for i in range(state.shape[0]):
+        heading = math.radians(state[i, L.HEADING])
+        state[i, L.X] += state[i, L.SPEED] * seconds[i] * math.sin(heading)
+        state[i, L.Y] += state[i, L.SPEED] * seconds[i] * math.cos(heading)
+
+
+@kernel
+def run_on_commands(state: Array, who: BoolArray, params: Array, pending: Array, dt_s: float) -> None:
+    """Step boats of ``who`` through commands on their way, the others straight on; in place.
+
+    Args:
+        state: (n, N_STATE) boats now.
+        who: (n,) boats whose commands are known.
+        params: (n, N_PARAM) platform rows.
+        pending: (steps, n, 2) speed m/s and absolute heading deg, the next to take effect first; NaN: none was sent,
+            the boat goes straight on, as it does for values no shield sends.
+        dt_s: step, s.
+    """
+    for k in range(pending.shape[0]):
+        for i in range(state.shape[0]):
+            # what boats not ours were told may be anything
+            if who[i] and abs(pending[k, i, 0]) <= LARGEST_COMMAND and abs(pending[k, i, 1]) <= 2.0 * LARGEST_COMMAND:
+                error = (pending[k, i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
+                step_boat(params[i], state[i], pending[k, i, 0], error, dt_s)
+            else:
+                way = state[i, L.SPEED] * dt_s
+                heading = math.radians(state[i, L.HEADING])
+                state[i, L.X] += way * math.sin(heading)
+                state[i, L.Y] += way * math.cos(heading)
+
+
+@kernel
+def queue_commands(pending: Array, state: Array, commands: Array) -> None:
+    """Put commands (n, 2), speed m/s and heading deg relative to ``state``, at the end of the queue, in place."""
+    last = pending.shape[0] - 1
+    for k in range(last):
+        for i in range(state.shape[0]):
+            copy_row(pending[k, i], pending[k + 1, i])
+    for i in range(state.shape[0]):
+        pending[last, i, 0] = commands[i, 0]
+        pending[last, i, 1] = state[i, L.HEADING] + commands[i, 1]
+
+
+@kernel
+def turn_round(state: Array, controlled: BoolArray) -> None:
+    """Make boats not ours that go astern go ahead the same way, in place: others' courses are followed ahead."""
+    for i in range(state.shape[0]):
+        if not controlled[i] and state[i, L.SPEED] < 0.0:
+            state[i, L.HEADING] = state[i, L.HEADING] % 360.0 - 180.0
+            state[i, L.SPEED] = -state[i, L.SPEED]
+
+
+def whole_steps(time_s: float, dt_s: float) -> int:
+    """Steps that a time takes, counted up but for its rounding."""
+    return math.ceil(time_s / dt_s - 1e-9)
+
+
+def steps_of_delay(config: ShieldConfig) -> int:
+    """Decisions whose commands are on their way at any time."""
+    return whole_steps(config.delay_s, config.dt_s)
+
+
+def check_ages(fleet: Fleet, config: ShieldConfig) -> None:
+    """Check the ages of tracks.
+
+    Raises:
+        FleetError: one is not usable, or older than ``max_track_age_s``.
+    """
+    age = fleet.age_s
+    if age is None:
+        return
+    if not (np.isfinite(age).all() and (age >= 0).all()):
+        raise FleetError("age_s holds a value that is negative or not finite; give seconds since each track's fix")
+    worst = int(np.argmax(age)) if len(age) > 0 else -1
+    if worst >= 0 and age[worst] > config.max_track_age_s:
+        raise FleetError(
+            f"track of {fleet.names[worst]!r} is {age[worst]:.2f} s old, limit {config.max_track_age_s} s; "
+            "refresh it, raise max_track_age_s, or leave the boat out: then nobody keeps clear of it"
+        )
+
+
+def who_stayed(before: tuple[Any, ...], now: tuple[Any, ...]) -> tuple[IntArray, IntArray]:
+    """Places now and then of boats of the same (name, platform, team); none where two boats have one name."""
+    place = {key: k for k, key in enumerate(before)}
+    if len({key[0] for key in before}) < len(before) or len({key[0] for key in now}) < len(now):
+        place = {}
+    stayed = [i for i, key in enumerate(now) if key in place]
+    return np.array(stayed, dtype=np.int64), np.array([place[now[i]] for i in stayed], dtype=np.int64)
+
+
+def carry_over(old: Scene, new: Scene, stayed: IntArray, then: IntArray, state: Array) -> None:
+    """Copy what is remembered of boats that stayed to the scene of another fleet, in place.
+
+    Margins are those of the boats seen then. Of a boat that meets a new one none is known of them all: it is asked for
+    no more than a margin of 0, and its backup is kept.
+
+    Args:
+        old: the scene until now.
+        new: the scene from now on.
+        stayed: (k,) places in the new one of boats that were in the old one,
+        then: (k,) at these places.
+        state: (n, N_STATE) boats of the new one.
+    """
+    if len(stayed) == 0:
+        return
+    met = _meets_new(stayed, new, state)
+    new.pending[:, :, stayed] = old.pending[:1, :, then]  # all deciders know what all boats were told
+    for_team = len(old.memories) == len(new.memories) == 1
+    for i, k in [(0, 0)] if for_team else zip(stayed, then, strict=True):
+        kept, was = new.memories[i], old.memories[k]
+        kept[stayed, :N_MEMORY] = was[then, :N_MEMORY]
+        places = np.full(len(old.ours) + 1, -1.0)  # the last for nobody
+        places[then] = stayed
+        kept[stayed, BLOCKED_BY] = places[was[then, BLOCKED_BY].astype(np.int64)]
+        kept[met, BACKUP_MARGIN] = np.minimum(kept[met, BACKUP_MARGIN], 0.0)
+        kept[np.ix_(stayed, N_MEMORY + stayed)] = was[np.ix_(then, N_MEMORY + then)]
+
+
+def _meets_new(stayed: IntArray, scene: Scene, state: Array) -> BoolArray:
+    """Boats, (n,), that one which was not there before can come near to while paths are looked at."""
+    boats, tuning = scene.boats, scene.tuning
+    fresh = np.ones(len(state), np.bool_)
+    fresh[stayed] = False
+    pursued = boats.pursuit_samples + boats.thrust_samples + boats.chased_samples
+    horizon_s = (np.maximum(boats.samples, pursued).max() + 1) * boats.sample_s + tuning.tail_s
+    top: Array = np.maximum(boats.fastest_mps, np.abs(state[:, L.SPEED]))
+    gap_m = np.hypot(state[:, None, L.X] - state[None, :, L.X], state[:, None, L.Y] - state[None, :, L.Y])
+    reach_m = tuning.radius_m + (top[:, None] + top[None]) * horizon_s
+    return np.asarray(((gap_m <= reach_m) & fresh[None] & ~np.eye(len(state), dtype=np.bool_)).any(axis=1))

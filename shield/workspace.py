@@ -1,0 +1,311 @@
+"""The one record that compiled code is handed: what is given, decided and remembered, constants, and scratch.
+
+A scene serves B decisions, one after another: arrays of all of them have B in front, all else is of the one under way.
+Row n of arrays of n + 1 rows is a manoeuvre on trial.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from .jit import Array, BoolArray, IntArray, lean_kernel
+from .platforms import layout as L
+from .shared import share
+from .tables.lookup import Tables
+
+PASSED, LEAST_CHANGE, QP_RELAXED, BACKUP, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY, LIMITED, STOPPED = range(10)
+"""Values of `decision.Reason`."""
+
+BY_QP, BY_LINE_SEARCH = 1, 2
+"""What found a least change; 0: nothing did."""
+
+LARGEST_COMMAND = 1e6
+"""Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""
+
+OURS, NOMINAL_SPEED, NOMINAL_TURN, AGE_S, ERROR_M, VISITING, HORIZON_S = (L.N_STATE + k for k in range(7))
+"""Columns of ``given`` behind the state: whether the boat is decided for, its nominal command, m/s and deg relative to
+its heading, age of its track, s, bound on its position error, m, `Fleet.visiting` and `Fleet.adversary_s`."""
+DRIVEN, N_GIVEN = L.N_STATE + 7, L.N_STATE + 11
+"""And from there `Fleet.driven`."""
+
+MARGIN_M, SLACK_M, ACTIVE, CUT_SHORT, FEARED_S, SOLVER, N_TOLD = range(7)
+"""Columns of ``told``: safety margin and what is given up of it, m, the active constraint (see `Decisions.bound`),
+whether the search was ended by its limit, how long the boat counts as adversarial, s (NaN: it is no opponent), and what
+found a least change, see `BY_QP`."""
+
+HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARGIN, STATIC_MARGIN = range(7)
+"""Columns of ``memory``: whether the boat holds a backup; its side (1: clockwise), the heading it ends on, deg (NaN:
+no turn is left) and speed, m/s; margins verified: of all boats, of runs of several opponents, of static constraints."""
+BACKING_UP, HOLD_S, PRESSED_S, PRESSED_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
+"""Whether it was carried out, and for how long it still is whatever is wanted, s; and see `right_of_way`: for how long
+a team-mate has kept the boat from turning, s, its heading when that began, deg, time since it was last, s, the
+team-mate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
+
+
+class Boats(NamedTuple):
+    """Constants of n boats."""
+
+    params: Array  # (n, N_PARAM) platform rows
+    team: IntArray  # (n,)
+    fastest_mps: Array  # (n,) speed no boat of the kind exceeds over ground; the stored speed may lag behind it
+    granted_turn_dps: Array  # (n,) turn rate granted to each as an opponent at its top speed
+    granted_acc_mps2: Array  # (n,) acceleration granted to each as an opponent
+    regain_s: Array  # (n,) time from rest to top speed at the highest acceleration
+    granted_dec_mps2: Array  # (n,) rate at which each, as an opponent, loses speed in a turn
+    granted_loss: Array  # (n,) share of top speed that each, as an opponent, loses in its granted turn
+    samples: IntArray  # (n,) path samples of the horizon
+    pursuit_samples: IntArray  # (n,) the same for which pursuers are followed once thrust is full; at least those
+    chase_samples: IntArray  # (n, n) beyond that, for which a pursuer (column) no faster than the boat (row) is
+    chased_samples: IntArray  # (n,) the most of them
+    ready_thrust: Array  # (n,) thrust, percent, from which a boat is taken to have all of it
+    thrust_samples: IntArray  # (n,) path samples until a boat has its thrust back at the latest
+    fade: Array  # (n,) factor of negative margins against pursuers per path sample
+    static_samples: IntArray  # (n,) samples until a half turn could be over
+    stride: int  # model steps between path samples
+    sample_s: float  # time between path samples, s
+    plans: Array  # (n, most, 3) backup manoeuvres of each, see `backup.family`; NaN beyond its own
+    n_plans: IntArray  # (n,) how many those are
+    decay: Array  # (n,) factor by which a margin may shrink in one step; 0: it may fall to 0 at once
+    cap_m: Array  # (n,) margins above this may shrink freely, m
+    dwell_s: Array  # (n,) least time for which a backup from opponents is carried on with, s
+    tables: Tables
+    table: IntArray  # (n, n) table of each own boat (row) with each opponent (column), -1 for none
+    table_margin_m: float  # added to the radius where a table is looked into, m
+    table_steps: IntArray  # (n,) steps ahead at which backups are compared by table, 0 for boats without one
+    joint_decay: float  # factor by which the margin on runs of several opponents may shrink in one step
+    joint_samples: int  # path samples over which several opponents are rolled out before they are looked up
+    feared: BoolArray  # (n,) whether some boat's table is about this boat
+
+
+class Registered(NamedTuple):
+    """The k registered barriers that are kept; written before every decision."""
+
+    address: IntArray  # (k,) where their functions are, in this process
+    values: Array  # (k, MOST_VALUES) the numbers they are given now, NaN beyond
+    size: IntArray  # (k,) how many those are; -1: they could not be had, and nothing is known of the barrier
+    faults: IntArray  # (k,) how often they gave no usable margin in this decision
+    off_m: float  # how far off a boat may be, and how much a margin may fall short between two samples, m
+    late_s: float  # time until the moment that is decided for, s
+
+
+MOST_VALUES = 64
+"""Numbers that one registered barrier may be given."""
+
+
+def new_registered(count: int = 0, off_m: float = 0.0, late_s: float = 0.0) -> Registered:
+    """So many barriers, of which nothing is known yet."""
+    values, size = np.full((count, MOST_VALUES), np.nan), np.full(count, -1)
+    return share(Registered(np.zeros(count, np.int64), values, size, np.zeros(count, np.int64), off_m, late_s))
+
+
+class Static(NamedTuple):
+    """Things that do not move, already widened by the distance to keep from them."""
+
+    field: Array  # (xmin, ymin, xmax, ymax), m; infinite where there is no edge
+    keep_out: Array  # (k, 3) circles kept by rule: centre x, y and radius, m
+    circles: Array  # (c, 3) the same of obstacles
+    segments: Array  # (s, 4) ends x0, y0, x1, y1 of walls, m
+    segment_m: float  # distance to keep from walls, m
+    side_m: float  # distance from a wall within which it is not known on which side of it a boat is, m
+    current_mps: float  # bound on the speed of a current whose direction is not known, m/s
+    line: Array  # (xmin, ymin, xmax, ymax) of the hard line that stops boats, m; infinite where none does
+    last_circles: int  # how many of the first circles and
+    last_segments: int  # of the first segments stop boats before them, whatever else is in their way
+    last_m: float  # how much nearer than the distance to keep these do, m
+    registered: Registered
+
+
+class Tuning(NamedTuple):
+    """Scalar settings in the form compiled code takes them, see `ShieldConfig`."""
+
+    dt_s: float  # step of decisions
+    model_s: float  # step of the boat model; sample 0 of every path is one such step from now
+    moves: int  # steps of the model in one of decisions, under one command
+    radius_m: float  # separation radius with buffer
+    buffer_m: float  # the buffer in it
+    tail_s: float  # how long straight runs are continued beyond the horizon
+    margin_cap_m: float  # margins above this are not looked at closely
+    speed_weight: float  # cost of changing the speed by top speed, full rudder to no rudder costing 1
+    mate_cap_m: float  # margins from team-mates above this may shrink freely
+    static_decay: float  # factor by which a margin from static constraints may shrink in one step
+    give_way_after_s: float  # time a boat is kept from turning before one of the two gives way
+    feared_s: float  # time for which an opponent is adversarial; 0: nobody is
+    visitor_s: float  # the same of opponents on our side of a field
+    position_error_m: float  # bound on the error of every position
+    delay_s: float  # time from own commands to their effect
+    track_error_mps: float  # how fast what is known of a position goes bad
+    search_limit: float  # cost at which a decision searches no further, see `backup.assign`
+
+
+class Scene(NamedTuple):
+    """All that decisions are made with, as one `shared` tuple; a shape is of the fields that are allocated anew."""
+
+    boats: Boats
+    static: Static
+    tuning: Tuning
+    # of all decisions
+    given: Annotated[Array, "B", "n", N_GIVEN]
+    sent: Annotated[Array, "B", "n", 2]  # commands as those given; bit for bit those where nothing is changed
+    changed: Annotated[BoolArray, "B", "n"]  # whether any bit is
+    reasons: Annotated[IntArray, "B", "n"]
+    told: Annotated[Array, "B", "n", N_TOLD]
+    memories: Annotated[Array, "B", "n", "memory"]
+    pending: Annotated[Array, "B", "delay", "n", 2]  # commands on their way, see `tracks.run_on_commands`
+    # of this decision
+    state: Annotated[Array, "n", L.N_STATE]  # boats at the moment the commands take effect
+    ours: Annotated[BoolArray, "n"]  # boats decided for now: of one group, while that is open
+    memory: Annotated[Array, "n", "memory"]
+    error_m: Annotated[Array, "n"]  # bound on the error of each position
+    nominal: Annotated[Array, "n", 2]  # nominal commands, speed m/s and relative heading deg
+    checked: Annotated[Array, "n", 2]  # those the nominal check looked at: else where a boat holds or gives way
+    checked_turn: Annotated[Array, "n"]  # turn of this step under them, deg
+    checked_reason: Annotated[IntArray, "n"]
+    command: Annotated[Array, "n", 2]  # candidate commands
+    next_state: Annotated[Array, "n", L.N_STATE]  # states after them
+    stepped: Annotated[Array, "n", 2]  # the commands of that
+    reason: Annotated[IntArray, "n"]
+    solver: Annotated[IntArray, "n"]  # what found the command, between nominal one and backup: `BY_QP` and the like
+    slack_m: Annotated[Array, "n"]
+    cause: Annotated[IntArray, "n"]  # what the nominal command is short of, as in ``bound``; -1: nothing
+    group: Annotated[IntArray, "n"]  # see `filter.groups`
+    moving: Annotated[BoolArray, "n"]  # boats whose commands are being changed
+    movers: Annotated[IntArray, "n"]  # their list,
+    mover_of: Annotated[IntArray, "n"]  # and each boat's place in it, -1: none
+    held: Annotated[Array, "n", 3]  # manoeuvre gone on with from other states: side, end heading deg (NaN), m/s
+    verified: Annotated[Array, "n", 5]  # what backups come to, see `filter.blend`
+    # neighbours
+    near: Annotated[BoolArray, "n", "n"]  # pairs that can matter
+    breach: Annotated[BoolArray, "n", "n"]  # pairs inside the separation
+    radius: Annotated[Array, "n", "n"]  # radius to keep
+    course: Annotated[Array, "n", 4]  # position one step on at present velocity, and heading as a unit vector
+    pursued: Annotated[BoolArray, "n"]  # whether an opponent that may pursue the boat is near
+    outnumbered: Annotated[BoolArray, "n"]  # whether several can come near to it, see `barriers.value_function`
+    reach_samples: Annotated[IntArray, "n"]  # path samples over which opponents may be followed
+    driven: Annotated[Array, "n", 4]
+    known: Annotated[BoolArray, "n"]  # boats whose way is predicted, in ``path``, by what drives them
+    fear_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
+    # required margins, m
+    target: Annotated[Array, "n"]  # from boats that are not ours
+    mate_target_m: Annotated[Array, "n"]  # from those that are
+    threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
+    joint_target_m: Annotated[Array, "n"]  # on runs of several
+    static_target_m: Annotated[Array, "n"]  # from static constraints
+    # manoeuvres held, and in row n on trial
+    manoeuvre: Annotated[Array, "n+1", 3]  # side, turn to go deg, speed m/s
+    path: Annotated[Array, "n+1", "samples", 2]  # positions along it, or along the way of predicted boats
+    ready: Annotated[Array, "n+1", 3]  # what is noted of the path, see `backup.rollout`
+    look: Annotated[Array, "n+1", 5]  # place at which the boat is looked up in tables
+    clear: Annotated[Array, "n+1", 4]  # clearance row of boats
+    static_clear: Annotated[Array, "n+1", 4]  # clearance row of static constraints
+    bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
+    kept: Annotated[IntArray, "n"]  # what it satisfies, see `backup.rank`,
+    worth_m: Annotated[Array, "n"]  # and the other entry of its score
+    short: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is not there
+    fails: Annotated[BoolArray, "n+1"]  # the same against pursuers
+    threat_m: Annotated[Array, "n+1"]  # least margin against pursuers
+    threat_by: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
+    threats_m: Annotated[Array, "n+1", "n"]  # margin against each, as far as they were looked at
+    joint_m: Annotated[Array, "n+1"]  # least on runs of several opponents
+    table_m: Annotated[Array, "n+1"]  # least that tables tell where they are looked up first
+    pursuers_known: Annotated[BoolArray, "n+1"]  # whether these are all those of the path that is there
+    sealed: Annotated[BoolArray, "n+1"]  # whether a table alone made the manoeuvre fail
+    searched: Annotated[IntArray, "n"]  # changes of manoeuvres when a boat was last searched for, -1: never
+    # scratch
+    row: Annotated[Array, L.N_STATE]
+    out: Annotated[Array, 4]
+    spare2: Annotated[Array, 4]
+    ways: Annotated[Array, "n", 3, 5]  # places an opponent may be at when tables are looked into
+    lookup: Annotated[Array, "n", "n", 5]  # place of each boat at which each opponent was looked up last, and margin
+    pursuer: Annotated[Array, 5]  # end of a pursuer's run: x, y, heading as a unit vector, speed
+    first_pursuer: Annotated[IntArray, "n"]  # opponent that is looked at first,
+    first_manner: Annotated[IntArray, "n", "n"]  # and how it is followed first
+    cost: Annotated[Array, "n"]  # what rating a manoeuvre of the boat costs,
+    spent: Annotated[Array, 1]  # what this decision has cost until now,
+    cut_short: Annotated[BoolArray, 1]  # and whether its search was ended by its limit
+    # quadratic program, two inputs a mover, see `filter.qp`
+    gain: Annotated[Array, "n", 3]
+    z_now: Annotated[Array, "2n"]
+    z0: Annotated[Array, "2n"]
+    z: Annotated[Array, "2n"]
+    C: Annotated[Array, "rows", "2n"]
+    d: Annotated[Array, "rows"]
+    dual: Annotated[Array, "rows"]
+    label: Annotated[IntArray, "rows", 2]
+
+
+MOST_ROWS = 3000
+"""Where a program would have more rows than this, the backups are sent instead."""
+
+_KINDS: dict[Any, type] = {Array: np.float64, IntArray: np.int64, BoolArray: np.bool_}
+
+
+def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, delay: int) -> Scene:
+    """A scene in which nothing is to be decided about yet.
+
+    Args:
+        decisions: how many it serves.
+        boats: their constants.
+        static: static constraints.
+        tuning: the settings.
+        delay: decisions whose commands are on their way at any time.
+    """
+    n = len(boats.team)
+    sizes = {
+        "B": decisions,
+        "n": n,
+        "n+1": n + 1,
+        "2n": 2 * n,
+        "samples": path_samples(boats) + 1,
+        "delay": delay,
+        "memory": N_MEMORY + n,
+        "rows": min(n * (n + 6) + 2, MOST_ROWS),
+    }
+    fields: dict[str, Any] = {"boats": boats, "static": static, "tuning": tuning}
+    for name, hint in get_type_hints(Scene, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            kind, *shape = get_args(hint)
+            fields[name] = np.zeros([sizes[size] if isinstance(size, str) else size for size in shape], _KINDS[kind])
+    fields["memories"], fields["pending"][:] = new_memory(decisions, n), np.nan
+    return share(Scene(**fields))
+
+
+def new_memory(decisions: int, boats: int) -> Array:
+    """Memory, (B, n, N_MEMORY + n), of boats that hold no manoeuvre yet."""
+    memories = np.zeros((decisions, boats, N_MEMORY + boats))
+    memories[..., BACKUP_SIDE], memories[..., BLOCKED_BY] = 1.0, -1.0
+    return memories
+
+
+def path_samples(boats: Boats) -> int:
+    """Path samples that paths of these boats have at most."""
+    return int((boats.pursuit_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))
+
+
+PATH_COST = 2.0
+"""Cost of tracing a path. The unit is the clearance of one path from one boat that holds its course, about a
+microsecond: counted in work, not in seconds, so that the same inputs give the same bits anywhere."""
+PURSUER_COST = 5.0
+"""Cost of rolling an opponent out as a pursuer, in every manner, or of looking it up."""
+ROW_COST = 0.02
+"""Cost of the program for each of its rows and boats."""
+
+
+@lean_kernel
+def all_spent(scene: Scene) -> bool:
+    """Whether the decision is to search no further; it is then told that it was cut short.
+
+    Every boat then keeps the best manoeuvre found for it so far, at first the one it has held since the last decision,
+    and what is sent passes the same exact check as ever.
+    """
+    if scene.spent[0] <= scene.tuning.search_limit:
+        return False
+    scene.cut_short[0] = True
+    return True
+
+
+@lean_kernel
+def unchanged(i: int, scene: Scene) -> bool:
+    """Whether boat i's command is the nominal one, bit for bit."""
+    return scene.command[i, 0] == scene.checked[i, 0] and scene.command[i, 1] == scene.checked[i, 1]
