@@ -77,7 +77,8 @@ class Gate:
                 fault = fault or f"{name} has been silent for more than {SILENCE_S:g} s"
         if fault:
             return Nominal(0.0, reading.heading_rad if math.isfinite(reading.heading_rad) else 0.0, fault)
-        return self.meaning(*(self._heard[name][0] for name in self.inputs), reading)
+        first, second = (self._heard[name][0] for name in self.inputs)
+        return self.meaning(first, second, reading)
 
     def meaning(self, first: float, second: float, reading: BoatReading) -> Nominal:
         """The command that the two inputs, both fresh, stand for."""
