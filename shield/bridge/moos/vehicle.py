@@ -30,6 +30,8 @@ ALIVE_S = 1.5
 REST_MPS, REST_S = 0.3, 3.0
 """A boat this slow lies still; how long `close` waits for it, real s."""
 POLL_S = 0.05
+HANGS_S = 1.0
+"""Without a command of ours for so long, MOOS s, thrust is taken off actuators that would keep the last one."""
 MOST_TEXTS = 32
 SAY_AGAIN_S, ALIKE = 10.0, 40
 """A text is repeated after this long, s of the loop's clock; texts that begin alike are one."""
@@ -80,7 +82,7 @@ class MoosLink(Link):
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._told_fault = ""
         self._said_s: dict[str, float] = {}
-        self._last_rad = 0.0
+        self._last_rad, self._sent_s = 0.0, math.inf
         self._prepared = self._closed = False
         self.writers: dict[str, set[str]] = {}
         names = (*nav.VARIABLES, *nav.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
@@ -175,6 +177,7 @@ class MoosLink(Link):
             delivered = self.client.post(self.gate.encode(heading_rad, speed_mps, self._reading(now_s)))
             self._last_rad = heading_rad
             if delivered:
+                self._sent_s = now_s
                 self._drivers.posted(now_s)
         return Sent(self.boat, now_s, heading_rad, speed_mps, route, delivered)
 
@@ -283,9 +286,18 @@ class MoosLink(Link):
             else:
                 obeyed = not self._drivers.why_not()
                 text = self._drivers.hear(message, received_s, received_s - true_s)
-                if obeyed and self._drivers.why_not() and self._prepared and self.gate.at_rest:
-                    self.client.post(self.gate.at_rest)  # who takes the boat must not inherit our last thrust
+                if obeyed and self._drivers.why_not():
+                    self._rest()  # who takes the boat must not inherit our last thrust
+            if self.gate.at_rest and received_s - self._sent_s > HANGS_S and not self._drivers.why_not():
+                self._say(f"no command for {HANGS_S:g} s: the loop hangs", received_s)
+                self._rest()
             self._say(text, received_s)
+
+    def _rest(self) -> None:
+        """Take thrust off actuators that would keep our last command, once; the lock is held."""
+        if self.gate.at_rest and math.isfinite(self._sent_s):
+            self._sent_s = math.inf
+            self.client.post(self.gate.at_rest)
 
     def _say(self, text: str, now_s: float) -> None:
         """Keep a text for the operator, unless one like it was said lately."""

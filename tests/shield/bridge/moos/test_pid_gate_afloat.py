@@ -71,6 +71,22 @@ def test_a_boat_that_is_left_has_no_thrust():
         assert until(lambda: boats.states()["blue_1"][L.SPEED] < 0.05, 10.0)
 
 
+def test_a_loop_that_hangs_leaves_no_thrust_behind():
+    fleet = fleet_of(1, 0, gate="pid")
+    with sim_of(fleet, WARP) as boats, link_of(fleet, WARP) as (link, _):
+        community = boats.boats["blue_1"].community
+        for _ in range(30):
+            link.send(1.0, 1.2)
+            time.sleep(0.1 / WARP)
+        assert community.actuators.thrust > 5.0
+        assert until(lambda: community.actuators.thrust == 0.0, 2.0)
+        assert "no command for 1 s" in " ".join(link.read().texts)
+        for _ in range(30):
+            link.send(1.0, 1.2)
+            time.sleep(0.1 / WARP)
+        assert community.actuators.thrust > 5.0  # and goes on with the next command
+
+
 @pytest.mark.parametrize(
     ("key", "word"), [("MOOS_MANUAL_OVERRIDE", "true"), ("IVPHELM_ALLSTOP", "BehaviorError")], ids=["hand", "all-stop"]
 )
